@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# add_layer(name USES lower-layers... LINKS libraries...): a static library of every source in the
+# folder, with a module directory of its own.
+function(add_layer name)
+  cmake_parse_arguments(LAYER "" "" "USES;LINKS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS
+       "${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.f90" "${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.F90"
+       "${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.c" "${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp")
+  if(NOT sources)
+    return()
+  endif()
+  set(target "separatrix_${name}")
+  add_library(${target} STATIC ${sources})
+  set(modules "${CMAKE_BINARY_DIR}/modules/${name}")
+  set_target_properties(${target} PROPERTIES Fortran_MODULE_DIRECTORY "${modules}" POSITION_INDEPENDENT_CODE ON)
+  target_include_directories(${target} PUBLIC "${modules}")
+  target_link_libraries(${target} PRIVATE separatrix_strict PUBLIC ${LAYER_LINKS})
+  foreach(lower IN LISTS LAYER_USES)
+    target_link_libraries(${target} PUBLIC "separatrix_${lower}")
+  endforeach()
+endfunction()

@@ -1,0 +1,38 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Exit codes of the program and reason codes of trajectories, with their texts, in one table each.
+module status
+  implicit none
+  private
+
+  public :: reason_name
+
+  ! Exit codes (sysexits style).
+  integer, parameter, public :: exit_done = 0, exit_usage = 64, exit_bad_case = 65, &
+    exit_no_input = 66, exit_internal = 70, exit_cannot_create = 73, exit_io = 74, &
+    exit_resumable = 75, exit_other_case = 76
+
+  ! Why a trajectory ended. The codes add up to the number of points; there is no catch-all.
+  integer, parameter, public :: reason_not_run = 0, reason_settled = 1, reason_time_over = 2, &
+    reason_left_domain = 3, reason_not_finite = 4, reason_event_budget = 5, &
+    reason_step_failed = 6
+
+  !> Texts of the reason codes, index = code.
+  character(len=*), parameter, public :: reason_names(0:6) = [character(len=14) :: &
+    'not_run', 'settled', 'time_over', 'left_domain', 'not_finite', 'event_budget', 'step_failed']
+
+contains
+
+  !> The text of a reason code; 'unknown' outside the table.
+  pure function reason_name(code) result(name)
+    integer, intent(in) :: code
+    character(len=:), allocatable :: name
+    if (code >= lbound(reason_names, 1) .and. code <= ubound(reason_names, 1)) then
+      name = trim(reason_names(code))
+    else
+      name = 'unknown'
+    end if
+  end function reason_name
+
+end module status

@@ -1,0 +1,294 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One slip by the embedded Runge-Kutta pair of `dormand_prince_table`, for whatever is not linear. Events
+!> are isolated on the continuous extension by its Bernstein coefficients, then the step is taken
+!> again to the event itself, so that the state carries the error of the method and not of the extension.
+module adaptive_flight
+  use dormand_prince_table, only: error_3, error_5, extension, node, stage
+  use drive_law, only: foot_motion
+  use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
+    flight_time_over
+  use friction_law, only: sliding_friction
+  use kinds, only: wp
+  use motion_state, only: log_t, mode_slip_plus, options_t, record_sample, state_t, tally_t
+  use oscillator, only: oscillator_t
+  use polynomial, only: degree, first_fall, maximum_until, value_at
+  use restoring_law, only: restoring_force
+  implicit none
+  private
+
+  public :: fly_adaptive
+
+  integer, parameter :: most_polish = 6
+  !> Positions and speeds beyond this stand for none.
+  real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
+
+  !> What a slip needs to know of the machine and where it must end.
+  type :: slip_t
+    real(wp) :: direction = 1
+    real(wp) :: crank_angle = 0
+    !> Barrier ahead [m] and speed at which the Stribeck layer is left [m/s].
+    real(wp) :: barrier = 0, exit_speed = 0
+    !> Size of position and velocity below which errors are absolute [m, m/s].
+    real(wp) :: scale(2) = 1
+  end type slip_t
+
+contains
+
+  !> Flies from `state` (mode slip_plus or slip_minus) up to `time_end` [s after the section], `barrier` [m]
+  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, or at
+  !> the time. The state returned is that just before the event.
+  pure subroutine fly_adaptive(machine, options, state, time_end, exit_speed, barrier, tally, outcome, log)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end, exit_speed, barrier
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: outcome
+    type(log_t), intent(inout), optional :: log
+    type(slip_t) :: slip
+    real(wp) :: y(2), next(2), slopes(2, 16), path(0:degree, 2), h, remaining, error, fraction
+    logical :: last
+    slip = slip_of(machine, options, state, exit_speed, barrier)
+    y = [state%x, state%v]
+    slopes(:, 1) = slope(machine, slip, state%time, y)
+    h = first_step(machine, slip, options%tolerance, state%time, y, slopes(:, 1))
+    do
+      remaining = time_end - state%time
+      outcome = flight_time_over
+      if (remaining <= 0) exit
+      last = h >= remaining
+      h = min(h, remaining)
+      outcome = flight_failed
+      if (.not. h > 2*spacing(state%time + tiny(h))) exit
+      call try_step(machine, slip, options%tolerance, state%time, y, h, slopes, next, error)
+      if (.not. error <= 1) then
+        h = h*max(0.2_wp, 0.9_wp*error**(-0.125_wp))
+        if (error /= error) h = h*0.2_wp
+        cycle
+      end if
+      call extend(machine, slip, state%time, y, next, h, slopes, path)
+      call first_event(slip, path, outcome, fraction)
+      if (outcome == flight_failed) then
+        call look_along(state, y, path, h, 1.0_wp, slip, tally, log)
+        state%time = merge(time_end, state%time + h, last)
+        y = next
+        slopes(:, 1) = slopes(:, 13)
+        h = h*min(5.0_wp, 0.9_wp*max(error, 1e-10_wp)**(-0.125_wp))
+        cycle
+      end if
+      call land(machine, slip, options%tolerance, outcome, state%time, y, h, fraction, slopes, next)
+      call look_along(state, y, path, h, fraction, slip, tally, log)
+      state%time = min(state%time + fraction*h, time_end)
+      y = next
+      exit
+    end do
+    state%x = y(1)
+    state%v = y(2)
+    if (outcome == flight_barrier) state%x = barrier
+    if (outcome == flight_speed_reached .or. slip%direction*state%v < 0) state%v = 0
+  end subroutine fly_adaptive
+
+  pure function slip_of(machine, options, state, exit_speed, barrier) result(slip)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: exit_speed, barrier
+    type(slip_t) :: slip
+    real(wp) :: length
+    slip%direction = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
+    slip%crank_angle = options%crank_angle
+    slip%barrier = barrier
+    slip%exit_speed = exit_speed
+    length = 1
+    if (machine%restoring%stiffness > 0) length = machine%force_scale/machine%restoring%stiffness
+    if (length <= 0) length = max(abs(state%x), abs(state%v)/machine%drive_frequency, tiny(length))
+    slip%scale = 1e-3_wp*length*[1.0_wp, machine%drive_frequency]
+  end function slip_of
+
+  !> Velocity and acceleration.
+  pure function slope(machine, slip, time, y)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: time, y(2)
+    real(wp) :: slope(2), foot
+    call foot_motion(machine%drive, slip%crank_angle + machine%drive_frequency*time, foot)
+    slope(1) = y(2)
+    slope(2) = (restoring_force(machine%restoring, machine%restoring%free_length + foot - y(1)) &
+                + sliding_friction(machine%friction, y(2), slip%direction))/machine%mass
+  end function slope
+
+  !> Starting step: Hairer, Norsett, Wanner, II.4.
+  pure real(wp) function first_step(machine, slip, tolerance, time, y, f) result(h)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: tolerance, time, y(2), f(2)
+    real(wp) :: weight(2), d0, d1, d2
+    weight = tolerance*(abs(y) + slip%scale)
+    d0 = norm2(y/weight)
+    d1 = norm2(f/weight)
+    h = 1e-3_wp*machine%period
+    if (d0 > 0 .and. d1 > 0) h = min(h, 0.01_wp*d0/d1)
+    d2 = norm2((slope(machine, slip, time + h, y + h*f) - f)/weight)/h
+    h = min(100*h, (0.01_wp/max(d1, d2, tiny(d1)))**0.125_wp)
+  end function first_step
+
+  !> One step of order 8 and its error relative to the tolerance; slope 13 is that at the end.
+  pure subroutine try_step(machine, slip, tolerance, time, y, h, slopes, next, error)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: tolerance, time, y(2), h
+    real(wp), intent(inout) :: slopes(2, 16)
+    real(wp), intent(out) :: next(2), error
+    real(wp) :: weight(2), e5(2), e3(2), size_5, size_3
+    integer :: i
+    do i = 2, 12
+      slopes(:, i) = slope(machine, slip, time + node(i)*h, y + h*combine(slopes, i))
+    end do
+    next = y + h*combine(slopes, 13)
+    slopes(:, 13) = slope(machine, slip, time + h, next)
+    weight = tolerance*(max(abs(y), abs(next)) + slip%scale)
+    e5 = matmul(slopes(:, 1:12), error_5)/weight
+    e3 = (combine(slopes, 13) - error_3(1)*slopes(:, 1) - error_3(2)*slopes(:, 9) &
+          - error_3(3)*slopes(:, 12))/weight
+    size_5 = sum(e5**2)
+    size_3 = sum(e3**2)
+    error = 0
+    if (size_5 > 0) error = abs(h)*size_5/sqrt(2*(size_5 + 0.01_wp*size_3))
+  end subroutine try_step
+
+  !> Weighted sum of the slopes before stage `i`.
+  pure function combine(slopes, i) result(total)
+    real(wp), intent(in) :: slopes(2, 16)
+    integer, intent(in) :: i
+    real(wp) :: total(2)
+    integer :: k, offset
+    offset = ((i - 1)*(i - 2))/2
+    total = 0
+    do k = 1, i - 1
+      total = total + stage(offset + k)*slopes(:, k)
+    end do
+  end function combine
+
+  !> Continuous extension of a step as polynomials in the fraction of the step.
+  pure subroutine extend(machine, slip, time, y, next, h, slopes, path)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: time, y(2), next(2), h
+    real(wp), intent(inout) :: slopes(2, 16)
+    real(wp), intent(out) :: path(0:degree, 2)
+    real(wp) :: nested(2, 7), p(0:degree)
+    integer :: i, k
+    do i = 14, 16
+      slopes(:, i) = slope(machine, slip, time + node(i)*h, y + h*combine(slopes, i))
+    end do
+    nested(:, 1) = next - y
+    nested(:, 2) = h*slopes(:, 1) - nested(:, 1)
+    nested(:, 3) = 2*nested(:, 1) - h*(slopes(:, 13) + slopes(:, 1))
+    nested(:, 4:7) = h*matmul(slopes, extension)
+    do k = 1, 2
+      p = 0
+      do i = 7, 1, -1
+        p(0) = p(0) + nested(k, i)
+        if (modulo(i, 2) == 1) then
+          p = eoshift(p, -1)
+        else
+          p = p - eoshift(p, -1)
+        end if
+      end do
+      path(:, k) = p
+      path(0, k) = path(0, k) + y(k)
+    end do
+  end subroutine extend
+
+  !> First event within a step; `flight_failed` stands for none.
+  pure subroutine first_event(slip, path, outcome, fraction)
+    type(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: path(0:degree, 2)
+    integer, intent(out) :: outcome
+    real(wp), intent(out) :: fraction
+    real(wp) :: p(0:degree), t
+    outcome = flight_failed
+    fraction = 2
+    t = first_fall(slip%direction*path(:, 2))
+    if (t <= 1) then
+      outcome = flight_speed_reached
+      fraction = t
+    end if
+    t = 2
+    if (slip%exit_speed < unreachable) then
+      p = -slip%direction*path(:, 2)
+      p(0) = p(0) + slip%exit_speed
+      t = first_fall(p)
+    end if
+    if (t < fraction .and. t <= 1) then
+      outcome = flight_layer_left
+      fraction = t
+    end if
+    t = 2
+    if (abs(slip%barrier) < unreachable) then
+      p = -slip%direction*path(:, 1)
+      p(0) = p(0) + slip%direction*slip%barrier
+      t = first_fall(p)
+    end if
+    if (t <= fraction .and. t <= 1) then
+      outcome = flight_barrier
+      fraction = t
+    end if
+  end subroutine first_event
+
+  !> Takes the step again up to the event, corrected by Newton.
+  pure subroutine land(machine, slip, tolerance, outcome, time, y, h, fraction, slopes, next)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: tolerance, time, y(2), h
+    integer, intent(in) :: outcome
+    real(wp), intent(inout) :: fraction, slopes(2, 16)
+    real(wp), intent(out) :: next(2)
+    real(wp) :: error, miss, rate, correction
+    integer :: i
+    do i = 1, most_polish
+      call try_step(machine, slip, tolerance, time, y, fraction*h, slopes, next, error)
+      select case (outcome)
+      case (flight_barrier)
+        miss = slip%barrier - next(1)
+        rate = slopes(1, 13)
+      case (flight_layer_left)
+        miss = slip%direction*slip%exit_speed - next(2)
+        rate = slopes(2, 13)
+      case default
+        miss = -next(2)
+        rate = slopes(2, 13)
+      end select
+      correction = 0
+      if (abs(miss) < 0.01_wp*abs(rate)*h) correction = miss/(rate*h)
+      if (fraction + correction <= 0 .or. fraction + correction > 1) exit
+      if (abs(correction) <= 2*epsilon(1.0_wp)) exit
+      fraction = fraction + correction
+    end do
+  end subroutine land
+
+  !> Largest velocity and samples of a step up to `fraction` of it.
+  pure subroutine look_along(state, y, path, h, fraction, slip, tally, log)
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: y(2), path(0:degree, 2), h, fraction
+    type(slip_t), intent(in) :: slip
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: sample
+    if (tally%wants_v_max .and. slip%direction > 0) &
+      tally%v_max = max(tally%v_max, y(2), maximum_until(path(:, 2), fraction))
+    if (.not. present(log)) return
+    if (log%sample_interval <= 0) return
+    do
+      sample = state
+      sample%time = log%next_sample*log%sample_interval
+      if (sample%time >= state%time + fraction*h) exit
+      sample%x = value_at(path(:, 1), (sample%time - state%time)/h)
+      sample%v = value_at(path(:, 2), (sample%time - state%time)/h)
+      call record_sample(log, sample)
+    end do
+  end subroutine look_along
+
+end module adaptive_flight

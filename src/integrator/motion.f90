@@ -1,0 +1,256 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The event loop: slip, impact, chatter, stick, rest on a barrier, release, in any order, until a
+!> time. One loop serves every machine; the modes decide what comes next.
+module motion
+  use adaptive_flight, only: fly_adaptive
+  use contact_law, only: velocity_after_impact
+  use errors, only: error_t, fail
+  use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
+    fly_exact
+  use exact_flow, only: flow_t, prepare_flow
+  use kinds, only: wp
+  use motion_state, only: append_word, event_barrier_release, event_chatter_lower, &
+    event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_stick, &
+    event_turning_point, flight_adaptive, flight_exact, log_t, mode_lower_barrier, mode_slip_minus, &
+    mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
+    record_sample, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+    word_stick, word_upper
+  use oscillator, only: oscillator_t
+  use rest, only: chatter_time, hold, mode_from_rest
+  use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
+    reason_step_failed
+  implicit none
+  private
+
+  public :: prepare_motion, start_state, advance, advance_period
+
+  !> The Stribeck layer is entered from outside at its edge and left at this multiple of it, so that a
+  !> motion along the edge does not switch back and forth.
+  real(wp), parameter :: layer_exit = 1.25_wp
+
+  !> Events without progress in time after which the body is held for an instant: only a tie of forces
+  !> to the last bit can bring this about.
+  integer, parameter :: most_stalls = 8
+
+  !> A machine ready to move: all that does not change along a trajectory.
+  type, public :: motion_t
+    type(oscillator_t) :: machine
+    type(options_t) :: options
+    type(flow_t) :: flow
+    !> Slips outside the Stribeck layer are flown on the closed form.
+    logical :: exact = .false.
+    !> Edge of the Stribeck layer [m/s], 0 without one.
+    real(wp) :: layer = 0
+  end type motion_t
+
+contains
+
+  !> Prepares a machine. Refuses flight `exact` where a mode has no closed form.
+  pure subroutine prepare_motion(machine, options, moving, error)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(motion_t), intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    moving%machine = machine
+    moving%options = options
+    moving%layer = machine%friction%layer_speed
+    call prepare_flow(machine, options%crank_angle, moving%flow)
+    moving%exact = moving%flow%available .and. options%flight /= flight_adaptive
+    if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0)) then
+      call fail(error, exit_bad_case, 'integrator.flight = "exact": this machine has modes without a '// &
+                'closed form (Stribeck layer, nonlinear or missing spring, damping ratio above 0.9); '// &
+                'use "auto"')
+    end if
+  end subroutine prepare_motion
+
+  !> State of a body set off at `x` [m], `v` [m/s] with the crank at the section.
+  pure function start_state(moving, x, v) result(state)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: x, v
+    type(state_t) :: state
+    state = state_t(x=x, v=v, time=0.0_wp, mode=mode_slip_plus)
+    if (v < 0) state%mode = mode_slip_minus
+    if (v == 0) state%mode = mode_from_rest(moving%machine, moving%options, state)
+  end function start_state
+
+  !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
+  !> trajectory had to be given up (codes of module `status`).
+  pure subroutine advance(moving, state, time_end, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: before
+    integer :: stalls
+    reason = 0
+    stalls = 0
+    do while (state%time < time_end)
+      tally%events = tally%events + 1
+      if (tally%events > moving%options%event_budget) reason = reason_event_budget
+      if (reason /= 0) return
+      before = state%time
+      select case (state%mode)
+      case (mode_slip_plus, mode_slip_minus)
+        call slip_on(moving, state, time_end, tally, reason, log)
+      case default
+        call rest_on(moving, state, time_end, tally, log)
+      end select
+      if (.not. (abs(state%x) <= moving%options%domain)) reason = reason_left_domain
+      if (state%x /= state%x .or. state%v /= state%v) reason = reason_not_finite
+      stalls = merge(0, stalls + 1, state%time > before)
+      if (stalls >= most_stalls) call break_tie(moving, state, time_end)
+    end do
+  end subroutine advance
+
+  !> Moves to the next stroboscopic section and starts the clock anew.
+  pure subroutine advance_period(moving, state, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    call advance(moving, state, moving%machine%period, tally, reason, log)
+    if (reason /= 0) return
+    state%time = 0
+    call append_word(tally, word_period)
+    if (present(log)) then
+      log%origin = log%origin + moving%machine%period
+      log%next_sample = 0
+    end if
+  end subroutine advance_period
+
+  !> One flight and the event at its end.
+  pure subroutine slip_on(moving, state, time_end, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(inout) :: reason
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: barrier, exit_speed, before
+    integer :: outcome, direction
+    logical :: inside
+    direction = merge(1, -1, state%mode == mode_slip_plus)
+    barrier = merge(moving%machine%contact%upper, moving%machine%contact%lower, direction > 0)
+    before = state%time
+    inside = moving%layer > 0 .and. abs(state%v) <= moving%layer
+    outcome = flight_barrier
+    if (direction*(state%x - barrier) < 0) then
+      if (moving%exact .and. .not. inside) then
+        call fly_exact(moving%flow, state, time_end, moving%layer, barrier, tally, outcome, log)
+        if (outcome == flight_speed_reached .and. moving%layer > 0) outcome = flight_layer_left
+      else
+        exit_speed = huge(1.0_wp)
+        if (moving%exact) exit_speed = layer_exit*moving%layer
+        call fly_adaptive(moving%machine, moving%options, state, time_end, exit_speed, barrier, tally, &
+                          outcome, log)
+      end if
+    end if
+    if (state%time > before) tally%slips = tally%slips + 1
+    call note_position(tally, state)
+    select case (outcome)
+    case (flight_barrier)
+      tally%v_max = max(tally%v_max, state%v)
+      call collide(moving, state, direction, time_end, tally, log)
+    case (flight_speed_reached)
+      tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
+      call come_to_rest(moving, state, event_turning_point, tally, log)
+    case (flight_failed)
+      reason = reason_step_failed
+    end select
+  end subroutine slip_on
+
+  !> Impact: Newton's law, then away from the barrier, at rest on it, or the end of a chatter sequence.
+  pure subroutine collide(moving, state, direction, time_end, tally, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: after, left
+    after = velocity_after_impact(moving%machine%contact, state%v)
+    tally%impacts = tally%impacts + 1
+    tally%last_impact_speed = abs(state%v)
+    tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)
+    call append_word(tally, merge(word_upper, word_lower, direction > 0))
+    if (present(log)) call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), &
+                                        state, after)
+    state%v = after
+    state%mode = merge(mode_slip_minus, mode_slip_plus, direction > 0)
+    if (.not. abs(after) > 0) then
+      call come_to_rest(moving, state, event_stick, tally, log)
+      return
+    end if
+    left = chatter_time(moving%machine, moving%options, state, direction, abs(after))
+    if (left < 0) return
+    tally%chatters = tally%chatters + 1
+    tally%sticks = tally%sticks + 1
+    state%time = min(state%time + left, time_end)
+    state%v = 0
+    state%mode = merge(mode_upper_barrier, mode_lower_barrier, direction > 0)
+    call append_word(tally, merge(word_chatter_upper, word_chatter_lower, direction > 0))
+    if (present(log)) call record_event(log, merge(event_chatter_upper, event_chatter_lower, direction > 0), &
+                                        state, 0.0_wp)
+  end subroutine collide
+
+  !> Zero velocity: the forces choose the next mode. `passing` is the event written down if the body does not stay.
+  pure subroutine come_to_rest(moving, state, passing, tally, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    integer, intent(in) :: passing
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    logical :: slips
+    state%v = 0
+    state%mode = mode_from_rest(moving%machine, moving%options, state)
+    slips = state%mode == mode_slip_plus .or. state%mode == mode_slip_minus
+    if (.not. slips) then
+      tally%sticks = tally%sticks + 1
+      call append_word(tally, word_stick)
+    end if
+    if (present(log)) call record_event(log, merge(passing, event_stick, slips), state, 0.0_wp)
+  end subroutine come_to_rest
+
+  !> Rest until release or the end of the time.
+  pure subroutine rest_on(moving, state, time_end, tally, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: start, sample
+    integer :: kind
+    start = state
+    call note_position(tally, state)
+    tally%v_max = max(tally%v_max, 0.0_wp)
+    call hold(moving%machine, moving%options, state, time_end)
+    if (.not. present(log)) return
+    if (log%sample_interval > 0) then
+      sample = start
+      do
+        sample%time = log%next_sample*log%sample_interval
+        if (sample%time >= state%time) exit
+        call record_sample(log, sample)
+      end do
+    end if
+    if (state%mode == start%mode) return
+    kind = merge(event_release, event_barrier_release, start%mode == mode_stick)
+    call record_event(log, kind, state, 0.0_wp)
+  end subroutine rest_on
+
+  !> A tie of forces to the last bit: the body is held where it is for an instant.
+  pure subroutine break_tie(moving, state, time_end)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    state%time = min(state%time + 1e-9_wp*moving%machine%period, time_end)
+    state%v = 0
+    state%mode = mode_from_rest(moving%machine, moving%options, state)
+  end subroutine break_tie
+
+end module motion

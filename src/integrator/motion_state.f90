@@ -1,0 +1,166 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What a moving machine is between two events (mode and state), what is counted on the way (tally),
+!> and what is written down when asked (log).
+module motion_state
+  use kinds, only: int64, wp
+  implicit none
+  private
+
+  public :: reset_tally, note_position, append_word, record_event, record_sample
+
+  !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
+  integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
+    mode_upper_barrier = 4, mode_lower_barrier = 5
+
+  !> Events.
+  integer, parameter, public :: event_impact_upper = 1, event_impact_lower = 2, event_stick = 3, &
+    event_release = 4, event_turning_point = 5, event_chatter_upper = 6, event_chatter_lower = 7, &
+    event_barrier_release = 8
+  character(len=*), parameter, public :: event_names(8) = [character(len=15) :: 'impact_upper', &
+    'impact_lower', 'stick', 'release', 'turning_point', 'chatter_upper', 'chatter_lower', &
+    'barrier_release']
+
+  !> Symbols of event words, three bits each.
+  integer, parameter, public :: word_upper = 1, word_lower = 2, word_stick = 3, &
+    word_chatter_upper = 4, word_chatter_lower = 5, word_overflow = 6, word_period = 7
+  integer, parameter :: word_capacity = 17
+
+  !> Which flight is used: exact wherever it exists, exact only, adaptive only.
+  integer, parameter, public :: flight_auto = 0, flight_exact = 1, flight_adaptive = 2
+
+  !> State of the body. `time` runs within one drive period, from the stroboscopic section.
+  type, public :: state_t
+    real(wp) :: x = 0, v = 0, time = 0
+    integer :: mode = 0
+  end type state_t
+
+  type, public :: options_t
+    integer :: flight = flight_auto
+    !> Relative tolerance of the adaptive flight.
+    real(wp) :: tolerance = 1e-13_wp
+    !> Events after which a trajectory is given up.
+    integer(int64) :: event_budget = 1000000_int64
+    !> |x| beyond which the body has left the domain [m].
+    real(wp) :: domain = 1e6_wp
+    !> Crank angle at the stroboscopic section [rad].
+    real(wp) :: crank_angle = 0
+  end type options_t
+
+  !> Counts and extremes since the last reset.
+  type, public :: tally_t
+    integer(int64) :: events = 0
+    integer(int64) :: impacts = 0, chatters = 0, sticks = 0, slips = 0
+    real(wp) :: impact_speed_sum = 0, last_impact_speed = 0
+    real(wp) :: x_max = -huge(1.0_wp), x_min = huge(1.0_wp), v_max = -huge(1.0_wp)
+    !> Smallest distance to a barrier at a turning point that missed it [m].
+    real(wp) :: grazing_margin = huge(1.0_wp)
+    integer(int64) :: word = 0
+    integer :: word_length = 0
+    !> The largest velocity costs a search in every flight: only when asked.
+    logical :: wants_v_max = .false.
+  end type tally_t
+
+  !> Every event and equidistant samples, in absolute time. Storage grows as needed.
+  type, public :: log_t
+    !> Absolute time of the start of the current drive period [s].
+    real(wp) :: origin = 0
+    !> Distance of samples within a period [s]; 0 = no samples.
+    real(wp) :: sample_interval = 0
+    integer :: events = 0, samples = 0
+    !> Index of the next sample within the current period.
+    integer :: next_sample = 0
+    integer, allocatable :: event_kind(:), sample_mode(:)
+    !> Rows: time, x, v before, v after.
+    real(wp), allocatable :: event_data(:, :)
+    !> Rows: time, x, v.
+    real(wp), allocatable :: sample_data(:, :)
+  end type log_t
+
+contains
+
+  !> Starts counting anew from a state; keeps what was asked for.
+  pure subroutine reset_tally(tally, state)
+    type(tally_t), intent(inout) :: tally
+    type(state_t), intent(in) :: state
+    logical :: wants_v_max
+    integer(int64) :: events
+    wants_v_max = tally%wants_v_max
+    events = tally%events
+    tally = tally_t()
+    tally%wants_v_max = wants_v_max
+    tally%events = events
+    call note_position(tally, state)
+    tally%v_max = state%v
+    select case (state%mode)
+    case (mode_stick, mode_upper_barrier, mode_lower_barrier)
+      tally%sticks = 1
+    end select
+  end subroutine reset_tally
+
+  !> Extremes of the position are taken at the ends of flights: between them x is monotone.
+  pure subroutine note_position(tally, state)
+    type(tally_t), intent(inout) :: tally
+    type(state_t), intent(in) :: state
+    tally%x_max = max(tally%x_max, state%x)
+    tally%x_min = min(tally%x_min, state%x)
+  end subroutine note_position
+
+  !> Adds a symbol to the event word.
+  pure subroutine append_word(tally, symbol)
+    type(tally_t), intent(inout) :: tally
+    integer, intent(in) :: symbol
+    integer :: shift
+    if (tally%word_length >= word_capacity) return
+    shift = 3*tally%word_length
+    tally%word_length = tally%word_length + 1
+    if (tally%word_length == word_capacity) then
+      tally%word = ior(tally%word, ishft(int(word_overflow, int64), shift))
+    else
+      tally%word = ior(tally%word, ishft(int(symbol, int64), shift))
+    end if
+  end subroutine append_word
+
+  !> Writes an event down: state just before it and the velocity just after.
+  pure subroutine record_event(log, kind, state, v_after)
+    type(log_t), intent(inout) :: log
+    integer, intent(in) :: kind
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: v_after
+    integer, allocatable :: kinds_grown(:)
+    real(wp), allocatable :: data_grown(:, :)
+    if (.not. allocated(log%event_kind)) allocate (log%event_kind(256), log%event_data(4, 256))
+    if (log%events == size(log%event_kind)) then
+      allocate (kinds_grown(2*log%events), data_grown(4, 2*log%events))
+      kinds_grown(:log%events) = log%event_kind
+      data_grown(:, :log%events) = log%event_data
+      call move_alloc(kinds_grown, log%event_kind)
+      call move_alloc(data_grown, log%event_data)
+    end if
+    log%events = log%events + 1
+    log%event_kind(log%events) = kind
+    log%event_data(:, log%events) = [log%origin + state%time, state%x, state%v, v_after]
+  end subroutine record_event
+
+  !> Writes one sample down and moves on to the next.
+  pure subroutine record_sample(log, state)
+    type(log_t), intent(inout) :: log
+    type(state_t), intent(in) :: state
+    integer, allocatable :: modes_grown(:)
+    real(wp), allocatable :: data_grown(:, :)
+    if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
+    if (log%samples == size(log%sample_mode)) then
+      allocate (modes_grown(2*log%samples), data_grown(3, 2*log%samples))
+      modes_grown(:log%samples) = log%sample_mode
+      data_grown(:, :log%samples) = log%sample_data
+      call move_alloc(modes_grown, log%sample_mode)
+      call move_alloc(data_grown, log%sample_data)
+    end if
+    log%samples = log%samples + 1
+    log%next_sample = log%next_sample + 1
+    log%sample_mode(log%samples) = state%mode
+    log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
+  end subroutine record_sample
+
+end module motion_state

@@ -1,0 +1,150 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The body at rest: which way it goes on from zero velocity (Filippov's rule with static and kinetic
+!> level), how long friction or a barrier holds it, and how a sequence of ever smaller impacts ends.
+module rest
+  use certified_step, only: departure_step, positive_step
+  use friction_law, only: friction_t
+  use kinds, only: wp
+  use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
+    mode_upper_barrier, options_t, state_t
+  use oscillator, only: holding_force, oscillator_t
+  implicit none
+  private
+
+  public :: mode_from_rest, hold, chatter_time
+
+  !> Relative change of the acceleration over what is left of a chatter sequence at which it is
+  !> completed analytically.
+  real(wp), parameter :: chatter_uniformity = 1e-6_wp
+
+contains
+
+  !> Mode of a body with zero velocity at `state%x`, `state%time`. At the edge of sticking the rate of
+  !> the holding force decides; a barrier counts as holding whatever pushes against it.
+  pure integer function mode_from_rest(machine, options, state) result(mode)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(state_t), intent(in) :: state
+    real(wp) :: force, rate, curvature
+    logical :: at_upper, at_lower, up, down
+    call holding_force(machine, state%x, options%crank_angle + machine%drive_frequency*state%time, &
+                       force, rate, curvature)
+    up = breaks_away(machine, force, rate)
+    down = breaks_away(machine, -force, -rate)
+    at_upper = state%x >= machine%contact%upper
+    at_lower = state%x <= machine%contact%lower
+    if (up .and. .not. at_upper) then
+      mode = mode_slip_plus
+    else if (down .and. .not. at_lower) then
+      mode = mode_slip_minus
+    else if (at_upper) then
+      mode = mode_upper_barrier
+    else if (at_lower) then
+      mode = mode_lower_barrier
+    else
+      mode = mode_stick
+    end if
+  end function mode_from_rest
+
+  !> Whether a force and its rate overcome the break-away force in their own direction.
+  pure logical function breaks_away(machine, force, rate)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: force, rate
+    real(wp) :: excess, rounding
+    excess = force - machine%friction%break_away
+    rounding = 32*epsilon(1.0_wp)*(machine%force_scale + abs(force))
+    if (abs(excess) <= rounding) then
+      breaks_away = rate > 0
+    else
+      breaks_away = excess > 0
+    end if
+  end function breaks_away
+
+  !> Keeps the body at rest until it is released or `time_end`. `state%mode` becomes the slip that follows;
+  !> it stays as it is when the time is over.
+  pure subroutine hold(machine, options, state, time_end)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    real(wp) :: force, rate, curvature, step_up, step_down, step, smallest
+    logical :: up_open, down_open
+    up_open = state%x < machine%contact%upper
+    down_open = state%x > machine%contact%lower
+    smallest = 4*epsilon(1.0_wp)*machine%period
+    do
+      call holding_force(machine, state%x, options%crank_angle + machine%drive_frequency*state%time, &
+                         force, rate, curvature)
+      if (up_open .and. breaks_away(machine, force, rate)) then
+        state%mode = mode_slip_plus
+        return
+      else if (down_open .and. breaks_away(machine, -force, -rate)) then
+        state%mode = mode_slip_minus
+        return
+      end if
+      step_up = huge(1.0_wp)
+      step_down = huge(1.0_wp)
+      if (up_open) step_up = holding_step(machine%friction%break_away - force, -rate, curvature)
+      if (down_open) step_down = holding_step(machine%friction%break_away + force, rate, curvature)
+      step = min(step_up, step_down)
+      if (step >= time_end - state%time) then
+        state%time = time_end
+        return
+      end if
+      state%time = state%time + max(step, smallest)
+    end do
+  end subroutine hold
+
+  !> Time for which a reserve of force that changes at `rate` is proven to last. At the edge, where
+  !> rounding hides which side it is on, the body was found to stay: step on at least a little.
+  pure real(wp) function holding_step(reserve, rate, curvature) result(step)
+    real(wp), intent(in) :: reserve, rate, curvature
+    if (reserve > 0) then
+      step = positive_step(reserve, rate, curvature)
+    else
+      step = departure_step(max(0.0_wp, rate), 0.0_wp, curvature, 0.0_wp)
+    end if
+  end function holding_step
+
+  !> Time [s] until impacts on the barrier in `direction` +1 (upper) or -1 have died out, the body having
+  !> just left it at `speed` [m/s]; -1 if they do not, or if the acceleration is not yet uniform over
+  !> what is left. One bounce with constant friction: out at a_out = (R + F)/m, back at a_in = (R - F)/m,
+  !> the speed shrinks by k sqrt(a_in/a_out), so the times form a geometric series.
+  pure real(wp) function chatter_time(machine, options, state, direction, speed) result(left)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: speed
+    real(wp) :: force, rate, curvature, out, back, shrink, friction, change
+    left = -1
+    call holding_force(machine, state%x, options%crank_angle + machine%drive_frequency*state%time, &
+                       force, rate, curvature)
+    associate (law => machine%friction)
+      if (direction*force <= law%break_away) return
+      friction = law%kinetic + law%excess
+      out = (direction*force + friction)/machine%mass
+      back = (direction*force - friction)/machine%mass
+      if (back <= 0) return
+      shrink = machine%contact%restitution*sqrt(back/out)
+      if (shrink >= 1) return
+      left = (speed/out + speed/sqrt(back*out))/(1 - shrink)
+      change = (abs(rate)*left + curvature*left**2/2 + law%damping*speed &
+                + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &
+               + layer_change(law, speed)/machine%mass
+      if (change > chatter_uniformity*back) left = -1
+    end associate
+  end function chatter_time
+
+  !> How much the sliding friction changes between rest and `speed` [N].
+  pure real(wp) function layer_change(law, speed)
+    type(friction_t), intent(in) :: law
+    real(wp), intent(in) :: speed
+    layer_change = 0
+    if (law%excess > 0) layer_change = &
+      law%excess*min(1.0_wp, (speed/law%stribeck_velocity)**min(law%stribeck_exponent, 1.0_wp))
+  end function layer_change
+
+end module rest

@@ -1,0 +1,197 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Drives move the foot of the spring. Every drive is held as the Fourier series of the foot
+!> position x_A over the crank angle phi,
+!>   x_A(phi) = mean + sum_n cosine(n) cos(n phi) + sine(n) sin(n phi),
+!> which the exact flight needs; a mechanism's series is computed once to rounding.
+module drive_law
+  use constants, only: two_pi
+  use elementary, only: sine_cosine
+  use kinds, only: wp
+  use law_table, only: law_choice_t, list_of, value_of
+  implicit none
+  private
+
+  public :: drive_of, foot_motion, lever_foot, lever_assembles
+
+  !> A mechanism whose series needs more harmonics is too close to a dead point.
+  integer, parameter, public :: max_harmonics = 1024
+
+  type, public :: drive_t
+    !> Drive angular frequency over the natural one; 0 without a drive.
+    real(wp) :: ratio = 0
+    real(wp) :: mean = 0
+    !> Fourier coefficients [m], index = harmonic.
+    real(wp), allocatable :: cosine(:), sine(:)
+    !> False if the series of a mechanism did not converge.
+    logical :: converged = .true.
+  end type drive_t
+
+  !> Crank OD, slotted lever CE turning about C, rod EA to the guide of A. Lengths in m, angles in rad.
+  type, public :: lever_t
+    real(wp) :: crank, pivot_distance, lever, rod, pivot_angle, guide_height, side, shift
+  end type lever_t
+
+contains
+
+  !> The law that a choice of the family `drive` names.
+  pure function drive_of(choice) result(law)
+    type(law_choice_t), intent(in) :: choice
+    type(drive_t) :: law
+    select case (choice%name)
+    case ('harmonic')
+      law%cosine = [value_of(choice, 'amplitude')]
+      law%sine = [0.0_wp]
+    case ('fourier')
+      law%cosine = list_of(choice, 'cosine')
+      law%sine = list_of(choice, 'sine')
+    case ('crank_lever_rod')
+      call expand_lever(lever_of(choice), law)
+      law%mean = law%mean + value_of(choice, 'shift')
+    case default
+      allocate (law%cosine(0), law%sine(0))
+      return
+    end select
+    if (choice%name /= 'crank_lever_rod') law%mean = value_of(choice, 'mean')
+    law%ratio = value_of(choice, 'ratio')
+    call advance_angle(law, value_of(choice, 'angle'))
+  end function drive_of
+
+  !> Rewrites a series in phi + angle as a series in phi.
+  pure subroutine advance_angle(law, angle)
+    type(drive_t), intent(inout) :: law
+    real(wp), intent(in) :: angle
+    real(wp) :: s, c, a, b
+    integer :: n
+    do n = 1, size(law%cosine)
+      call sine_cosine(n*angle, s, c)
+      a = law%cosine(n)
+      b = law%sine(n)
+      law%cosine(n) = a*c + b*s
+      law%sine(n) = b*c - a*s
+    end do
+  end subroutine advance_angle
+
+  !> Foot position x_A [m] and its first two derivatives with respect to the crank angle `phi` [rad].
+  pure subroutine foot_motion(law, phi, position, first, second)
+    type(drive_t), intent(in) :: law
+    real(wp), intent(in) :: phi
+    real(wp), intent(out) :: position
+    real(wp), intent(out), optional :: first, second
+    real(wp) :: s1, c1, s, c, next, d1, d2
+    integer :: n
+    position = law%mean
+    d1 = 0
+    d2 = 0
+    call sine_cosine(phi, s1, c1)
+    s = s1
+    c = c1
+    do n = 1, size(law%cosine)
+      position = position + law%cosine(n)*c + law%sine(n)*s
+      d1 = d1 + n*(law%sine(n)*c - law%cosine(n)*s)
+      d2 = d2 - n*n*(law%cosine(n)*c + law%sine(n)*s)
+      next = c*c1 - s*s1
+      s = s*c1 + c*s1
+      c = next
+    end do
+    if (present(first)) first = d1
+    if (present(second)) second = d2
+  end subroutine foot_motion
+
+  pure function lever_of(choice) result(lever)
+    type(law_choice_t), intent(in) :: choice
+    type(lever_t) :: lever
+    lever = lever_t(value_of(choice, 'crank'), value_of(choice, 'pivot_distance'), &
+                    value_of(choice, 'lever'), value_of(choice, 'rod'), &
+                    value_of(choice, 'pivot_angle'), value_of(choice, 'guide_height'), &
+                    value_of(choice, 'side'), 0.0_wp)
+  end function lever_of
+
+  !> Foot position [m] of the mechanism at crank angle `phi`, C at the origin:
+  !> D = O + r (cos phi, sin phi), E = l2 D/|D|, x_A = s + E_x + sigma sqrt(l3^2 - (E_y - h)^2).
+  !> Not a number where the mechanism cannot be assembled.
+  pure elemental real(wp) function lever_foot(lever, phi)
+    type(lever_t), intent(in) :: lever
+    real(wp), intent(in) :: phi
+    real(wp) :: e(2)
+    e = lever_end(lever, phi)
+    lever_foot = lever%shift + e(1) + lever%side*sqrt(lever%rod**2 - (e(2) - lever%guide_height)**2)
+  end function lever_foot
+
+  !> Whether the rod reaches the guide at crank angle `phi`.
+  pure elemental logical function lever_assembles(lever, phi)
+    type(lever_t), intent(in) :: lever
+    real(wp), intent(in) :: phi
+    real(wp) :: e(2)
+    e = lever_end(lever, phi)
+    lever_assembles = abs(e(2) - lever%guide_height) <= lever%rod
+  end function lever_assembles
+
+  pure function lever_end(lever, phi) result(e)
+    type(lever_t), intent(in) :: lever
+    real(wp), intent(in) :: phi
+    real(wp) :: e(2), d(2), s, c, sb, cb
+    call sine_cosine(phi, s, c)
+    call sine_cosine(lever%pivot_angle, sb, cb)
+    d = lever%pivot_distance*[cb, sb] + lever%crank*[c, s]
+    e = lever%lever*d/sqrt(d(1)**2 + d(2)**2)
+  end function lever_end
+
+  !> Discrete Fourier transform of the foot position with as many samples as the series needs: they
+  !> are doubled until the upper half of the spectrum is rounding.
+  pure subroutine expand_lever(lever, law)
+    type(lever_t), intent(in) :: lever
+    type(drive_t), intent(inout) :: law
+    real(wp), allocatable :: samples(:), cosine(:), sine(:)
+    real(wp) :: size_of_motion, tail
+    integer :: count, i, kept
+    law%converged = .false.
+    allocate (law%cosine(0), law%sine(0))
+    count = 64
+    do while (count <= 4*max_harmonics)
+      samples = [(lever_foot(lever, i*two_pi/count), i=0, count - 1)]
+      call transform(samples, cosine, sine)
+      size_of_motion = maxval(abs(samples))
+      tail = maxval(abs(cosine(count/4:))) + maxval(abs(sine(count/4:)))
+      if (tail <= 8*epsilon(1.0_wp)*size_of_motion) then
+        law%mean = sum(samples)/count
+        kept = count/4
+        do while (kept > 1)
+          if (abs(cosine(kept)) + abs(sine(kept)) > epsilon(1.0_wp)*size_of_motion) exit
+          kept = kept - 1
+        end do
+        law%cosine = cosine(:kept)
+        law%sine = sine(:kept)
+        law%converged = .true.
+        return
+      end if
+      count = 2*count
+    end do
+  end subroutine expand_lever
+
+  !> Real Fourier coefficients of harmonics 1 .. n/2 - 1 of n equidistant samples.
+  pure subroutine transform(samples, cosine, sine)
+    real(wp), intent(in) :: samples(0:)
+    real(wp), allocatable, intent(out) :: cosine(:), sine(:)
+    real(wp), allocatable :: table_sine(:), table_cosine(:)
+    integer :: n, i, k, position
+    n = size(samples)
+    allocate (cosine(n/2 - 1), sine(n/2 - 1), table_sine(0:n - 1), table_cosine(0:n - 1))
+    do i = 0, n - 1
+      call sine_cosine(i*two_pi/n, table_sine(i), table_cosine(i))
+    end do
+    cosine = 0
+    sine = 0
+    do k = 1, n/2 - 1
+      do i = 0, n - 1
+        position = modulo(k*i, n)
+        cosine(k) = cosine(k) + samples(i)*table_cosine(position)
+        sine(k) = sine(k) + samples(i)*table_sine(position)
+      end do
+    end do
+    cosine = 2*cosine/n
+    sine = 2*sine/n
+  end subroutine transform
+
+end module drive_law

@@ -1,0 +1,96 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Dry and viscous friction. While sliding in direction s = +1 or -1 the force on the body is
+!>   -s (K + E exp(-|v/v_s|^delta)) - b v,
+!> at rest it is whatever holds the body, up to the break-away force. Nothing is smoothed.
+module friction_law
+  use elementary, only: exponential, logarithm
+  use kinds, only: wp
+  use law_table, only: law_choice_t, value_of
+  implicit none
+  private
+
+  public :: friction_of, sliding_friction, stribeck_excess
+
+  !> Exponent at which the Stribeck excess is below the rounding of the sliding friction.
+  real(wp), parameter :: negligible_exponent = -log(0.01_wp*epsilon(1.0_wp))
+
+  type, public :: friction_t
+    !> Sliding friction at high speed, K [N].
+    real(wp) :: kinetic = 0
+    !> Largest force that friction holds at rest [N].
+    real(wp) :: break_away = 0
+    !> b [N s/m].
+    real(wp) :: damping = 0
+    !> E [N].
+    real(wp) :: excess = 0
+    !> v_s [m/s] and delta.
+    real(wp) :: stribeck_velocity = 1
+    real(wp) :: stribeck_exponent = 1
+    !> Speed above which the Stribeck excess is nil to rounding [m/s]; 0 without excess.
+    real(wp) :: layer_speed = 0
+  end type friction_t
+
+contains
+
+  !> The law that a choice of the family `friction` names, for a normal force [N].
+  pure function friction_of(choice, normal_force) result(law)
+    type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: normal_force
+    type(friction_t) :: law
+    real(wp) :: static
+    select case (choice%name)
+    case ('coulomb', 'coulomb_viscous')
+      law%kinetic = value_of(choice, 'kinetic_coefficient')*normal_force
+      static = value_of(choice, 'static_coefficient')*normal_force
+      law%break_away = max(static, law%kinetic)
+      if (choice%name == 'coulomb_viscous') law%damping = value_of(choice, 'damping')
+    case ('viscous')
+      law%damping = value_of(choice, 'damping')
+    case ('coulomb_stribeck')
+      law%kinetic = value_of(choice, 'kinetic_coefficient')*normal_force
+      law%break_away = value_of(choice, 'static_coefficient')*normal_force
+      law%excess = law%break_away - law%kinetic
+      law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
+      law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+      if (law%excess > 0) law%layer_speed = law%stribeck_velocity &
+        *negligible_exponent**(1.0_wp/law%stribeck_exponent)
+    end select
+  end function friction_of
+
+  !> Force on the body [N] while sliding at velocity `v` [m/s] in `direction` +1 or -1. Continued smoothly
+  !> beyond v = 0, where a flight in that direction ends: a trial step may look there.
+  pure elemental real(wp) function sliding_friction(law, v, direction)
+    type(friction_t), intent(in) :: law
+    real(wp), intent(in) :: v, direction
+    sliding_friction = -direction*(law%kinetic + stribeck_excess(law, direction*v)) - law%damping*v
+  end function sliding_friction
+
+  !> E exp(-(v/v_s)^delta) [N] at the sliding speed `speed` [m/s]; smooth continuation below zero.
+  pure elemental real(wp) function stribeck_excess(law, speed)
+    type(friction_t), intent(in) :: law
+    real(wp), intent(in) :: speed
+    real(wp) :: u
+    stribeck_excess = 0
+    if (law%excess > 0) then
+      u = max(speed/law%stribeck_velocity, -1.0_wp)
+      stribeck_excess = law%excess*exponential(-power(u, law%stribeck_exponent))
+    end if
+  end function stribeck_excess
+
+  !> u**p for u >= 0 and its continuation to negative u, in reproducible arithmetic.
+  pure elemental real(wp) function power(u, p)
+    real(wp), intent(in) :: u, p
+    if (p == 1) then
+      power = u
+    else if (p == 2) then
+      power = u*u
+    else if (abs(u) < tiny(1.0_wp)) then
+      power = 0
+    else
+      power = sign(exponential(p*logarithm(abs(u))), u)
+    end if
+  end function power
+
+end module friction_law

@@ -1,0 +1,237 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The catalogue of laws, kept as data: name, parameters, units, bounds and source of each. The
+!> case reader, `separatrix laws` and the documentation all come from it. Adding a law means one
+!> pure procedure, rows here and a test.
+module law_table
+  use kinds, only: wp
+  use text, only: join
+  implicit none
+  private
+
+  public :: find_law, law_names, parameters_of, law_choice, value_of, list_of
+
+  !> The parts that a machine is composed of, one law each.
+  character(len=*), parameter, public :: families(5) = [character(len=9) :: &
+    'body', 'restoring', 'friction', 'contact', 'drive']
+
+  real(wp), parameter :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
+
+  type, public :: law_row_t
+    character(len=9) :: family
+    character(len=16) :: name
+    character(len=96) :: meaning
+    character(len=96) :: source
+  end type law_row_t
+
+  !> One parameter of one law. Values are in the SI unit given; bounds are closed unless open.
+  type, public :: parameter_row_t
+    character(len=9) :: family
+    character(len=16) :: law
+    character(len=20) :: name
+    character(len=6) :: unit
+    real(wp) :: lower, upper
+    logical :: lower_open
+    !> An optional parameter takes its default.
+    logical :: optional
+    real(wp) :: default
+    !> A list of any length instead of one number.
+    logical :: list
+    character(len=88) :: meaning
+  end type parameter_row_t
+
+  !> The values of one parameter: one number, or a list.
+  type, public :: parameter_value_t
+    real(wp), allocatable :: values(:)
+  end type parameter_value_t
+
+  !> A law with values for its parameters, in the order of `parameters_of`.
+  type, public :: law_choice_t
+    character(len=9) :: family = ''
+    character(len=16) :: name = ''
+    type(parameter_value_t), allocatable :: parameters(:)
+  end type law_choice_t
+
+  character(len=*), parameter :: lemes = 'Lemes et al., vibro-impact system with ideal excitation'
+
+  type(law_row_t), parameter, public :: laws(14) = [ &
+    law_row_t('body', 'point_mass', 'one body on a horizontal guide', lemes), &
+    law_row_t('restoring', 'linear', 'force c (l0 + x_A - x)', lemes), &
+    law_row_t('restoring', 'none', 'no restoring force', ''), &
+    law_row_t('friction', 'none', 'no friction', ''), &
+    law_row_t('friction', 'coulomb', '-mu m g sgn v; sticks up to mu_s m g', lemes), &
+    law_row_t('friction', 'viscous', '-b v', lemes), &
+    law_row_t('friction', 'coulomb_viscous', '-mu m g sgn v - b v; sticks up to mu_s m g', 'sum of the two laws'), &
+    law_row_t('friction', 'coulomb_stribeck', &
+              '-(mu + (mu_s - mu) exp(-|v/v_s|^delta)) m g sgn v; sticks up to mu_s m g', lemes), &
+    law_row_t('contact', 'none', 'no barrier', ''), &
+    law_row_t('contact', 'newton', 'rigid barrier: v+ = -k v-', lemes), &
+    law_row_t('drive', 'none', 'the foot of the spring is at rest at x_A = 0', ''), &
+    law_row_t('drive', 'harmonic', 'x_A = mean + amplitude cos(phi + angle)', 'Den Hartog, Trans. ASME 53 (1931)'), &
+    law_row_t('drive', 'fourier', 'x_A = mean + sum a_n cos n(phi + angle) + b_n sin n(phi + angle)', &
+              'calibrated stand-in for the drive of Lemes et al.'), &
+    law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
+              'geometry derived from '//lemes)]
+
+  type(parameter_row_t), parameter, public :: parameters(36) = [ &
+    parameter_row_t('body', 'point_mass', 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'm'), &
+    parameter_row_t('body', 'point_mass', 'gravity', 'm/s^2', 0.0_wp, none_above, .false., .true., 9.81_wp, .false., &
+                    'g; normal force of the friction laws is m g'), &
+    parameter_row_t('restoring', 'linear', 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'c'), &
+    parameter_row_t('restoring', 'linear', 'free_length', 'm', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'l0, undeformed length of the spring'), &
+    parameter_row_t('friction', 'coulomb', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'mu while sliding'), &
+    parameter_row_t('friction', 'coulomb', 'static_coefficient', '1', 0.0_wp, none_above, .false., .true., -1.0_wp, .false., &
+                    'mu_s at break-away; the kinetic coefficient if absent, never below it'), &
+    parameter_row_t('friction', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'b'), &
+    parameter_row_t('friction', 'coulomb_viscous', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, &
+                    .false., 'mu while sliding'), &
+    parameter_row_t('friction', 'coulomb_viscous', 'static_coefficient', '1', 0.0_wp, none_above, .false., .true., -1.0_wp, &
+                    .false., 'mu_s at break-away; the kinetic coefficient if absent, never below it'), &
+    parameter_row_t('friction', 'coulomb_viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'b'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, &
+                    .false., 'mu at high speed'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'static_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, &
+                    .false., 'mu_s at zero speed and at break-away, never below the kinetic coefficient'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, &
+                    .false., 'v_s'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_exponent', '1', 0.0_wp, none_above, .true., .true., 1.0_wp, &
+                    .false., 'delta'), &
+    parameter_row_t('contact', 'newton', 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
+                    'k, ratio of the speeds after and before an impact'), &
+    parameter_row_t('contact', 'newton', 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &
+                    'position of the barrier above the body; no barrier if absent'), &
+    parameter_row_t('contact', 'newton', 'lower', 'm', none_below, none_above, .false., .true., none_below, .false., &
+                    'position of the barrier below the body; no barrier if absent'), &
+    parameter_row_t('drive', 'harmonic', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
+    parameter_row_t('drive', 'harmonic', 'mean', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'mean position of the foot of the spring'), &
+    parameter_row_t('drive', 'harmonic', 'amplitude', 'm', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'amplitude of the foot'), &
+    parameter_row_t('drive', 'harmonic', 'angle', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'offset added to the crank angle'), &
+    parameter_row_t('drive', 'fourier', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
+    parameter_row_t('drive', 'fourier', 'mean', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'mean position of the foot of the spring'), &
+    parameter_row_t('drive', 'fourier', 'cosine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'a_1, a_2, ...'), &
+    parameter_row_t('drive', 'fourier', 'sine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'b_1, b_2, ..., as many as cosine has'), &
+    parameter_row_t('drive', 'fourier', 'angle', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'offset added to the crank angle'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'crank', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'r = OD'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'pivot_distance', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'l1 = OC, longer than the crank'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'lever', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'l2 = CE'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'rod', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'l3 = EA'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'pivot_angle', 'rad', none_below, none_above, .false., .false., 0.0_wp, &
+                    .false., 'B, direction of O seen from C against the guide'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'guide_height', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'h, distance of the guide of A from C'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'side', '1', -1.0_wp, 1.0_wp, .false., .true., 1.0_wp, .false., &
+                    'sigma, +1 or -1: A is ahead of E or behind it'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'shift', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    's, position of C on the axis of x'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'offset added to the crank angle')]
+
+contains
+
+  !> Row of a law in `laws`, 0 if there is none.
+  pure integer function find_law(family, name)
+    character(len=*), intent(in) :: family, name
+    integer :: i
+    find_law = 0
+    do i = 1, size(laws)
+      if (laws(i)%family == family .and. laws(i)%name == name) find_law = i
+    end do
+  end function find_law
+
+  !> The known laws of a family, for messages: 'coulomb, viscous, ...'.
+  pure function law_names(family) result(names)
+    character(len=*), intent(in) :: family
+    character(len=:), allocatable :: names
+    names = join(pack(laws%name, laws%family == family), ', ')
+  end function law_names
+
+  !> The parameter rows of a law, in table order.
+  pure function parameters_of(family, law) result(rows)
+    character(len=*), intent(in) :: family, law
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i, count
+    count = 0
+    do i = 1, size(parameters)
+      if (parameters(i)%family == family .and. parameters(i)%law == law) count = count + 1
+    end do
+    allocate (rows(count))
+    count = 0
+    do i = 1, size(parameters)
+      if (parameters(i)%family == family .and. parameters(i)%law == law) then
+        count = count + 1
+        rows(count) = parameters(i)
+      end if
+    end do
+  end function parameters_of
+
+  !> A law with every parameter at its default (zero where it has none, empty lists): set the
+  !> others before use. Stops nothing: an unknown law has no parameters.
+  pure function law_choice(family, name) result(choice)
+    character(len=*), intent(in) :: family, name
+    type(law_choice_t) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    choice%family = family
+    choice%name = name
+    rows = parameters_of(family, name)
+    allocate (choice%parameters(size(rows)))
+    do i = 1, size(rows)
+      if (rows(i)%list) then
+        allocate (choice%parameters(i)%values(0))
+      else
+        choice%parameters(i)%values = [rows(i)%default]
+      end if
+    end do
+  end function law_choice
+
+  !> The number that a choice holds for a parameter; the parameter must belong to the law.
+  pure real(wp) function value_of(choice, parameter)
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: parameter
+    value_of = choice%parameters(position_of(choice, parameter))%values(1)
+  end function value_of
+
+  !> The list that a choice holds for a parameter; the parameter must belong to the law.
+  pure function list_of(choice, parameter) result(values)
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: parameter
+    real(wp), allocatable :: values(:)
+    values = choice%parameters(position_of(choice, parameter))%values
+  end function list_of
+
+  pure integer function position_of(choice, parameter)
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: parameter
+    integer :: i
+    position_of = 0
+    do i = 1, size(parameters)
+      if (parameters(i)%family /= choice%family .or. parameters(i)%law /= choice%name) cycle
+      position_of = position_of + 1
+      if (parameters(i)%name == parameter) return
+    end do
+    error stop 'law_table: a parameter that the law does not have'
+  end function position_of
+
+end module law_table

@@ -1,0 +1,62 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Restoring forces as functions of the stretch, (free length + foot position) - (body position).
+!> A new law adds a kind here, a row to `law_table`, a branch to both functions and a test; if it is not
+!> linear in the stretch, `is_linear` stays false and the adaptive flight takes over.
+module restoring_law
+  use kinds, only: wp
+  use law_table, only: law_choice_t, value_of
+  implicit none
+  private
+
+  public :: restoring_of, restoring_force, restoring_stiffness
+
+  integer, parameter :: kind_none = 0, kind_linear = 1
+
+  type, public :: restoring_t
+    integer :: kind = kind_none
+    !> Stiffness at zero stretch [N/m]; gives the natural frequency.
+    real(wp) :: stiffness = 0
+    !> Stretch-free distance between foot and body [m].
+    real(wp) :: free_length = 0
+    logical :: is_linear = .true.
+  end type restoring_t
+
+contains
+
+  !> The law that a choice of the family `restoring` names.
+  pure function restoring_of(choice) result(law)
+    type(law_choice_t), intent(in) :: choice
+    type(restoring_t) :: law
+    if (choice%name == 'linear') then
+      law = restoring_t(kind_linear, value_of(choice, 'stiffness'), &
+                        value_of(choice, 'free_length'), .true.)
+    end if
+  end function restoring_of
+
+  !> Force on the body [N] at a stretch [m].
+  pure elemental real(wp) function restoring_force(law, stretch)
+    type(restoring_t), intent(in) :: law
+    real(wp), intent(in) :: stretch
+    select case (law%kind)
+    case (kind_linear)
+      restoring_force = law%stiffness*stretch
+    case default
+      restoring_force = 0
+    end select
+  end function restoring_force
+
+  !> Derivative of the force with respect to the stretch [N/m].
+  pure elemental real(wp) function restoring_stiffness(law, stretch)
+    type(restoring_t), intent(in) :: law
+    real(wp), intent(in) :: stretch
+    select case (law%kind)
+    case (kind_linear)
+      restoring_stiffness = law%stiffness
+    case default
+      restoring_stiffness = 0*stretch
+    end select
+  end function restoring_stiffness
+
+end module restoring_law

@@ -1,0 +1,116 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A machine composed of laws: m x'' = restoring(l0 + x_A(phi) - x) + friction(x'), barriers at
+!> fixed positions, crank angle phi = Omega t + phi_0.
+module oscillator
+  use constants, only: two_pi
+  use contact_law, only: contact_of, contact_t
+  use drive_law, only: drive_of, drive_t, foot_motion
+  use errors, only: error_t, fail
+  use friction_law, only: friction_of, friction_t
+  use kinds, only: wp
+  use law_table, only: law_choice_t, value_of
+  use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
+  use status, only: exit_bad_case
+  implicit none
+  private
+
+  public :: build_oscillator, holding_force
+
+  type, public :: oscillator_t
+    !> Mass [kg].
+    real(wp) :: mass = 1
+    type(restoring_t) :: restoring
+    type(friction_t) :: friction
+    type(contact_t) :: contact
+    type(drive_t) :: drive
+    !> sqrt(stiffness/mass) [rad/s]; 0 without a spring.
+    real(wp) :: natural_frequency = 0
+    !> Angular frequency of the section: the drive's, or the natural one without a drive [rad/s].
+    real(wp) :: drive_frequency = 0
+    !> Period of the section [s].
+    real(wp) :: period = 0
+    !> Bounds on |x_A'| and |x_A''| with respect to time [m/s, m/s^2].
+    real(wp) :: foot_speed_bound = 0
+    real(wp) :: foot_acceleration_bound = 0
+    !> Largest spring force in magnitude that the foot alone can change by [N]; scale of rounding.
+    real(wp) :: force_scale = 0
+  end type oscillator_t
+
+contains
+
+  !> The machine of one law per family: body, restoring, friction, contact, drive, in any order.
+  !> Parameters are taken as they are (the case reader checks bounds); what only the whole shows is
+  !> refused: a drive without a natural frequency, a mechanism whose series does not converge.
+  pure subroutine build_oscillator(choices, machine, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(oscillator_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: normal_force
+    integer :: i, n
+    normal_force = 0
+    do i = 1, size(choices)
+      if (choices(i)%family /= 'body') cycle
+      machine%mass = value_of(choices(i), 'mass')
+      normal_force = machine%mass*value_of(choices(i), 'gravity')
+    end do
+    do i = 1, size(choices)
+      select case (choices(i)%family)
+      case ('restoring')
+        machine%restoring = restoring_of(choices(i))
+      case ('friction')
+        machine%friction = friction_of(choices(i), normal_force)
+      case ('contact')
+        machine%contact = contact_of(choices(i))
+      case ('drive')
+        machine%drive = drive_of(choices(i))
+      end select
+    end do
+    if (.not. allocated(machine%drive%cosine)) allocate (machine%drive%cosine(0), machine%drive%sine(0))
+    if (.not. machine%drive%converged) then
+      call fail(error, exit_bad_case, 'drive crank_lever_rod: the mechanism passes too close to a dead '// &
+                'point (its Fourier series does not converge); move the guide or lengthen the rod')
+      return
+    end if
+    machine%natural_frequency = sqrt(machine%restoring%stiffness/machine%mass)
+    machine%drive_frequency = machine%natural_frequency
+    if (machine%drive%ratio > 0) machine%drive_frequency = machine%drive%ratio*machine%natural_frequency
+    if (machine%drive_frequency > 0) then
+      machine%period = two_pi/machine%drive_frequency
+    else if (machine%drive%ratio > 0) then
+      call fail(error, exit_bad_case, 'drive.ratio needs a restoring law with a stiffness: it is relative '// &
+                'to the natural frequency sqrt(c/m)')
+      return
+    else
+      machine%period = 1
+      machine%drive_frequency = two_pi
+    end if
+    do n = 1, size(machine%drive%cosine)
+      associate (size_n => sqrt(machine%drive%cosine(n)**2 + machine%drive%sine(n)**2))
+        machine%foot_speed_bound = machine%foot_speed_bound + size_n*n*machine%drive_frequency
+        machine%foot_acceleration_bound = machine%foot_acceleration_bound &
+                                          + size_n*(n*machine%drive_frequency)**2
+      end associate
+    end do
+    machine%force_scale = machine%restoring%stiffness*(abs(machine%restoring%free_length) &
+      + abs(machine%drive%mean) + sum(abs(machine%drive%cosine)) + sum(abs(machine%drive%sine))) &
+      + machine%friction%break_away
+  end subroutine build_oscillator
+
+  !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
+  !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
+  !> derivative [N/s^2] over all angles.
+  pure subroutine holding_force(machine, x, phi, force, rate, curvature_bound)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: x, phi
+    real(wp), intent(out) :: force, rate, curvature_bound
+    real(wp) :: foot, foot_rate, stretch
+    call foot_motion(machine%drive, phi, foot, foot_rate)
+    stretch = machine%restoring%free_length + foot - x
+    force = restoring_force(machine%restoring, stretch)
+    rate = restoring_stiffness(machine%restoring, stretch)*foot_rate*machine%drive_frequency
+    curvature_bound = machine%restoring%stiffness*machine%foot_acceleration_bound
+  end subroutine holding_force
+
+end module oscillator
