@@ -27,7 +27,6 @@ module adaptive_flight
   !> What a slip needs to know of the machine and where it must end.
   type :: slip_t
     real(wp) :: direction = 1
-    real(wp) :: crank_angle = 0
     !> Barrier ahead [m] and speed at which the Stribeck layer is left [m/s].
     real(wp) :: barrier = 0, exit_speed = 0
     !> Size of position and velocity below which errors are absolute [m, m/s].
@@ -50,7 +49,7 @@ contains
     type(slip_t) :: slip
     real(wp) :: y(2), next(2), slopes(2, 16), path(0:degree, 2), h, remaining, error, fraction
     logical :: last
-    slip = slip_of(machine, options, state, exit_speed, barrier)
+    slip = slip_of(machine, state, exit_speed, barrier)
     y = [state%x, state%v]
     slopes(:, 1) = slope(machine, slip, state%time, y)
     h = first_step(machine, slip, options%tolerance, state%time, y, slopes(:, 1))
@@ -90,15 +89,13 @@ contains
     if (outcome == flight_speed_reached .or. slip%direction*state%v < 0) state%v = 0
   end subroutine fly_adaptive
 
-  pure function slip_of(machine, options, state, exit_speed, barrier) result(slip)
+  pure function slip_of(machine, state, exit_speed, barrier) result(slip)
     type(oscillator_t), intent(in) :: machine
-    type(options_t), intent(in) :: options
     type(state_t), intent(in) :: state
     real(wp), intent(in) :: exit_speed, barrier
     type(slip_t) :: slip
     real(wp) :: length
     slip%direction = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
-    slip%crank_angle = options%crank_angle
     slip%barrier = barrier
     slip%exit_speed = exit_speed
     length = 1
@@ -113,7 +110,7 @@ contains
     type(slip_t), intent(in) :: slip
     real(wp), intent(in) :: time, y(2)
     real(wp) :: slope(2), foot
-    call foot_motion(machine%drive, slip%crank_angle + machine%drive_frequency*time, foot)
+    call foot_motion(machine%drive, machine%drive_frequency*time, foot)
     slope(1) = y(2)
     slope(2) = (restoring_force(machine%restoring, machine%restoring%free_length + foot - y(1)) &
                 + sliding_friction(machine%friction, y(2), slip%direction))/machine%mass

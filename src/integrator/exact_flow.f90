@@ -3,7 +3,7 @@
 
 !> The motion between two events in closed form, for a linear spring, constant and viscous friction and
 !> a periodic drive:
-!>   y'' + 2 g y' + w^2 y = f(phi),  y = x - x_equilibrium,  phi = phi_0 + Omega t.
+!>   y'' + 2 g y' + w^2 y = f(phi),  y = x - x_equilibrium,  phi = Omega t.
 !> With z = y' + g y + i w_d y this is z' = lambda z + f, lambda = -g + i w_d, so
 !>   z = periodic response + exp(lambda s) Z.
 !> The one harmonic that may be near resonance is kept out of the periodic response; its answer from
@@ -25,7 +25,7 @@ module exact_flow
   type, public :: flow_t
     !> False if the machine has no closed form here.
     logical :: available = .false.
-    real(wp) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, crank_angle = 0
+    real(wp) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0
     !> Equilibria while slipping down, at frictionless rest, and up [m].
     real(wp) :: equilibrium(-1:1) = 0
     integer :: harmonics = 0
@@ -54,10 +54,9 @@ module exact_flow
 
 contains
 
-  !> Closed form of a machine with the stroboscopic section at `crank_angle` [rad].
-  pure subroutine prepare_flow(machine, crank_angle, flow)
+  !> Closed form of a machine; `available` tells whether it has one.
+  pure subroutine prepare_flow(machine, flow)
     type(oscillator_t), intent(in) :: machine
-    real(wp), intent(in) :: crank_angle
     type(flow_t), intent(out) :: flow
     complex(wp) :: lambda, h, forward, backward
     real(wp) :: w, amplitude
@@ -69,7 +68,6 @@ contains
     if (.not. flow%available) return
     flow%damped = sqrt((flow%natural - flow%decay)*(flow%natural + flow%decay))
     flow%drive_frequency = machine%drive_frequency
-    flow%crank_angle = crank_angle
     flow%equilibrium = machine%restoring%free_length + machine%drive%mean &
       - [-1, 0, 1]*(machine%friction%kinetic/machine%restoring%stiffness)
     flow%harmonics = size(machine%drive%cosine)
@@ -138,7 +136,7 @@ contains
     y = x - segment%equilibrium
     z_re = v + flow%decay*y
     z_im = flow%damped*y
-    call sine_cosine(flow%crank_angle + flow%drive_frequency*time, s1, c1)
+    call sine_cosine(flow%drive_frequency*time, s1, c1)
     s = s1
     c = c1
     do n = 1, flow%harmonics
@@ -175,7 +173,7 @@ contains
     z_im = turn_s*segment%z_re + turn_c*segment%z_im
     f = 0
     f_rate = 0
-    call sine_cosine(flow%crank_angle + flow%drive_frequency*(segment%start + elapsed), s1, c1)
+    call sine_cosine(flow%drive_frequency*(segment%start + elapsed), s1, c1)
     s = s1
     c = c1
     do n = 1, flow%harmonics

@@ -5,6 +5,7 @@
 !> time. One loop serves every machine; the modes decide what comes next.
 module motion
   use adaptive_flight, only: fly_adaptive
+  use constants, only: two_pi
   use contact_law, only: velocity_after_impact
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
@@ -56,7 +57,7 @@ contains
     moving%machine = machine
     moving%options = options
     moving%layer = machine%friction%layer_speed
-    call prepare_flow(machine, options%crank_angle, moving%flow)
+    call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive
     if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0)) then
       call fail(error, exit_bad_case, 'integrator.flight = "exact": this machine has modes without a '// &
@@ -65,14 +66,15 @@ contains
     end if
   end subroutine prepare_motion
 
-  !> State of a body set off at `x` [m], `v` [m/s] with the crank at the section.
-  pure function start_state(moving, x, v) result(state)
+  !> State of a body set off at `x` [m], `v` [m/s] with the crank at `crank_angle` [rad].
+  pure function start_state(moving, x, v, crank_angle) result(state)
     type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: x, v
+    real(wp), intent(in) :: x, v, crank_angle
     type(state_t) :: state
-    state = state_t(x=x, v=v, time=0.0_wp, mode=mode_slip_plus)
+    state = state_t(x=x, v=v, mode=mode_slip_plus)
+    state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
-    if (v == 0) state%mode = mode_from_rest(moving%machine, moving%options, state)
+    if (v == 0) state%mode = mode_from_rest(moving%machine, state)
   end function start_state
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
@@ -186,7 +188,7 @@ contains
       call come_to_rest(moving, state, event_stick, tally, log)
       return
     end if
-    left = chatter_time(moving%machine, moving%options, state, direction, abs(after))
+    left = chatter_time(moving%machine, state, direction, abs(after))
     if (left < 0) return
     tally%chatters = tally%chatters + 1
     tally%sticks = tally%sticks + 1
@@ -207,7 +209,7 @@ contains
     type(log_t), intent(inout), optional :: log
     logical :: slips
     state%v = 0
-    state%mode = mode_from_rest(moving%machine, moving%options, state)
+    state%mode = mode_from_rest(moving%machine, state)
     slips = state%mode == mode_slip_plus .or. state%mode == mode_slip_minus
     if (.not. slips) then
       tally%sticks = tally%sticks + 1
@@ -228,7 +230,7 @@ contains
     start = state
     call note_position(tally, state)
     tally%v_max = max(tally%v_max, 0.0_wp)
-    call hold(moving%machine, moving%options, state, time_end)
+    call hold(moving%machine, state, time_end)
     if (.not. present(log)) return
     if (log%sample_interval > 0) then
       sample = start
@@ -250,7 +252,7 @@ contains
     real(wp), intent(in) :: time_end
     state%time = min(state%time + 1e-9_wp*moving%machine%period, time_end)
     state%v = 0
-    state%mode = mode_from_rest(moving%machine, moving%options, state)
+    state%mode = mode_from_rest(moving%machine, state)
   end subroutine break_tie
 
 end module motion

@@ -30,7 +30,8 @@ module motion_state
   !> Which flight is used: exact wherever it exists, exact only, adaptive only.
   integer, parameter, public :: flight_auto = 0, flight_exact = 1, flight_adaptive = 2
 
-  !> State of the body. `time` runs within one drive period, from the stroboscopic section.
+  !> State of the body. `time` runs within one drive period, from the stroboscopic section at crank
+  !> angle 0.
   type, public :: state_t
     real(wp) :: x = 0, v = 0, time = 0
     integer :: mode = 0
@@ -44,8 +45,6 @@ module motion_state
     integer(int64) :: event_budget = 1000000_int64
     !> |x| beyond which the body has left the domain [m].
     real(wp) :: domain = 1e6_wp
-    !> Crank angle at the stroboscopic section [rad].
-    real(wp) :: crank_angle = 0
   end type options_t
 
   !> Counts and extremes since the last reset.

@@ -8,7 +8,7 @@ module rest
   use friction_law, only: friction_t
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
-    mode_upper_barrier, options_t, state_t
+    mode_upper_barrier, state_t
   use oscillator, only: holding_force, oscillator_t
   implicit none
   private
@@ -23,13 +23,12 @@ contains
 
   !> Mode of a body with zero velocity at `state%x`, `state%time`. At the edge of sticking the rate of
   !> the holding force decides; a barrier counts as holding whatever pushes against it.
-  pure integer function mode_from_rest(machine, options, state) result(mode)
+  pure integer function mode_from_rest(machine, state) result(mode)
     type(oscillator_t), intent(in) :: machine
-    type(options_t), intent(in) :: options
     type(state_t), intent(in) :: state
     real(wp) :: force, rate, curvature
     logical :: at_upper, at_lower, up, down
-    call holding_force(machine, state%x, options%crank_angle + machine%drive_frequency*state%time, &
+    call holding_force(machine, state%x, machine%drive_frequency*state%time, &
                        force, rate, curvature)
     up = breaks_away(machine, force, rate)
     down = breaks_away(machine, -force, -rate)
@@ -64,9 +63,8 @@ contains
 
   !> Keeps the body at rest until it is released or `time_end`. `state%mode` becomes the slip that follows;
   !> it stays as it is when the time is over.
-  pure subroutine hold(machine, options, state, time_end)
+  pure subroutine hold(machine, state, time_end)
     type(oscillator_t), intent(in) :: machine
-    type(options_t), intent(in) :: options
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     real(wp) :: force, rate, curvature, step_up, step_down, step, smallest
@@ -75,7 +73,7 @@ contains
     down_open = state%x > machine%contact%lower
     smallest = 4*epsilon(1.0_wp)*machine%period
     do
-      call holding_force(machine, state%x, options%crank_angle + machine%drive_frequency*state%time, &
+      call holding_force(machine, state%x, machine%drive_frequency*state%time, &
                          force, rate, curvature)
       if (up_open .and. breaks_away(machine, force, rate)) then
         state%mode = mode_slip_plus
@@ -112,15 +110,14 @@ contains
   !> just left it at `speed` [m/s]; -1 if they do not, or if the acceleration is not yet uniform over
   !> what is left. One bounce with constant friction: out at a_out = (R + F)/m, back at a_in = (R - F)/m,
   !> the speed shrinks by k sqrt(a_in/a_out), so the times form a geometric series.
-  pure real(wp) function chatter_time(machine, options, state, direction, speed) result(left)
+  pure real(wp) function chatter_time(machine, state, direction, speed) result(left)
     type(oscillator_t), intent(in) :: machine
-    type(options_t), intent(in) :: options
     type(state_t), intent(in) :: state
     integer, intent(in) :: direction
     real(wp), intent(in) :: speed
     real(wp) :: force, rate, curvature, out, back, shrink, friction, change
     left = -1
-    call holding_force(machine, state%x, options%crank_angle + machine%drive_frequency*state%time, &
+    call holding_force(machine, state%x, machine%drive_frequency*state%time, &
                        force, rate, curvature)
     associate (law => machine%friction)
       if (direction*force <= law%break_away) return

@@ -10,7 +10,7 @@ module law_table
   implicit none
   private
 
-  public :: find_law, law_names, parameters_of, law_choice, value_of, list_of
+  public :: find_law, law_names, parameters_of, law_choice, value_of, list_of, set_value
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=9) :: &
@@ -220,6 +220,14 @@ contains
     real(wp), allocatable :: values(:)
     values = choice%parameters(position_of(choice, parameter))%values
   end function list_of
+
+  !> Sets a parameter of a choice to one number or a list; the parameter must belong to the law.
+  pure subroutine set_value(choice, parameter, values)
+    type(law_choice_t), intent(inout) :: choice
+    character(len=*), intent(in) :: parameter
+    real(wp), intent(in) :: values(:)
+    choice%parameters(position_of(choice, parameter))%values = values
+  end subroutine set_value
 
   pure integer function position_of(choice, parameter)
     type(law_choice_t), intent(in) :: choice

@@ -1,0 +1,92 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> From a case to what the numerics take.
+module case_setup
+  use axis, only: axis_t
+  use case_type, only: case_t
+  use grid, only: grid_t, make_grid
+  use kinds, only: int64, wp
+  use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
+  use trajectory, only: span_t
+  implicit none
+  private
+
+  public :: options_of, span_of, grid_of, output_path, automatic_tile
+
+contains
+
+  !> Integrator options of a case.
+  pure function options_of(the_case) result(options)
+    type(case_t), intent(in) :: the_case
+    type(options_t) :: options
+    select case (the_case%integrator%flight)
+    case ('exact')
+      options%flight = flight_exact
+    case ('adaptive')
+      options%flight = flight_adaptive
+    case default
+      options%flight = flight_auto
+    end select
+    options%tolerance = the_case%integrator%tolerance
+    options%event_budget = int(the_case%integrator%event_budget, int64)
+    options%domain = the_case%run%domain
+  end function options_of
+
+  !> Length and window of the trajectories of a case.
+  pure function span_of(the_case) result(span)
+    type(case_t), intent(in) :: the_case
+    type(span_t) :: span
+    span%duration = the_case%run%duration
+    span%window = the_case%run%window
+    span%extension = the_case%run%extension
+    span%stop_when_captured = the_case%run%stop == 'captured'
+  end function span_of
+
+  !> The grid of a case over `axes`.
+  pure function grid_of(the_case, axes) result(grid)
+    type(case_t), intent(in) :: the_case
+    type(axis_t), intent(in) :: axes(:)
+    type(grid_t) :: grid
+    grid = make_grid(axes, the_case%laws, &
+                     [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], options_of(the_case))
+  end function grid_of
+
+  !> Where the output goes: as asked, or the name of the case without its folder, with .h5.
+  pure function output_path(asked, case_path) result(path)
+    character(len=*), intent(in) :: asked, case_path
+    character(len=:), allocatable :: path
+    if (len(asked) > 0) then
+      path = asked
+      return
+    end if
+    path = case_path(index(case_path, '/', back=.true.) + 1:)
+    if (len(path) > 5) then
+      if (path(len(path) - 4:) == '.toml') path = path(:len(path) - 5)
+    end if
+    path = path//'.h5'
+  end function output_path
+
+  !> Tile shape where the case leaves it open: about a thousand trajectories of one slice.
+  pure function automatic_tile(grid, asked) result(tile)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: asked(:)
+    integer :: tile(size(grid%shape))
+    integer :: i, starts
+    starts = count(grid%start_axis > 0)
+    do i = 1, size(tile)
+      if (any(grid%start_axis == i)) then
+        tile(i) = max(1, nint(1024.0_wp**(1.0_wp/starts)))
+      else if (starts == 0) then
+        tile(i) = max(1, nint(64.0_wp**(1.0_wp/size(tile))))
+      else
+        tile(i) = 1
+      end if
+      if (i <= size(asked)) then
+        if (asked(i) > 0) tile(i) = asked(i)
+      end if
+      tile(i) = min(tile(i), grid%shape(i))
+    end do
+  end function automatic_tile
+
+end module case_setup

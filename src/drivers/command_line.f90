@@ -1,0 +1,268 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The command line: what was asked, and the texts of `--help`.
+module command_line
+  use errors, only: error_t, fail
+  use kinds, only: int64, wp
+  use status, only: exit_usage
+  use text, only: join, starts_with
+  implicit none
+  private
+
+  public :: read_command_line, help_text, whole_command_line
+
+  integer, parameter :: longest_argument = 4096
+
+  character(len=*), parameter, public :: commands(7) = [character(len=10) :: 'basin', 'sweep', &
+    'trajectory', 'points', 'laws', 'info', 'verify']
+
+  type, public :: command_t
+    character(len=:), allocatable :: name
+    !> The case, or the file of `info` and `verify`.
+    character(len=:), allocatable :: path
+    character(len=:), allocatable :: output, list, csv
+    !> `--set` arguments.
+    character(len=longest_argument), allocatable :: overrides(:)
+    logical :: help = .false., version = .false., validate = .false., dry_run = .false.
+    logical :: force = .false., resume = .false., json = .false., quiet = .false.
+    real(wp) :: time_limit = 0
+    integer :: ranks_per_node = 0
+    !> `verify`: points rerun, and the seed that chooses them.
+    integer :: sample = 200, seed = 1
+  end type command_t
+
+contains
+
+  !> Reads the arguments; code 64 for what is not understood.
+  subroutine read_command_line(command, error)
+    type(command_t), intent(out) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: argument
+    integer :: position
+    command%name = ''
+    command%path = ''
+    command%output = ''
+    command%list = ''
+    command%csv = ''
+    allocate (command%overrides(0))
+    position = 0
+    do while (position < command_argument_count())
+      position = position + 1
+      argument = argument_at(position)
+      if (starts_with(argument, '-') .and. len(argument) > 1) then
+        call read_option(argument, position, command, error)
+      else if (len(command%name) == 0) then
+        command%name = argument
+        if (.not. any(commands == argument)) call fail(error, exit_usage, "unknown command '"//argument// &
+          "'; the commands are "//join(commands, ', '))
+      else if (len(command%path) == 0) then
+        command%path = argument
+      else
+        call fail(error, exit_usage, "unexpected argument '"//argument//"' after '"//command%path//"'")
+      end if
+      if (allocated(error)) return
+    end do
+    if (command%help .or. command%version) return
+    call check_command(command, error)
+  end subroutine read_command_line
+
+  subroutine check_command(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    if (len(command%name) == 0) then
+      call fail(error, exit_usage, 'a command is missing; the commands are '//join(commands, ', ')// &
+                ' (see separatrix --help)')
+    else if (len(command%path) == 0 .and. command%name /= 'laws') then
+      call fail(error, exit_usage, command%name//': the file is missing (see separatrix '//command%name// &
+                ' --help)')
+    else if (command%name == 'points' .and. len(command%list) == 0) then
+      call fail(error, exit_usage, 'points: --list ICS.csv is missing')
+    else if (command%name /= 'points' .and. len(command%list) > 0) then
+      call fail(error, exit_usage, '--list belongs to the command points')
+    else if (len(command%csv) > 0 .and. command%name /= 'points' .and. command%name /= 'trajectory') then
+      call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
+    else if (command%force .and. command%resume) then
+      call fail(error, exit_usage, '--force starts anew and --resume goes on: choose one')
+    end if
+  end subroutine check_command
+
+  !> One option, with its value taken from the next argument or after '='.
+  subroutine read_option(argument, position, command, error)
+    character(len=*), intent(in) :: argument
+    integer, intent(inout) :: position
+    type(command_t), intent(inout) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name, value
+    integer :: equals
+    name = argument
+    equals = index(argument, '=')
+    if (starts_with(argument, '--') .and. equals > 0) name = argument(:equals - 1)
+    select case (name)
+    case ('-h', '--help')
+      command%help = .true.
+    case ('--version')
+      command%version = .true.
+    case ('--validate')
+      command%validate = .true.
+    case ('--dry-run')
+      command%dry_run = .true.
+    case ('--force')
+      command%force = .true.
+    case ('--resume')
+      command%resume = .true.
+    case ('--json')
+      command%json = .true.
+    case ('-q', '--quiet')
+      command%quiet = .true.
+    case ('-o', '--output', '--set', '--list', '--csv', '--time-limit', '--ranks-per-node', '--sample', &
+          '--seed')
+      if (equals > 0 .and. starts_with(argument, '--')) then
+        value = argument(equals + 1:)
+      else if (position < command_argument_count()) then
+        position = position + 1
+        value = argument_at(position)
+      else
+        call fail(error, exit_usage, name//' needs a value')
+        return
+      end if
+      call take_value(name, value, command, error)
+    case default
+      call fail(error, exit_usage, "unknown option '"//argument//"' (see separatrix --help)")
+    end select
+    if (equals > 0 .and. .not. allocated(value) .and. .not. allocated(error)) &
+      call fail(error, exit_usage, name//' takes no value')
+  end subroutine read_option
+
+  subroutine take_value(name, value, command, error)
+    character(len=*), intent(in) :: name, value
+    type(command_t), intent(inout) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=longest_argument) :: padded
+    select case (name)
+    case ('-o', '--output')
+      command%output = value
+    case ('--list')
+      command%list = value
+    case ('--csv')
+      command%csv = value
+    case ('--set')
+      padded = value
+      command%overrides = [command%overrides, padded]
+    case ('--time-limit')
+      call read_number(name, value, command%time_limit, error)
+    case ('--ranks-per-node')
+      call read_integer(name, value, 1, command%ranks_per_node, error)
+    case ('--sample')
+      call read_integer(name, value, 1, command%sample, error)
+    case ('--seed')
+      call read_integer(name, value, 0, command%seed, error)
+    end select
+  end subroutine take_value
+
+  subroutine read_number(name, value, number, error)
+    character(len=*), intent(in) :: name, value
+    real(wp), intent(out) :: number
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+    number = 0
+    status = verify(value, '0123456789.eE+-')
+    if (status == 0) read (value, *, iostat=status) number
+    if (status /= 0 .or. .not. number > 0 .or. number > huge(number)) &
+      call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of seconds above 0")
+  end subroutine read_number
+
+  subroutine read_integer(name, value, least, number, error)
+    character(len=*), intent(in) :: name, value
+    integer, intent(in) :: least
+    integer, intent(out) :: number
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+    number = least - 1
+    status = verify(value, '0123456789')
+    if (status == 0) read (value, *, iostat=status) number
+    if (status /= 0 .or. number < least) &
+      call fail(error, exit_usage, name//": found '"//value//"', allowed is a whole number"// &
+                trim(merge(' from 1', ' from 0', least > 0)))
+  end subroutine read_integer
+
+  function argument_at(position) result(argument)
+    integer, intent(in) :: position
+    character(len=:), allocatable :: argument
+    integer :: length
+    call get_command_argument(position, length=length)
+    allocate (character(len=length) :: argument)
+    call get_command_argument(position, argument)
+  end function argument_at
+
+  !> The command line as it was given, for the record.
+  function whole_command_line() result(line)
+    character(len=:), allocatable :: line
+    integer :: i
+    line = argument_at(0)
+    do i = 1, command_argument_count()
+      line = line//' '//argument_at(i)
+    end do
+  end function whole_command_line
+
+  !> The text of `--help`, of one command or, with '', of the program.
+  pure function help_text(command) result(lines)
+    character(len=*), intent(in) :: command
+    character(len=:), allocatable :: lines
+    character(len=*), parameter :: nl = new_line('a')
+    select case (command)
+    case ('basin')
+      lines = 'separatrix basin CASE [-o FILE]: where every point of a grid ends up'//nl// &
+        '  The grid is the [[axis]] tables of the case: two or more of x0, v0, crank_angle, drive.ratio or any'//nl// &
+        '  other parameter. Run it with mpirun to share the work.'//nl
+    case ('sweep')
+      lines = 'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
+        '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
+        '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl
+    case ('trajectory')
+      lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE]: one motion with all its events'//nl// &
+        '  --csv FILE      also write the events as a table'//nl
+    case ('points')
+      lines = 'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
+        '  --list FILE     table with the columns x0,v0 and optionally ratio; replaces the grid of the case'//nl// &
+        '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl
+    case ('laws')
+      lines = 'separatrix laws [--json]: every law with parameters, units, bounds and source'//nl
+      return
+    case ('info')
+      lines = 'separatrix info FILE [--json]: what a file holds, with shares of regimes and attractors'//nl
+      return
+    case ('verify')
+      lines = 'separatrix verify FILE [--sample N] [--seed N] [--json]: checks a map file'//nl// &
+        '  Reads everything back, checks sums and invariants, and reruns a random sample of the points in double'//nl// &
+        '  precision (must agree to the bit) and in quadruple precision (label flips, largest deviation).'//nl// &
+        '  --sample N      points rerun (default 200)'//nl// &
+        '  --seed N        seed that chooses them (default 1)'//nl
+      return
+    case default
+      lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl// &
+        '  basin CASE       where every point of a grid of starts or parameters ends up'//nl// &
+        '  sweep CASE       amplitude-frequency and bifurcation diagram, run up, run down and from many starts'//nl// &
+        '  trajectory CASE  one motion with all its events'//nl// &
+        '  points CASE      a list of starts'//nl// &
+        '  laws             every law with parameters, units, bounds and source'//nl// &
+        '  info FILE        what a file holds'//nl// &
+        '  verify FILE      checks a file and reruns a sample of it at higher precision'//nl//nl// &
+        'separatrix COMMAND --help tells more. CASE is a TOML file, see docs/case-file.md.'//nl
+    end select
+    lines = lines//nl//'Options:'//nl// &
+      '  -o, --output FILE  where to write (default: the name of the case with .h5)'//nl// &
+      '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'//nl// &
+      '  --validate         checks the case and stops'//nl// &
+      '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &
+      '  --force            replaces an existing output'//nl// &
+      '  --resume           goes on with a run that was stopped or killed'//nl// &
+      '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
+      '  --json             log as JSON lines'//nl// &
+      '  -q, --quiet        errors only'//nl// &
+      '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &
+      'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &
+      '75 stopped early and resumable, 76 file belongs to another case.'//nl
+  end function help_text
+
+end module command_line

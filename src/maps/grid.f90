@@ -1,0 +1,168 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A map's grid: points over axes, some of which are starts (x0, v0, crank angle) and the others parameters.
+!> A slice is one combination of the parameters: one machine, one catalogue of attractors.
+module grid
+  use axis, only: axis_t
+  use errors, only: error_t
+  use kinds, only: int64, wp
+  use law_table, only: law_choice_t, set_value
+  use motion, only: motion_t, prepare_motion
+  use motion_state, only: options_t
+  use oscillator, only: build_oscillator, oscillator_t
+  implicit none
+  private
+
+  public :: make_grid, point_start, point_slice, slice_motion, slice_starts, machine_with
+
+  type, public :: grid_t
+    type(axis_t), allocatable :: axes(:)
+    !> Points along each axis.
+    integer, allocatable :: shape(:)
+    !> Axis of x0, v0 and the crank angle; 0 where the start's own value is used.
+    integer :: start_axis(3) = 0
+    !> x0 [m], v0 [m/s], crank angle [rad] where no axis gives them.
+    real(wp) :: start(3) = 0
+    !> The other axes, in order, and the number of their combinations.
+    integer, allocatable :: parameter_axes(:)
+    integer(int64) :: slices = 1
+    !> The machine where no axis changes it.
+    type(law_choice_t), allocatable :: laws(:)
+    type(options_t) :: options
+  end type grid_t
+
+contains
+
+  !> A grid over `axes`; `start` = x0, v0, crank angle where no axis gives them.
+  pure function make_grid(axes, laws, start, options) result(grid)
+    type(axis_t), intent(in) :: axes(:)
+    type(law_choice_t), intent(in) :: laws(:)
+    real(wp), intent(in) :: start(3)
+    type(options_t), intent(in) :: options
+    type(grid_t) :: grid
+    integer :: i
+    grid%axes = axes
+    grid%laws = laws
+    grid%start = start
+    grid%options = options
+    allocate (grid%shape(size(axes)), grid%parameter_axes(0))
+    do i = 1, size(axes)
+      grid%shape(i) = size(axes(i)%values)
+      select case (axes(i)%name)
+      case ('x0')
+        grid%start_axis(1) = i
+      case ('v0')
+        grid%start_axis(2) = i
+      case ('crank_angle')
+        grid%start_axis(3) = i
+      case default
+        grid%parameter_axes = [grid%parameter_axes, i]
+        grid%slices = grid%slices*grid%shape(i)
+      end select
+    end do
+  end function make_grid
+
+  !> x0, v0, crank angle of a point (`index` from 1 along each axis).
+  pure function point_start(grid, index) result(start)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: index(:)
+    real(wp) :: start(3)
+    integer :: i
+    start = grid%start
+    do i = 1, 3
+      if (grid%start_axis(i) > 0) start(i) = grid%axes(grid%start_axis(i))%values(index(grid%start_axis(i)))
+    end do
+  end function point_start
+
+  !> Slice of a point, from 0, last parameter axis fastest.
+  pure integer(int64) function point_slice(grid, index) result(slice)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: index(:)
+    integer :: i
+    slice = 0
+    do i = 1, size(grid%parameter_axes)
+      slice = slice*grid%shape(grid%parameter_axes(i)) + index(grid%parameter_axes(i)) - 1
+    end do
+  end function point_slice
+
+  !> The machine of a slice, ready to move.
+  pure subroutine slice_motion(grid, slice, moving, error)
+    type(grid_t), intent(in) :: grid
+    integer(int64), intent(in) :: slice
+    type(motion_t), intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    type(law_choice_t), allocatable :: laws(:)
+    integer(int64) :: rest
+    integer :: i, position, along
+    laws = grid%laws
+    rest = slice
+    do i = size(grid%parameter_axes), 1, -1
+      along = grid%parameter_axes(i)
+      position = int(modulo(rest, int(grid%shape(along), int64)))
+      rest = rest/grid%shape(along)
+      call set_by_path(laws, grid%axes(along)%name, grid%axes(along)%values(position + 1))
+    end do
+    call machine_of(laws, grid%options, moving, error)
+  end subroutine slice_motion
+
+  !> The machine with one parameter 'family.parameter' changed.
+  pure subroutine machine_with(grid, path, value, moving, error)
+    type(grid_t), intent(in) :: grid
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value
+    type(motion_t), intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    type(law_choice_t), allocatable :: laws(:)
+    laws = grid%laws
+    call set_by_path(laws, path, value)
+    call machine_of(laws, grid%options, moving, error)
+  end subroutine machine_with
+
+  pure subroutine machine_of(laws, options, moving, error)
+    type(law_choice_t), intent(in) :: laws(:)
+    type(options_t), intent(in) :: options
+    type(motion_t), intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    type(oscillator_t) :: machine
+    call build_oscillator(laws, machine, error)
+    if (allocated(error)) return
+    call prepare_motion(machine, options, moving, error)
+  end subroutine machine_of
+
+  pure subroutine set_by_path(laws, path, value)
+    type(law_choice_t), intent(inout) :: laws(:)
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value
+    integer :: i, dot
+    dot = index(path, '.')
+    do i = 1, size(laws)
+      if (laws(i)%family == path(:dot - 1)) call set_value(laws(i), trim(path(dot + 1:)), [value])
+    end do
+  end subroutine set_by_path
+
+  !> Starts that sample a slice: `count` points of the additive recurrence of Roberts (2018) over the ranges of
+  !> the start axes, shifted by `seed`; one start if no start is an axis. Rows x0, v0, crank angle.
+  pure function slice_starts(grid, count, seed) result(starts)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: count, seed
+    real(wp), allocatable :: starts(:, :)
+    ! Powers of 1/p for the root p of p^4 = p + 1.
+    real(wp), parameter :: irrational(3) = [0.8191725133961645_wp, 0.6710436067037893_wp, &
+                                            0.5497004779019703_wp]
+    real(wp) :: low, high
+    integer :: i, k, points
+    points = merge(count, 1, any(grid%start_axis > 0))
+    allocate (starts(3, points))
+    do k = 1, 3
+      starts(k, :) = grid%start(k)
+      if (grid%start_axis(k) == 0) cycle
+      low = minval(grid%axes(grid%start_axis(k))%values)
+      high = maxval(grid%axes(grid%start_axis(k))%values)
+      do i = 1, points
+        starts(k, i) = low + (high - low)*modulo(0.5_wp + (i + seed*0.6180339887498949_wp)*irrational(k), 1.0_wp)
+      end do
+    end do
+  end function slice_starts
+
+end module grid

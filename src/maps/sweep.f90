@@ -1,0 +1,137 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Run-up and run-down: a parameter is held at one value after the other while the body and the crank
+!> go on as they are. Each hold lasts a whole number of drive periods, so that the crank is at the section when
+!> the parameter changes and its angle carries over exactly.
+module sweep
+  use attractors, only: features_t, regime_of
+  use errors, only: error_t
+  use grid, only: grid_t, machine_with
+  use kinds, only: int64, wp
+  use motion, only: advance_period, motion_t, start_state
+  use motion_state, only: reset_tally, state_t, tally_t
+  use trajectory, only: span_t
+  implicit none
+  private
+
+  public :: hold_parameter, bracket_limit
+
+  !> Relative distance at which section points count as the same when a period is read off.
+  real(wp), parameter :: same_point = 0.02_wp
+
+  !> What is seen at the end of one hold.
+  type, public :: hold_t
+    integer :: reason = 0
+    integer :: period = 0
+    type(features_t) :: features
+    !> Last section points, rows x [m] and v [m/s].
+    real(wp), allocatable :: samples(:, :)
+    type(state_t) :: state
+  end type hold_t
+
+contains
+
+  !> Holds parameter `path` at `value` for at least the duration, starting from `state`; features are over the window.
+  subroutine hold_parameter(grid, span, path, value, state, samples, held, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: samples
+    type(hold_t), intent(out) :: held
+    type(error_t), allocatable, intent(out) :: error
+    type(motion_t) :: moving
+    type(tally_t) :: tally
+    integer :: periods, in_window, i
+    call machine_with(grid, path, value, moving, error)
+    if (allocated(error)) return
+    in_window = max(1, ceiling(span%window/moving%machine%period))
+    periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)
+    allocate (held%samples(2, samples))
+    held%state = start_state(moving, state%x, state%v, 0.0_wp)
+    call reset_tally(tally, held%state)
+    do i = 1, periods
+      if (i == periods - in_window + 1) then
+        tally%wants_v_max = .true.
+        call reset_tally(tally, held%state)
+      end if
+      call advance_period(moving, held%state, tally, held%reason)
+      if (held%reason /= 0) return
+      if (i > periods - samples) held%samples(:, i - periods + samples) = [held%state%x, held%state%v]
+    end do
+    held%features = regime_of(tally, real(in_window, wp))
+    held%period = period_of(held%samples, held%features%amplitude*[1.0_wp, moving%machine%drive_frequency])
+    held%features%word = 0
+    if (held%period > 0) held%features%word = word_of(moving, held%state, held%period)
+  end subroutine hold_parameter
+
+  !> Event word of the `period` drive periods that follow a state.
+  pure integer(int64) function word_of(moving, state, period) result(word)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: period
+    type(state_t) :: probe
+    type(tally_t) :: tally
+    integer :: i, reason
+    probe = state
+    call reset_tally(tally, probe)
+    do i = 1, period
+      call advance_period(moving, probe, tally, reason)
+      if (reason /= 0) exit
+    end do
+    word = tally%word
+  end function word_of
+
+  !> Smallest number of drive periods after which the samples repeat, 0 if none up to half of them does.
+  pure integer function period_of(samples, size_of_motion) result(period)
+    real(wp), intent(in) :: samples(:, :), size_of_motion(2)
+    integer :: p, i
+    logical :: repeats
+    period = 0
+    do p = 1, size(samples, 2)/2
+      repeats = .true.
+      do i = 1, size(samples, 2) - p
+        repeats = repeats .and. norm2((samples(:, i + p) - samples(:, i)) &
+                                      /(size_of_motion + tiny(1.0_wp))) <= same_point
+      end do
+      if (repeats) then
+        period = p
+        return
+      end if
+    end do
+  end function period_of
+
+  !> Halves the interval in which impacts start or stop while the parameter moves from `value` (state given)
+  !> to `beyond`, until it is at most `tolerance` wide. Every hold starts from the last state before the change.
+  subroutine bracket_limit(grid, span, path, value, beyond, state, impacting, tolerance, bracket, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value, beyond, tolerance
+    type(state_t), intent(in) :: state
+    logical, intent(in) :: impacting
+    real(wp), intent(out) :: bracket(2)
+    type(error_t), allocatable, intent(out) :: error
+    type(hold_t) :: held
+    type(state_t) :: last
+    real(wp) :: near, far, middle
+    near = value
+    far = beyond
+    last = state
+    do while (abs(far - near) > tolerance)
+      middle = 0.5_wp*(near + far)
+      call hold_parameter(grid, span, path, middle, last, 0, held, error)
+      if (allocated(error)) return
+      if ((held%features%impacts_per_period > 0) .eqv. impacting) then
+        near = middle
+        last = held%state
+      else
+        far = middle
+      end if
+    end do
+    bracket = [min(near, far), max(near, far)]
+  end subroutine bracket_limit
+
+end module sweep

@@ -1,0 +1,80 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The one entry of the reference library: trajectories of a machine, run and labelled by the same code
+!> as the maps but in quadruple precision. Doubles go in and out; nothing else is visible outside.
+module reference_library
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use attractors, only: attractor_t, packed_size, unpack_attractor
+  use errors, only: error_t
+  use kinds, only: wp
+  use law_table, only: families, law_choice, law_choice_t, laws
+  use motion, only: motion_t, prepare_motion
+  use motion_state, only: options_t
+  use oscillator, only: build_oscillator, oscillator_t
+  use trajectory, only: outcome_t, run_trajectory, span_t
+  implicit none
+  private
+
+  public :: separatrix_reference_run
+
+contains
+
+  !> Runs `points` trajectories. Laws: row in the law table per family, lengths and values of their parameters one
+  !> after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at capture;
+  !> `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
+  !> Returns 0, or 1 if the machine cannot be built.
+  integer(c_int) function separatrix_reference_run(law_rows, lengths, values, flight, event_budget, numbers, &
+      attractor_count, packed, points, starts, results) bind(c)
+    integer(c_int), intent(in) :: law_rows(size(families)), lengths(*)
+    real(c_double), intent(in) :: values(*)
+    integer(c_int), value :: flight
+    integer(c_int64_t), value :: event_budget
+    real(c_double), intent(in) :: numbers(6)
+    integer(c_int), value :: attractor_count, points
+    real(c_double), intent(in) :: packed(packed_size, attractor_count), starts(3, points)
+    real(c_double), intent(out) :: results(6, points)
+    type(law_choice_t) :: choices(size(families))
+    type(oscillator_t) :: machine
+    type(motion_t) :: moving
+    type(attractor_t), allocatable :: catalogue(:)
+    type(error_t), allocatable :: error
+    type(options_t) :: options
+    type(outcome_t) :: outcome
+    type(span_t) :: span
+    integer :: i, k, parameter, position
+    separatrix_reference_run = 1
+    position = 0
+    parameter = 0
+    do i = 1, size(families)
+      choices(i) = law_choice(trim(laws(law_rows(i))%family), trim(laws(law_rows(i))%name))
+      do k = 1, size(choices(i)%parameters)
+        parameter = parameter + 1
+        choices(i)%parameters(k)%values = real(values(position + 1:position + lengths(parameter)), wp)
+        position = position + lengths(parameter)
+      end do
+    end do
+    call build_oscillator(choices, machine, error)
+    if (allocated(error)) return
+    options%flight = flight
+    options%event_budget = event_budget
+    options%tolerance = numbers(1)
+    options%domain = numbers(2)
+    span = span_t(real(numbers(3), wp), real(numbers(4), wp), real(numbers(5), wp), numbers(6) > 0)
+    call prepare_motion(machine, options, moving, error)
+    if (allocated(error)) return
+    allocate (catalogue(attractor_count))
+    do i = 1, attractor_count
+      catalogue(i) = unpack_attractor(real(packed(:, i), wp))
+    end do
+    do i = 1, points
+      call run_trajectory(moving, catalogue, span, real(starts(1, i), wp), real(starts(2, i), wp), &
+                          real(starts(3, i), wp), outcome)
+      results(:, i) = real([real(outcome%reason, wp), real(outcome%attractor, wp), &
+                            real(outcome%features%regime, wp), outcome%x, outcome%v, &
+                            real(outcome%impacts, wp)], c_double)
+    end do
+    separatrix_reference_run = 0
+  end function separatrix_reference_run
+
+end module reference_library
