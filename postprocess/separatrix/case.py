@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a figure says about the case that it shows, taken from the resolved case of the file."""
+
+import tomllib
+
+import xarray as xr
+
+# symbol and unit of the parameters that matter for a caption, in this order
+_FRICTION = {
+    "kinetic_coefficient": (r"$\mu$", ""),
+    "static_coefficient": (r"$\mu_s$", ""),
+    "damping": ("$b$", "N s/m"),
+    "stribeck_velocity": ("$v_s$", "m/s"),
+    "stribeck_exponent": (r"$\delta$", ""),
+}
+_CONTACT = {
+    "restitution": ("$k$", ""),
+    "upper": (r"$x_\mathrm{upper}$", "m"),
+    "lower": (r"$x_\mathrm{lower}$", "m"),
+}
+_LAW_NAMES = {
+    "none": "no",
+    "coulomb": "Coulomb",
+    "viscous": "viscous",
+    "coulomb_viscous": "Coulomb-viscous",
+    "coulomb_stribeck": "Coulomb-Stribeck",
+}
+# values beyond this mean "absent", and are not numbers to print
+_HUGE = 1e300
+
+
+def resolved_case(result: xr.Dataset) -> dict:
+    """Return the resolved case of a file as nested dictionaries; empty if none can be read."""
+    try:
+        return tomllib.loads(result.attrs.get("resolved_case", ""))
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def describe_case(result: xr.Dataset) -> list[str]:
+    """Return short pieces of a caption: friction, contact and drive ratio.
+
+    A parameter that is an axis of the map or of the sweep is left out.
+    """
+    case = resolved_case(result)
+    axes = set(result.dims)
+    pieces = []
+    friction = case.get("friction")
+    if isinstance(friction, dict):
+        law = str(friction.get("law", ""))
+        name = f"{_LAW_NAMES.get(law, law.replace('_', ' '))} friction".strip()
+        pieces.append(", ".join([name, *_values(friction, _FRICTION, "friction", axes)]))
+    contact = case.get("contact")
+    if isinstance(contact, dict):
+        values = _values(contact, _CONTACT, "contact", axes)
+        pieces.append(", ".join(values) if values else "no barrier")
+    ratio = _drive_ratio(result, case)
+    if ratio is not None and not axes & {"drive_ratio", "ratio"}:
+        pieces.append(rf"$\Omega_p/\omega$ = {ratio:g}")
+    return pieces
+
+
+def version_text(result: xr.Dataset) -> str:
+    """Return program, version and commit that wrote the file."""
+    source = str(result.attrs.get("source", "Separatrix"))
+    commit = str(result.attrs.get("provenance_commit", ""))
+    return f"{source} ({commit[:10]})" if commit else source
+
+
+def _drive_ratio(result: xr.Dataset, case: dict) -> float | None:
+    drive = case.get("drive")
+    value = result.attrs.get("drive_ratio", drive.get("ratio") if isinstance(drive, dict) else None)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _values(section: dict, symbols: dict, family: str, axes: set) -> list[str]:
+    texts = []
+    for key, (symbol, unit) in symbols.items():
+        value = section.get(key)
+        if not isinstance(value, int | float) or f"{family}_{key}" in axes or not abs(value) < _HUGE:
+            continue
+        texts.append(f"{symbol} = {value:g} {unit}".rstrip())
+    return texts

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names and colours of the classes of a coded field: regimes, attractors, periods, event words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from separatrix import style
+from separatrix.labels import flag_text
+from separatrix.open import decode_word, flag_names, table
+
+CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word")
+_MOST = len(style.TOL_MUTED)
+
+
+@dataclass(frozen=True)
+class Class:
+    """One entry of a legend and the codes that it stands for."""
+
+    text: str
+    colour: str
+    codes: tuple[int, ...]
+
+
+def classes(result: xr.Dataset, field: str, counts: dict[int, int]) -> list[Class]:
+    """Return the classes that occur, ascending by code; beyond ten colours the rarest are one class.
+
+    The colour of a regime is always the same. That of an attractor follows its id as long as the
+    catalogue has at most ten, so that maps of one family keep their colours.
+    """
+    present = sorted(code for code, count in counts.items() if count > 0)
+    if field == "regime":
+        names = flag_names(result[field])
+        return [
+            Class(
+                flag_text(names.get(code, str(code))),
+                style.REGIMES.get(names.get(code), style.OTHER),
+                (code,),
+            )
+            for code in present
+        ]
+    nothing = [Class(_text(result, field, 0), style.NOTHING, (0,))] if 0 in present else []
+    coded = [code for code in present if code != 0]
+    highest = max(_known_ids(result) + coded, default=0) if field == "attractor" else len(coded)
+    if highest <= _MOST:
+        colours = style.palette(highest)
+        places = [code - 1 for code in coded] if field == "attractor" else range(len(coded))
+        return nothing + [
+            Class(_text(result, field, code), colours[place], (code,))
+            for code, place in zip(coded, places, strict=True)
+        ]
+    return nothing + _most_frequent(result, field, coded, counts)
+
+
+def class_index(image: np.ndarray, entries: list[Class]) -> np.ndarray:
+    """Return the position in `entries` of the code at each pixel."""
+    index = np.zeros(image.shape, dtype=np.int16)
+    for place, entry in enumerate(entries):
+        index[np.isin(image, entry.codes)] = place
+    return index
+
+
+def class_counts(entries: list[Class], counts: dict[int, int]) -> np.ndarray:
+    """Return how many points belong to each class."""
+    return np.array([sum(counts.get(code, 0) for code in entry.codes) for entry in entries], dtype=np.int64)
+
+
+def _most_frequent(result: xr.Dataset, field: str, coded: list[int], counts: dict[int, int]) -> list[Class]:
+    ranked = sorted(coded, key=lambda code: (-counts[code], code))
+    shown, rest = ranked[:_MOST], sorted(ranked[_MOST:])
+    entries = [
+        Class(_text(result, field, code), style.TOL_MUTED[place], (code,)) for place, code in enumerate(shown)
+    ]
+    entries.sort(key=lambda entry: entry.codes)
+    if rest:
+        entries.append(Class(f"{len(rest)} others", style.OTHER, tuple(rest)))
+    return entries
+
+
+def _known_ids(result: xr.Dataset) -> list[int]:
+    catalogue = table(result, "catalogue")
+    return [int(i) for i in np.unique(catalogue["attractor"].values)] if "attractor" in catalogue else []
+
+
+def _text(result: xr.Dataset, field: str, code: int) -> str:
+    if field == "attractor":
+        return _attractor_text(result, code) if code else "no attractor"
+    if field == "period":
+        return f"period {code}" if code else "not periodic"
+    if field == "event_word":
+        return f"word {decode_word(code)}" if code else "no events"
+    return flag_text(flag_names(result[field]).get(code, str(code)))
+
+
+def _attractor_text(result: xr.Dataset, identity: int) -> str:
+    """Return 'attractor 1: non-impact, period 1' from the catalogue, over all of its slices."""
+    catalogue = table(result, "catalogue")
+    if "attractor" not in catalogue:
+        return f"attractor {identity}"
+    mine = catalogue["attractor"].values == identity
+    if not mine.any():
+        return f"attractor {identity}"
+    names = flag_names(result["regime"])
+    regimes = [flag_text(names.get(int(r), str(r))) for r in np.unique(catalogue["regime"].values[mine])]
+    periods = [int(p) for p in np.unique(catalogue["period"].values[mine])]
+    if periods == [0]:
+        period = "not periodic"
+    else:
+        period = ("period " if len(periods) == 1 else "periods ") + ", ".join(str(p) for p in periods)
+    return f"attractor {identity}: {' or '.join(regimes)}, {period}"

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command `separatrix-figures`: the figures that fit each file."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from separatrix import basin, points, style, sweep, trajectory
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.labels import plain
+from separatrix.open import open_result
+from separatrix.save import FORMATS, save
+from separatrix.version import __version__
+
+
+class _Parser(argparse.ArgumentParser):
+    """Usage errors leave with 64, as those of `separatrix` do."""
+
+    def error(self, message: str) -> None:
+        raise SeparatrixError(f"{message}; see separatrix-figures --help", USAGE)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    code = 0
+    try:
+        options = _parser().parse_args(arguments)
+    except SeparatrixError as error:
+        return _report(error)
+    for path in options.files:
+        try:
+            for written in make(path, options):
+                print(written, flush=True)
+        except SeparatrixError as error:
+            reported = _report(error)
+            code = code or reported
+    return code
+
+
+def make(path: Path, options: argparse.Namespace) -> list[Path]:
+    """Write the figures of one file; return their paths."""
+    try:
+        return _make(path, options)
+    except KeyError as error:
+        raise SeparatrixError(f"{path}: lacks what the figure needs ({error.args[0]})") from error
+    except OSError as error:
+        raise SeparatrixError(f"{path}: is damaged ({str(error).splitlines()[0]})") from error
+
+
+def _make(path: Path, options: argparse.Namespace) -> list[Path]:
+    with style.context(), open_result(path) as result:
+        title = plain(options.title or result.attrs.get("title", path.stem))
+        stem = path.name.removesuffix(".h5")
+        folder = options.output or path.parent
+        return [
+            written
+            for name, figure in _figures(path, result, options.field, title).items()
+            for written in save(figure, folder / f"{stem}_{name}", options.formats, options.dpi)
+        ]
+
+
+def _figures(path: Path, result: object, field: str | None, title: str) -> dict[str, Figure]:
+    kind = result.attrs["kind"]
+    if kind == "basin":
+        return basin.figures(path, result, field, title)
+    if field:
+        raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
+    return {"sweep": sweep, "trajectory": trajectory, "points": points}[kind].figures(result, title)
+
+
+def _report(error: SeparatrixError) -> int:
+    print(f"separatrix-figures: {error}", file=sys.stderr)
+    return error.code
+
+
+def _formats(text: str) -> list[str]:
+    names = [name.strip().lower() for name in text.split(",") if name.strip()]
+    unknown = [name for name in names if name not in FORMATS]
+    if unknown or not names:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list out of {', '.join(FORMATS)}")
+    return names
+
+
+def _dpi(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 50 <= value <= 2400:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 50 to 2400")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="separatrix-figures",
+        description="Make the figures that fit each Separatrix result file.",
+        epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="result file (.h5)")
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", type=Path, help="folder of the figures [that of the file]"
+    )
+    parser.add_argument("--field", metavar="NAME", help="basin files: map this variable, e.g. settle_time")
+    parser.add_argument(
+        "--formats", metavar="LIST", type=_formats, default=["png", "pdf"], help="png, pdf, svg [png,pdf]"
+    )
+    parser.add_argument("--title", help="title of the figures [that of the file]")
+    parser.add_argument(
+        "--dpi", type=_dpi, default=style.PNG_DPI, help=f"resolution of images [{style.PNG_DPI}]"
+    )
+    parser.add_argument("--version", action="version", version=f"separatrix-figures {__version__}")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

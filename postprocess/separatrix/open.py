@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Open a result file: HDF5 -> xarray, codes -> text."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import xarray as xr
+
+from separatrix.errors import BAD_DATA, NO_INPUT, SeparatrixError
+from separatrix.version import __version__
+
+FORMAT = "separatrix"
+FORMAT_VERSION = 1
+KINDS = ("basin", "sweep", "trajectory", "points")
+TABLES = ("catalogue", "limits")
+
+_WORD_SYMBOLS = {1: "R", 2: "L", 3: "S", 4: "C", 5: "D", 6: "+", 7: "."}
+
+
+def open_result(path: str | Path) -> xr.Dataset:
+    """Open a result file as an xarray Dataset whose arrays are read when they are used.
+
+    The groups `/catalogue` and `/limits` are part of it as `catalogue_*` and `limits_*` (see `table`),
+    the texts and attributes of `/provenance` are attributes (`resolved_case`, `provenance_version`, ...).
+    Raises SeparatrixError for a missing, foreign, incomplete or too new file.
+    """
+    attributes, texts, groups = _read_header(Path(path))
+    parts = [xr.open_dataset(path, engine="h5netcdf", decode_times=False)]
+    parts += [_open_table(path, name) for name in groups]
+    result = xr.merge(parts, join="exact", compat="no_conflicts")
+    result.attrs = attributes | texts
+    result.set_close(lambda: _close(parts))
+    return result
+
+
+def table(result: xr.Dataset, name: str) -> xr.Dataset:
+    """Return the catalogue or the limits of an opened file as a Dataset; empty if there is none."""
+    prefix = f"{name}_"
+    return xr.Dataset(
+        {key.removeprefix(prefix): var for key, var in result.data_vars.items() if key.startswith(prefix)}
+    )
+
+
+def flag_names(variable: xr.DataArray) -> dict[int, str]:
+    """Return the meaning of each code of a coded variable."""
+    values = np.atleast_1d(variable.attrs.get("flag_values", []))
+    return dict(
+        zip((int(v) for v in values), _text(variable.attrs.get("flag_meanings", "")).split(), strict=True)
+    )
+
+
+def decode_flags(variable: xr.DataArray) -> xr.DataArray:
+    """Return a coded variable as text: `regime` 1 -> 'non_impact'. Unknown codes are shown as numbers."""
+    names = flag_names(variable)
+    codes, where = np.unique(variable.values, return_inverse=True)
+    texts = np.array([names.get(int(code), str(code)) for code in codes], dtype=object)
+    return variable.copy(data=texts[where].reshape(variable.shape))
+
+
+def decode_word(word: int) -> str:
+    """Return the events of one period as text, first event first: 'R.' is one impact a drive period."""
+    symbols, rest = [], int(word)
+    while rest > 0:
+        symbols.append(_WORD_SYMBOLS.get(rest & 7, "?"))
+        rest >>= 3
+    return "".join(symbols)
+
+
+def decode_words(variable: xr.DataArray) -> xr.DataArray:
+    """Return a variable of event words as text."""
+    words, where = np.unique(variable.values, return_inverse=True)
+    texts = np.array([decode_word(word) for word in words], dtype=object)
+    return variable.copy(data=texts[where].reshape(variable.shape))
+
+
+def _close(parts: list[xr.Dataset]) -> None:
+    for part in parts:
+        part.close()
+
+
+def _open_table(path: str | Path, name: str) -> xr.Dataset:
+    group = xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False)
+    for key, variable in list(group.variables.items()):
+        if variable.dtype.kind in "SO":
+            group[key] = (variable.dims, np.array([_text(v) for v in variable.values], dtype=object))
+    group = group.reset_coords()
+    return group.rename({key: f"{name}_{key}" for key in group.data_vars})
+
+
+def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
+    """Check that the file is one that this package reads; return what describes it."""
+    if not path.is_file():
+        raise SeparatrixError(f"{path}: no such file", NO_INPUT)
+    try:
+        with h5py.File(path, "r") as file:
+            attributes = {key: _plain(value) for key, value in file.attrs.items()}
+            _check_header(path, attributes)
+            return attributes, _read_provenance(file), [name for name in TABLES if name in file]
+    except OSError as error:
+        raise SeparatrixError(f"{path}: cannot be read as HDF5 ({_first_line(error)})", BAD_DATA) from error
+
+
+def _check_header(path: Path, attributes: dict) -> None:
+    if attributes.get("format") != FORMAT:
+        raise SeparatrixError(f"{path}: not a Separatrix file (no attribute format = '{FORMAT}')")
+    version = attributes.get("format_version")
+    if version != FORMAT_VERSION:
+        raise SeparatrixError(
+            f"{path}: has format_version {version}; separatrix {__version__} reads {FORMAT_VERSION} only"
+        )
+    if attributes.get("kind") not in KINDS:
+        raise SeparatrixError(
+            f"{path}: unknown kind '{attributes.get('kind')}'; known kinds: {', '.join(KINDS)}"
+        )
+    if attributes.get("complete") != 1:
+        raise SeparatrixError(f"{path}: is not complete; resume the run that writes it")
+
+
+def _read_provenance(file: h5py.File) -> dict:
+    group = file.get("provenance")
+    if group is None:
+        return {}
+    texts = {key: _text(group[key][()]) for key in ("case_text", "resolved_case") if key in group}
+    return texts | {f"provenance_{key}": _plain(value) for key, value in group.attrs.items()}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, bytes | str):
+        return _text(value)
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return _plain(value.reshape(-1)[0])
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _text(value: object) -> str:
+    # Fortran pads fixed-length strings with blanks
+    return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).rstrip(" \0")
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__

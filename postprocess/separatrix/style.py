@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One style for all figures: print widths, fonts, colours that colour-blind readers can tell apart."""
+
+from contextlib import AbstractContextManager
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+SINGLE_COLUMN = 85.0
+DOUBLE_COLUMN = 175.0
+PNG_DPI = 300
+
+# Okabe and Ito (2008), in the order in which attractors take them
+OKABE_ITO = ("#D55E00", "#0072B2", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#F0E442", "#000000")
+# Paul Tol, muted
+TOL_MUTED = (
+    "#CC6677", "#332288", "#DDCC77", "#117733", "#88CCEE",
+    "#882255", "#44AA99", "#999933", "#AA4499", "#661100",
+)  # fmt: skip
+NOTHING = "#DDDDDD"
+OTHER = "#777777"
+SCALAR_MAP = "cividis"
+
+REGIMES = {
+    "unresolved": NOTHING,
+    "non_impact": OKABE_ITO[0],
+    "impact": OKABE_ITO[1],
+    "sticking": OKABE_ITO[2],
+    "mixed": OKABE_ITO[3],
+    "chattering": OKABE_ITO[4],
+    "at_rest": OKABE_ITO[6],
+}
+RUN_UP = OKABE_ITO[0]
+RUN_DOWN = OKABE_ITO[1]
+BARRIER = OKABE_ITO[2]
+BRANCH = "#C4C4C4"
+MOTION = OKABE_ITO[1]
+IMPACT = OKABE_ITO[0]
+
+_RC = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "mathtext.fontset": "dejavusans",
+    "font.size": 7.0,
+    "axes.titlesize": 7.0,
+    "axes.labelsize": 7.5,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "legend.fontsize": 6.5,
+    "figure.titlesize": 8.0,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "lines.linewidth": 0.9,
+    "legend.frameon": False,
+    "legend.handlelength": 1.4,
+    "axes.axisbelow": False,
+    "image.interpolation": "nearest",
+    "savefig.dpi": PNG_DPI,
+    "figure.dpi": PNG_DPI,
+    # TrueType outlines: journals refuse Type 3
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
+    "svg.fonttype": "none",
+}
+
+
+def context() -> AbstractContextManager:
+    """Return the context in which figures are made and saved."""
+    return matplotlib.rc_context(_RC)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of a size in mm; no window system is needed."""
+    figure = Figure(figsize=(width / 25.4, height / 25.4))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def palette(number: int) -> tuple[str, ...]:
+    """Return the palette for a number of classes: Okabe-Ito up to 8, Tol muted up to 10."""
+    return OKABE_ITO if number <= len(OKABE_ITO) else TOL_MUTED

@@ -1,0 +1,487 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures: what they show is what the file says."""
+
+import re
+import tracemalloc
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from sample_files import write_basin, write_points, write_sweep, write_trajectory
+from separatrix import basin, cli, reduce, style, sweep, trajectory
+from separatrix.labels import share_texts
+from separatrix.open import open_result, table
+from separatrix.regions import Boundary, boundaries, regions
+
+X0 = np.linspace(-1.0, 0.8, 7)
+V0 = np.linspace(-6.0, 6.0, 4)
+
+
+def colour_at(figure: Figure, x: float, y: float, panel: int = 0) -> tuple:
+    """The colour of the rendered figure at a point of the data of one panel."""
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())
+    column, row = figure.axes[panel].transData.transform((x, y))
+    return tuple(pixels[pixels.shape[0] - 1 - int(row), int(column), :3] / 255)
+
+
+def legend_texts(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def draw(path: Path, field: str = "attractor") -> Figure:
+    with style.context(), open_result(path) as result:
+        return basin.basin_map(path, result, field, "title")
+
+
+def drawn(path: Path, make: object) -> Figure:
+    with style.context(), open_result(path) as result:
+        return make(result, "title")
+
+
+@pytest.mark.parametrize("order", [("x0", "v0"), ("v0", "x0")])
+@pytest.mark.parametrize("descending", [False, True])
+def test_each_point_has_its_colour_at_its_place(tmp_path: Path, order: tuple, descending: bool) -> None:
+    axes = {"x0": X0[::-1] if descending else X0, "v0": V0}
+    attractor = np.random.default_rng(3).integers(1, 4, (7, 4))
+    shown = attractor if order == ("x0", "v0") else attractor.T
+    path = write_basin(tmp_path / "b.h5", {name: axes[name] for name in order}, shown, regime_of=(0, 1, 2, 3))
+    figure = draw(path)
+    for i, x in enumerate(axes["x0"]):
+        for j, v in enumerate(axes["v0"]):
+            expected = to_rgb(style.OKABE_ITO[attractor[i, j] - 1])
+            assert colour_at(figure, x, v) == pytest.approx(expected, abs=0.01)
+
+
+def test_cells_reach_half_way_to_their_neighbours(tmp_path: Path) -> None:
+    np.testing.assert_allclose(basin.cell_edges(np.array([0.0, 1.0, 3.0])), [-0.5, 0.5, 2.0, 4.0])
+    np.testing.assert_allclose(basin.cell_edges(np.array([2.0])), [1.5, 2.5])
+    figure = draw(write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, np.ones((7, 4), int)))
+    figure.canvas.draw()
+    assert figure.axes[0].get_xlim() == pytest.approx((-1.15, 0.95))
+    assert figure.axes[0].get_ylim() == pytest.approx((-8.0, 8.0))
+
+
+def test_a_reduced_map_keeps_places_and_extent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(basin, "majority_plane", lambda *a: reduce.majority_plane(*a, target=10))
+    x, v = np.linspace(0, 1, 41), np.linspace(0, 2, 23)
+    attractor = np.where(x[:, None] + 0 * v > 0.6, 2, 1)
+    attractor[:, v > 1.5] = 3
+    figure = draw(write_basin(tmp_path / "b.h5", {"x0": x, "v0": v}, attractor, regime_of=(0, 1, 2, 3)))
+    assert figure.axes[0].get_xlim() == pytest.approx((-0.0125, 1.0125))
+    for place, identity in (((0.2, 0.5), 1), ((0.9, 0.5), 2), ((0.2, 1.9), 3), ((0.99, 1.95), 3)):
+        assert colour_at(figure, *place) == pytest.approx(to_rgb(style.OKABE_ITO[identity - 1]), abs=0.01)
+    assert "5 by 3 points" in figure.separatrix_caption
+
+
+def test_panels_show_their_own_slice(tmp_path: Path) -> None:
+    attractor = np.ones((7, 4, 3), int)
+    attractor[6, 0, 1] = 2
+    axes = {"x0": X0, "v0": V0, "drive_ratio": np.array([1.1, 1.2, 1.3])}
+    figure = draw(write_basin(tmp_path / "b.h5", axes, attractor))
+    titles = [ax.get_title() for ax in figure.axes]
+    assert [re.search(r"= (\S+)", title).group(1) for title in titles] == ["1.1", "1.2", "1.3"]
+    colours = [colour_at(figure, X0[6], V0[0], panel) for panel in range(3)]
+    assert colours[1] == pytest.approx(to_rgb(style.OKABE_ITO[1]), abs=0.01)
+    assert colours[0] == colours[2] == pytest.approx(to_rgb(style.OKABE_ITO[0]), abs=0.01)
+
+
+def test_too_many_slices_are_thinned_and_said(tmp_path: Path) -> None:
+    axes = {"x0": X0, "v0": V0, "drive_ratio": np.linspace(1, 2, 5), "crank_angle": np.linspace(0, 6, 5)}
+    figure = draw(write_basin(tmp_path / "b.h5", axes, np.ones((7, 4, 5, 5), int)))
+    assert len(figure.axes) == basin.MOST_PANELS
+    assert "12 of 25 slices shown" in figure.separatrix_caption
+
+
+@pytest.mark.parametrize("axes", [{"x0": X0}, {"drive_ratio": X0 + 2, "v0": V0}, {"x0": X0, "v0": V0[:1]}])
+def test_maps_over_other_axes_are_drawn(tmp_path: Path, axes: dict) -> None:
+    attractor = np.ones([len(points) for points in axes.values()], int)
+    attractor[0] = 2
+    figure = draw(write_basin(tmp_path / "b.h5", axes, attractor))
+    first = next(iter(axes))
+    middle = np.mean(figure.axes[0].get_ylim())
+    assert colour_at(figure, axes[first][0], middle) == pytest.approx(to_rgb(style.OKABE_ITO[1]), abs=0.01)
+    assert colour_at(figure, axes[first][1], middle) == pytest.approx(to_rgb(style.OKABE_ITO[0]), abs=0.01)
+
+
+def test_legend_names_what_occurs_with_its_share(tmp_path: Path) -> None:
+    attractor = np.ones((7, 4), int)
+    attractor[:, 0] = 2
+    attractor[0, 3] = 0
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, attractor)
+    assert legend_texts(draw(path)) == [
+        "no attractor (3.57 %)",
+        "attractor 1: non-impact, period 1 (71.43 %)",
+        "attractor 2: impact, period 1 (25.00 %)",
+    ]
+    regimes = legend_texts(draw(path, "regime"))
+    assert regimes == ["unresolved (3.57 %)", "non-impact (71.43 %)", "impact (25.00 %)"]
+    assert [text.split(" (")[0] for text in legend_texts(draw(path, "event_word"))] == [
+        "no events",
+        "word .",
+        "word R.",
+    ]
+
+
+def test_the_colour_of_an_attractor_does_not_depend_on_the_others_present(tmp_path: Path) -> None:
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, np.full((7, 4), 3), regime_of=(0, 1, 2, 3))
+    assert colour_at(draw(path), X0[2], V0[2]) == pytest.approx(to_rgb(style.OKABE_ITO[2]), abs=0.01)
+
+
+def test_the_rarest_of_many_attractors_are_one_class(tmp_path: Path) -> None:
+    x, v = np.linspace(0, 1, 13), np.linspace(0, 1, 14)
+    attractor = np.maximum(np.arange(13)[:, None], np.arange(14))
+    path = write_basin(tmp_path / "b.h5", {"x0": x, "v0": v}, attractor, regime_of=(0, *[1] * 13))
+    texts = legend_texts(draw(path))
+    assert len(texts) == 12
+    assert texts[-1].startswith("3 others")
+    assert "attractor 13" in texts[-2]
+
+
+@pytest.mark.parametrize(
+    "counts", [[1], [1, 1, 1], [0, 5], [1, 10**9], [7, 11, 13, 17, 19, 23], [333, 333, 334]]
+)
+def test_printed_shares_add_up_to_100(counts: list) -> None:
+    parts = [0.0 if text.startswith("<") else float(text.removesuffix(" %")) for text in share_texts(counts)]
+    assert sum(parts) == pytest.approx(100.0, abs=1e-9)
+    for part, count in zip(parts, counts, strict=True):
+        assert part == pytest.approx(100 * count / sum(counts), abs=0.01)
+
+
+def test_a_rare_class_is_not_printed_as_zero() -> None:
+    assert share_texts([1, 10**9])[0] == "< 0.01 %"
+
+
+def majority_by_hand(values: np.ndarray, f: int, g: int) -> np.ndarray:
+    rows, columns = range(0, values.shape[0], f), range(0, values.shape[1], g)
+    blocks = [[values[i : i + f, j : j + g].ravel() for j in columns] for i in rows]
+    # of equally frequent labels bincount().argmax() takes the smallest
+    return np.array([[np.bincount(block).argmax() for block in row] for row in blocks])
+
+
+@pytest.mark.parametrize("shape", [(97, 64), (64, 97), (30, 200)])
+@pytest.mark.parametrize("plane", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("chunks", [None, (16, 24)])
+def test_majority_equals_that_of_each_block(
+    tmp_path: Path, shape: tuple, plane: tuple, chunks: tuple | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reduce, "SLAB_BYTES", 700)
+    values = np.random.default_rng(5).integers(0, 5, shape).astype("i2")
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        dataset = file.create_dataset("label", data=values, chunks=chunks)
+        found = reduce.majority_plane(dataset, plane, (), target=20)
+    image = values if plane == (0, 1) else values.T
+    np.testing.assert_array_equal(found.image, majority_by_hand(image, *found.factors))
+    assert max(found.image.shape) <= 20
+    assert found.counts == {k: int((values == k).sum()) for k in range(5)}
+
+
+def test_a_slice_of_more_axes_is_the_right_one(tmp_path: Path) -> None:
+    values = np.random.default_rng(6).integers(0, 3, (4, 5, 6, 7)).astype("i1")
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        file["label"] = values
+        found = reduce.majority_plane(file["label"], (3, 1), (2, 4))
+    np.testing.assert_array_equal(found.image, values[2, :, 4, :].T)
+
+
+def test_scalars_reduce_to_mean_or_smallest_of_the_finite(tmp_path: Path) -> None:
+    values = np.random.default_rng(7).normal(size=(12, 9))
+    values[:4, :3] = np.nan
+    values[5, 5] = np.inf
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        file["t"] = values
+        mean = reduce.scalar_plane(file["t"], (0, 1), (), target=3).image
+        low = reduce.scalar_plane(file["t"], (0, 1), (), target=3, smallest=True).image
+    assert mean.shape == (3, 3)
+    assert np.isnan(mean[0, 0])
+    assert np.isnan(low[0, 0])
+    block = values[4:8, 3:6][np.isfinite(values[4:8, 3:6])]
+    assert mean[1, 1] == pytest.approx(block.mean())
+    assert low[1, 1] == block.min()
+
+
+def test_memory_is_bounded_by_the_slab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reduce, "SLAB_BYTES", 2**18)
+    values = np.random.default_rng(8).integers(0, 4, (4096, 2048), dtype="i1")
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        dataset = file.create_dataset("label", data=values, chunks=(128, 128))
+        tracemalloc.start()
+        found = reduce.majority_plane(dataset, (0, 1), (), target=256)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peak < values.nbytes / 2
+    np.testing.assert_array_equal(found.image[:5], majority_by_hand(values[:80], *found.factors))
+
+
+def test_runs_and_branches_are_all_drawn(tmp_path: Path) -> None:
+    ratios = np.linspace(0.7, 1.8, 45)
+    path = write_sweep(tmp_path / "s.h5", ratios)
+    figure = drawn(path, sweep.amplitude_diagram)
+    with open_result(path) as result:
+        expected = {tuple(result[key].values[k]) for key in ("x_max", "x_min") for k in (0, 1)}
+        barrier = result.attrs["barrier_upper"]
+    found = {tuple(line.get_ydata()) for line in figure.axes[0].lines if len(line.get_xdata()) == ratios.size}
+    assert expected <= found
+    assert any(
+        set(line.get_ydata()) == {barrier} and line.get_color() == style.BARRIER
+        for line in figure.axes[0].lines
+    )
+    assert "run-up" in legend_texts(figure)
+    assert sum(len(points.get_offsets()) for points in figure.axes[0].collections) == 2 * 6 * ratios.size
+
+
+def test_a_one_way_sweep_has_one_run(tmp_path: Path) -> None:
+    path = write_sweep(tmp_path / "s.h5", np.linspace(0.7, 1.8, 23))
+    with h5py.File(path, "r+") as file:
+        for name in ("x_max", "x_min", "mean_impact_speed", "strobe_x"):
+            file[name][1] = np.nan
+    for make in (sweep.amplitude_diagram, sweep.bifurcation_diagram):
+        texts = legend_texts(drawn(path, make))
+        assert "run-up" in texts
+        assert "run-down" not in texts
+
+
+def test_regions_lie_between_the_limits(tmp_path: Path) -> None:
+    path = write_sweep(tmp_path / "s.h5", np.arange(0.7, 1.8, 0.01))
+    with open_result(path) as result:
+        lines = boundaries(table(result, "limits"))
+        found = regions(result, "drive_ratio", lines)
+    # the limits near 0.87 of run-up and run-down overlap: one line
+    assert [round(line.middle, 3) for line in lines] == [0.870, 1.121, 1.351]
+    assert [region.text for region in found] == ["non-impact", "impact", "multiple solutions", "non-impact"]
+    assert [region.upper for region in found[:-1]] == [region.lower for region in found[1:]]
+    shown = {text.get_text() for text in drawn(path, sweep.amplitude_diagram).axes[0].texts}
+    assert {"multiple solutions", "impact", "non-impact", "0.870", "1.121", "1.351"} <= shown
+
+
+def test_a_sweep_without_limits_is_one_region(tmp_path: Path) -> None:
+    path = write_sweep(tmp_path / "s.h5", np.linspace(1.4, 1.8, 9))
+    with h5py.File(path, "r+") as file:
+        del file["limits"]
+    with open_result(path) as result:
+        assert [region.text for region in regions(result, "drive_ratio", [])] == ["non-impact"]
+    assert "limit of a region" not in legend_texts(drawn(path, sweep.amplitude_diagram))
+
+
+def test_brackets_that_touch_are_one_line_and_open_ones_none() -> None:
+    limits = xr.Dataset(
+        {"lower": ("limit", [2.0, 1.0, np.nan, 5.0]), "upper": ("limit", [3.0, 2.0, 4.0, 4.5])}
+    )
+    assert boundaries(limits) == [Boundary(1.0, 3.0), Boundary(4.5, 5.0)]
+
+
+def test_the_phase_portrait_jumps_at_each_impact_of_the_window(tmp_path: Path) -> None:
+    path = write_trajectory(tmp_path / "t.h5", samples=1999)
+    with open_result(path) as result:
+        x, v, jumps = trajectory.steady_path(result, 16.5)
+    assert len(jumps) == 3
+    breaks = np.flatnonzero(np.isnan(x))
+    assert len(breaks) == 3
+    for place, (position, before, after) in zip(breaks, jumps, strict=True):
+        assert (x[place - 1], v[place - 1]) == (position, before)
+        assert (x[place + 1], v[place + 1]) == (position, after)
+    # no piece of the path crosses from one side of an impact to the other
+    assert np.nanmax(np.abs(np.diff(v))) < 0.1
+
+
+def test_a_sample_at_the_instant_of_an_impact_draws_no_false_line(tmp_path: Path) -> None:
+    with open_result(write_trajectory(tmp_path / "t.h5", samples=2001)) as result:
+        _, v, _ = trajectory.steady_path(result, 16.5)
+    assert np.nanmax(np.abs(np.diff(v))) < 0.1
+
+
+def test_impacts_are_marked_and_named_only_where_there_are_any(tmp_path: Path) -> None:
+    for impacting in (True, False):
+        path = write_trajectory(tmp_path / f"{impacting}.h5", impacting=impacting)
+        for make in (trajectory.time_history, trajectory.phase_portrait):
+            assert ("impact" in legend_texts(drawn(path, make))) == impacting
+
+
+def test_a_thinned_history_keeps_the_extremes(tmp_path: Path) -> None:
+    path = write_trajectory(tmp_path / "t.h5", samples=200001)
+    line = drawn(path, trajectory.time_history).axes[0].lines[0]
+    with open_result(path) as result:
+        assert line.get_ydata().max() == result.x.values.max()
+        assert line.get_ydata().min() == result.x.values.min()
+    assert line.get_xdata().size < 5000
+    assert (np.diff(line.get_xdata()) > 0).all()
+
+
+WRITERS = {
+    "basin": lambda path: write_basin(path, {"x0": X0, "v0": V0}, np.ones((7, 4), int)),
+    "sweep": lambda path: write_sweep(path, np.linspace(0.7, 1.8, 23)),
+    "trajectory": write_trajectory,
+    "points": write_points,
+}
+FIGURES = {
+    "basin": ["regime", "attractor"],
+    "sweep": ["amplitude", "bifurcation"],
+    "trajectory": ["history", "phase"],
+    "points": ["regime"],
+}
+
+
+@pytest.mark.parametrize("kind", list(WRITERS))
+def test_every_kind_gives_png_and_pdf(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture) -> None:
+    path = WRITERS[kind](tmp_path / f"{kind}.h5")
+    folder = tmp_path / "new" / "figures"
+    assert cli.main([str(path), "-o", str(folder)]) == 0
+    expected = [folder / f"{kind}_{name}.{suffix}" for name in FIGURES[kind] for suffix in ("png", "pdf")]
+    assert capsys.readouterr().out.split() == [str(name) for name in expected]
+    assert sorted(folder.iterdir()) == sorted(expected)
+    for name in expected:
+        content = name.read_bytes()
+        assert content.startswith(b"\x89PNG" if name.suffix == ".png" else b"%PDF")
+        # journals refuse Type 3 fonts
+        assert b"/Type3" not in content
+
+
+@pytest.mark.parametrize("kind", list(WRITERS))
+def test_figures_say_what_they_show(tmp_path: Path, kind: str) -> None:
+    path = WRITERS[kind](tmp_path / f"{kind}.h5")
+    with style.context(), open_result(path) as result:
+        made = cli._figures(path, result, None, "The title")
+    for figure in made.values():
+        assert figure.texts[0].get_text() == "The title"
+        assert "Coulomb friction" in figure.separatrix_caption
+        assert "Separatrix 0.1.0" in figure.separatrix_caption
+        for ax in figure.axes:
+            assert ax.get_ylabel()
+            assert re.search(r"\((m|s|m/s)\)|Omega", ax.get_xlabel() or "(m)")
+
+
+def test_nothing_of_a_figure_lies_over_another(tmp_path: Path) -> None:
+    path = WRITERS["basin"](tmp_path / "b.h5")
+    with style.context(), open_result(path) as result:
+        figure = basin.basin_map(path, result, "attractor", "A long title " * 12)
+        figure.canvas.draw()
+        head, foot = (text.get_window_extent() for text in figure.texts)
+        legend = figure.legends[0].get_window_extent()
+        axes = figure.axes[0].get_tightbbox()
+    assert head.y0 >= axes.y1
+    assert axes.y0 >= legend.y1
+    assert legend.y0 >= foot.y1
+    assert foot.y0 >= 0
+    assert head.y1 <= figure.bbox.y1
+    assert max(head.x1, foot.x1, axes.x1) <= figure.bbox.x1
+
+
+def test_the_same_file_gives_the_same_bytes(tmp_path: Path) -> None:
+    path = WRITERS["basin"](tmp_path / "b.h5")
+    for folder in ("one", "two"):
+        assert cli.main([str(path), "-o", str(tmp_path / folder)]) == 0
+    for first in (tmp_path / "one").iterdir():
+        assert first.read_bytes() == (tmp_path / "two" / first.name).read_bytes()
+
+
+def test_a_field_a_title_and_formats_are_taken(tmp_path: Path) -> None:
+    path = WRITERS["basin"](tmp_path / "b.h5")
+    arguments = [
+        str(path),
+        "--field",
+        "settle_time",
+        "--formats",
+        "svg",
+        "--title",
+        r"50 $ \alpha",
+        "--dpi",
+        "60",
+    ]
+    assert cli.main(arguments) == 0
+    assert (tmp_path / "b_settle_time.svg").stat().st_size > 0
+    assert not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_field_without_finite_values_is_drawn(tmp_path: Path, value: float) -> None:
+    fields = {"grazing_margin": np.full((7, 4), value)}
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, np.ones((7, 4), int), fields=fields)
+    assert cli.main([str(path), "--field", "grazing_margin", "--formats", "png"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["absent.h5"], 66, "no such file"),
+        (["text.h5"], 65, "cannot be read as HDF5"),
+        (["b.h5", "--field", "colour"], 64, "no field 'colour'; known fields: amplitude, attractor"),
+        (["p.h5", "--field", "regime"], 64, "--field is for basin files"),
+        (["b.h5", "--formats", "gif"], 64, "not a list out of png, pdf, svg"),
+        (["b.h5", "--dpi", "0"], 64, "from 50 to 2400"),
+        (["b.h5", "-o", "text.h5"], 73, "cannot be written"),
+        ([], 64, "required"),
+    ],
+)
+def test_errors_are_one_line_and_a_code(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+    arguments: list,
+    code: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("text.h5").write_text("text")
+    WRITERS["basin"](Path("b.h5"))
+    WRITERS["points"](Path("p.h5"))
+    assert cli.main(arguments) == code
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
+    assert message in output.err
+
+
+def test_a_file_without_what_a_figure_needs_is_named(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    sweep_file, motion_file = WRITERS["sweep"](tmp_path / "s.h5"), WRITERS["trajectory"](tmp_path / "t.h5")
+    with h5py.File(sweep_file, "r+") as file:
+        del file["strobe_x"]
+    with h5py.File(motion_file, "r+") as file:
+        del file.attrs["window"]
+    assert cli.main([str(sweep_file), str(motion_file)]) == 65
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+def test_a_damaged_chunk_is_an_error_not_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, np.ones((7, 4), int), chunks=(7, 4))
+    with h5py.File(path, "r") as file:
+        chunk = file["regime"].id.get_chunk_info(0)
+    with path.open("r+b") as raw:
+        raw.seek(chunk.byte_offset)
+        raw.write(b"\xff" * chunk.size)
+    assert cli.main([str(path)]) == 65
+    assert "is damaged" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_bad_file_does_not_keep_the_others_from_their_figures(tmp_path: Path) -> None:
+    path = WRITERS["points"](tmp_path / "p.h5")
+    assert cli.main([str(tmp_path / "absent.h5"), str(path)]) == 66
+    assert (tmp_path / "p_regime.pdf").is_file()
+
+
+def test_a_failed_write_leaves_the_old_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = WRITERS["points"](tmp_path / "p.h5")
+    old = tmp_path / "p_regime.png"
+    old.write_text("old")
+
+    def fail(self: Figure, target: Path, **options: object) -> None:
+        Path(target).write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    assert cli.main([str(path)]) == 73
+    assert old.read_text() == "old"
+    assert sorted(tmp_path.iterdir()) == [path, old]
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_and_version(option: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as caught:
+        cli.main([option])
+    assert caught.value.code == 0
+    assert "separatrix-figures" in capsys.readouterr().out
