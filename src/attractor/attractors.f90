@@ -12,8 +12,9 @@ module attractors
 
   !> Regimes of a motion.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
-    regime_sticking = 3, regime_mixed = 4, regime_chattering = 5, regime_at_rest = 6
-  character(len=*), parameter, public :: regime_names(0:6) = [character(len=10) :: 'unresolved', &
+    regime_sticking = 3, regime_mixed = 4, regime_chattering = 5, regime_at_rest = 6, &
+    last_regime = 6
+  character(len=*), parameter, public :: regime_names(0:last_regime) = [character(len=10) :: 'unresolved', &
     'non_impact', 'impact', 'sticking', 'mixed', 'chattering', 'at_rest']
 
   !> Longest period in drive periods that is looked for.

@@ -4,13 +4,13 @@
 !> The command line: what was asked, and the texts of `--help`.
 module command_line
   use errors, only: error_t, fail
-  use kinds, only: int64, wp
+  use kinds, only: wp
   use status, only: exit_usage
   use text, only: join, starts_with
   implicit none
   private
 
-  public :: read_command_line, help_text, whole_command_line
+  public :: read_command_line, help_text
 
   integer, parameter :: longest_argument = 4096
 
@@ -194,16 +194,6 @@ contains
     allocate (character(len=length) :: argument)
     call get_command_argument(position, argument)
   end function argument_at
-
-  !> The command line as it was given, for the record.
-  function whole_command_line() result(line)
-    character(len=:), allocatable :: line
-    integer :: i
-    line = argument_at(0)
-    do i = 1, command_argument_count()
-      line = line//' '//argument_at(i)
-    end do
-  end function whole_command_line
 
   !> The text of `--help`, of one command or, with '', of the program.
   pure function help_text(command) result(lines)

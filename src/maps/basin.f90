@@ -11,6 +11,7 @@ module basin
   use match, only: carry_labels
   use motion, only: motion_t
   use trajectory, only: outcome_t, run_trajectory, span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
@@ -101,7 +102,8 @@ contains
   end subroutine basin_point
 
   !> An outcome in the order of the file: regime, attractor, reason, period, event word, impacts per period, mean
-  !> impact speed, amplitude, x_max, x_min, v_max, settle time (negative: not captured), grazing margin.
+  !> impact speed, amplitude, x_max, x_min, v_max, settle time (not a number: not captured), grazing margin (infinite:
+  !> no barrier was missed).
   pure function outcome_values(outcome) result(values)
     type(outcome_t), intent(in) :: outcome
     real(wp) :: values(basin_variables)
@@ -109,6 +111,8 @@ contains
       values = [real(f%regime, wp), real(outcome%attractor, wp), real(outcome%reason, wp), &
                 real(outcome%period, wp), real(f%word, wp), f%impacts_per_period, f%mean_impact_speed, &
                 f%amplitude, f%x_max, f%x_min, f%v_max, outcome%settle_time, f%grazing_margin]
+      if (outcome%settle_time < 0) values(12) = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (.not. f%grazing_margin < huge(1.0_wp)) values(13) = ieee_value(1.0_wp, ieee_positive_inf)
     end associate
   end function outcome_values
 

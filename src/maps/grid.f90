@@ -14,7 +14,7 @@ module grid
   implicit none
   private
 
-  public :: make_grid, point_start, point_slice, slice_motion, slice_starts, machine_with
+  public :: make_grid, point_start, point_slice, slice_motion, slice_laws, slice_starts, machine_with
 
   type, public :: grid_t
     type(axis_t), allocatable :: axes(:)
@@ -92,6 +92,13 @@ contains
     integer(int64), intent(in) :: slice
     type(motion_t), intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
+    call machine_of(slice_laws(grid, slice), grid%options, moving, error)
+  end subroutine slice_motion
+
+  !> The laws of a slice's machine.
+  pure function slice_laws(grid, slice) result(laws)
+    type(grid_t), intent(in) :: grid
+    integer(int64), intent(in) :: slice
     type(law_choice_t), allocatable :: laws(:)
     integer(int64) :: rest
     integer :: i, position, along
@@ -103,8 +110,7 @@ contains
       rest = rest/grid%shape(along)
       call set_by_path(laws, grid%axes(along)%name, grid%axes(along)%values(position + 1))
     end do
-    call machine_of(laws, grid%options, moving, error)
-  end subroutine slice_motion
+  end function slice_laws
 
   !> The machine with one parameter 'family.parameter' changed.
   pure subroutine machine_with(grid, path, value, moving, error)

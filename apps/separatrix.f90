@@ -1,0 +1,52 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One executable with subcommands: reads the arguments, calls the command, returns the exit code.
+program separatrix
+  use basin_driver, only: run_basin
+  use command_line, only: command_t, help_text, read_command_line
+  use errors, only: error_t
+  use info_driver, only: run_info
+  use laws_driver, only: run_laws
+  use points_driver, only: run_points
+  use sweep_driver, only: run_sweep
+  use system, only: exit_program
+  use trajectory_driver, only: run_trajectory_command
+  use verify_driver, only: run_verify
+  use version_text, only: print_version
+  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  implicit none
+
+  type(command_t) :: command
+  type(error_t), allocatable :: error
+
+  call read_command_line(command, error)
+  if (.not. allocated(error)) then
+    if (command%help) then
+      write (output_unit, '(a)', advance='no') help_text(command%name)
+    else if (command%version) then
+      call print_version()
+    else
+      select case (command%name)
+      case ('basin')
+        call run_basin(command)
+      case ('sweep')
+        call run_sweep(command)
+      case ('trajectory')
+        call run_trajectory_command(command)
+      case ('points')
+        call run_points(command)
+      case ('laws')
+        call run_laws(command%json)
+      case ('info')
+        call run_info(command%path, command%json, error)
+      case ('verify')
+        call run_verify(command, error)
+      end select
+    end if
+  end if
+  if (allocated(error)) then
+    write (error_unit, '(a)') 'separatrix: '//error%message
+    call exit_program(error%code)
+  end if
+end program separatrix

@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# Everything that comes from outside. Layers link the targets separatrix_mpi and separatrix_hdf5, so
+# that no other file asks which build this is.
+
+add_library(separatrix_mpi INTERFACE)
+if(SEPARATRIX_MPI)
+  set(MPI_DETERMINE_LIBRARY_VERSION ON)
+  find_package(MPI REQUIRED COMPONENTS C Fortran)
+  if(NOT MPI_Fortran_HAVE_F08_MODULE)
+    message(FATAL_ERROR "This MPI has no mpi_f08 module for ${CMAKE_Fortran_COMPILER}.")
+  endif()
+  target_link_libraries(separatrix_mpi INTERFACE MPI::MPI_Fortran MPI::MPI_C)
+  target_compile_definitions(separatrix_mpi INTERFACE SEPARATRIX_MPI)
+endif()
+
+# With both kinds of HDF5 installed, the module takes the one that is asked for or, silently, the other.
+set(HDF5_PREFER_PARALLEL ${SEPARATRIX_MPI})
+find_package(HDF5 1.10 REQUIRED COMPONENTS C Fortran HL)
+if(SEPARATRIX_MPI AND NOT HDF5_IS_PARALLEL)
+  message(FATAL_ERROR "SEPARATRIX_MPI=ON needs a parallel HDF5, found a serial one: "
+                      "install libhdf5-openmpi-dev or set HDF5_ROOT.")
+elseif(HDF5_IS_PARALLEL AND NOT SEPARATRIX_MPI)
+  message(FATAL_ERROR "SEPARATRIX_MPI=OFF needs a serial HDF5, found a parallel one: "
+                      "install libhdf5-dev or set HDF5_ROOT.")
+endif()
+# The dimension scales are in the high-level library, which HDF5::HDF5 leaves out.
+add_library(separatrix_hdf5 INTERFACE)
+target_include_directories(separatrix_hdf5 SYSTEM INTERFACE ${HDF5_Fortran_INCLUDE_DIRS} ${HDF5_C_INCLUDE_DIRS})
+target_link_libraries(separatrix_hdf5 INTERFACE
+  ${HDF5_Fortran_HL_LIBRARIES} ${HDF5_Fortran_LIBRARIES} ${HDF5_C_HL_LIBRARIES} ${HDF5_C_LIBRARIES})
+
+find_package(ZLIB REQUIRED)
+find_package(GSL REQUIRED)
+
+# Debian's package has the headers only.
+find_package(toml11 QUIET)
+if(NOT TARGET toml11::toml11)
+  find_path(TOML11_INCLUDE_DIR toml.hpp REQUIRED)
+  add_library(toml11::toml11 INTERFACE IMPORTED)
+  target_include_directories(toml11::toml11 INTERFACE "${TOML11_INCLUDE_DIR}")
+endif()

@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+option(SEPARATRIX_MPI "Build with MPI and parallel HDF5 (OFF: one process, serial HDF5)" ON)
+option(SEPARATRIX_TESTS "Build the tests" ON)
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
+set(CMAKE_LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/lib")
+set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/lib")
+set(CMAKE_Fortran_FLAGS_RELEASE "-O3 -g" CACHE STRING "Fortran release flags" FORCE)
+set(CMAKE_CXX_STANDARD 17)
+set(CMAKE_C_STANDARD 11)
+
+include(refuse_fast_math)
+
+add_library(separatrix_strict INTERFACE)
+target_compile_options(separatrix_strict INTERFACE
+  -ffp-contract=off
+  "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2018;-fimplicit-none;-Wall;-Wextra;-Wno-compare-reals;-Wno-maybe-uninitialized;-Wno-uninitialized;-Werror=implicit-interface;-ffree-line-length-132>"
+  "$<$<COMPILE_LANGUAGE:C>:-Wall;-Wextra>"
+  "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all;-fbacktrace>")

@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# Builds Separatrix with and without MPI and runs all tests. The last line counts them; the exit
+# code is 0 only if none failed.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+scripts/bootstrap.sh
+# shellcheck source=scripts/environment.sh
+source scripts/environment.sh
+jobs=$(nproc)
+status=0
+
+# Layers whose serial build differs from the MPI build, and what they stand on.
+serial_layers='^(core|csupport|parallel|io|drivers)$'
+
+echo "test: building with MPI in build/"
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=ON
+cmake --build build -j "$jobs"
+
+echo "test: running the tests of the MPI build"
+ctest --test-dir build -E '^python$' -j "$jobs" --output-on-failure --no-tests=error \
+  --output-junit ctest.xml || status=1
+
+echo "test: building without MPI in build-serial/"
+cmake -S . -B build-serial -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=OFF
+cmake --build build-serial -j "$jobs"
+ctest --test-dir build-serial -L "$serial_layers" -j "$jobs" --output-on-failure --no-tests=error \
+  --output-junit ctest.xml || status=1
+
+echo "test: running the Python tests"
+SEPARATRIX_BUILD=$PWD/build .venv/bin/python -m pytest -q -ra tests/python \
+  --junit-xml=build/pytest.xml || status=1
+
+.venv/bin/python scripts/count_tests.py build/ctest.xml build-serial/ctest.xml build/pytest.xml || status=1
+exit "$status"

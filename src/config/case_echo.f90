@@ -1,0 +1,181 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A case as text: TOML in SI units with every default filled in. Reading it back gives the same
+!> case to the bit.
+module case_echo
+  use axis, only: axis_t, linear_values
+  use case_type, only: case_t, sweep_t
+  use kinds, only: wp
+  use law_table, only: law_choice_t, parameter_row_t, parameters_of
+  use text, only: to_text
+  use toml_bindings, only: hash_text
+  implicit none
+  private
+
+  public :: echo_case, case_identity
+
+  character(len=1), parameter :: newline = new_line('a')
+
+contains
+
+  !> The resolved case.
+  pure function echo_case(the_case) result(text)
+    type(case_t), intent(in) :: the_case
+    character(len=:), allocatable :: text
+    text = '# The resolved case: SI units, defaults filled in.'//newline
+    if (len(the_case%title) > 0) text = text//'title = '//quoted(the_case%title)//newline
+    text = text//deciding_text(the_case)
+    if (size(the_case%axes) > 0) then
+      text = text//newline//'[grid]'//newline//'tile = '//integers(the_case%tile)//newline
+    end if
+  end function echo_case
+
+  !> Checksum of what decides the results: everything but the title and the shape of the tiles.
+  pure function case_identity(the_case) result(identity)
+    type(case_t), intent(in) :: the_case
+    character(len=16) :: identity
+    identity = hash_text(deciding_text(the_case))
+  end function case_identity
+
+  pure function deciding_text(the_case) result(text)
+    type(case_t), intent(in) :: the_case
+    character(len=:), allocatable :: text
+    integer :: i
+    text = ''
+    do i = 1, size(the_case%laws)
+      text = text//law_text(the_case%laws(i))
+    end do
+    text = text//settings_text(the_case)
+    do i = 1, size(the_case%axes)
+      text = text//newline//'[[axis]]'//newline//line('name', quoted(trim(the_case%axes(i)%name)))// &
+             values_text(the_case%axes(i)%values)
+    end do
+    if (the_case%sweep%present) text = text//sweep_text(the_case%sweep)
+  end function deciding_text
+
+  !> One table of a law; a barrier that is not there (at the largest number) is left out.
+  pure function law_text(law) result(text)
+    type(law_choice_t), intent(in) :: law
+    character(len=:), allocatable :: text
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    text = newline//'['//trim(law%family)//']'//newline//line('law', quoted(trim(law%name)))
+    rows = parameters_of(law%family, law%name)
+    do i = 1, size(rows)
+      associate (values => law%parameters(i)%values)
+        if (rows(i)%list) then
+          text = text//line(trim(rows(i)%name), reals(values))
+        else if (abs(values(1)) < huge(1.0_wp)) then
+          text = text//line(trim(rows(i)%name), to_text(values(1)))
+        end if
+      end associate
+    end do
+  end function law_text
+
+  pure function settings_text(the_case) result(text)
+    type(case_t), intent(in) :: the_case
+    character(len=:), allocatable :: text
+    associate (start => the_case%start, run => the_case%run, integrator => the_case%integrator, &
+               attractors => the_case%attractors)
+      text = newline//'[start]'//newline// &
+             line('x0', to_text(start%x0))// &
+             line('v0', to_text(start%v0))// &
+             line('crank_angle', to_text(start%crank_angle))// &
+             newline//'[run]'//newline// &
+             line('duration', to_text(run%duration))// &
+             line('window', to_text(run%window))// &
+             line('stop', quoted(trim(run%stop)))// &
+             line('extension', to_text(run%extension))// &
+             line('domain', to_text(run%domain))// &
+             newline//'[integrator]'//newline// &
+             line('flight', quoted(trim(integrator%flight)))// &
+             line('tolerance', to_text(integrator%tolerance))// &
+             line('event_budget', to_text(integrator%event_budget))// &
+             newline//'[attractors]'//newline// &
+             line('sample', to_text(attractors%sample))// &
+             line('seed', to_text(attractors%seed))// &
+             line('max_period', to_text(attractors%max_period))// &
+             newline//'[trajectory]'//newline// &
+             line('samples_per_period', to_text(the_case%trajectory%samples_per_period))
+    end associate
+  end function settings_text
+
+  pure function sweep_text(sweep) result(text)
+    type(sweep_t), intent(in) :: sweep
+    character(len=:), allocatable :: text
+    text = newline//'[sweep]'//newline// &
+           line('parameter', quoted(trim(sweep%swept%name)))// &
+           values_text(sweep%swept%values)// &
+           line('directions', quoted(trim(sweep%directions)))// &
+           line('starts', integers(sweep%starts))// &
+           line('x0', reals(sweep%x0))// &
+           line('v0', reals(sweep%v0))// &
+           line('samples', to_text(sweep%samples))// &
+           line('limit_tolerance', to_text(sweep%limit_tolerance))
+  end function sweep_text
+
+  !> from, to and count where they give the same bits, otherwise the list.
+  pure function values_text(values) result(text)
+    real(wp), intent(in) :: values(:)
+    character(len=:), allocatable :: text
+    if (all(linear_values(values(1), values(size(values)), size(values)) == values)) then
+      text = line('from', to_text(values(1)))//line('to', to_text(values(size(values))))// &
+             line('count', to_text(size(values)))
+    else
+      text = line('values', reals(values))
+    end if
+  end function values_text
+
+  pure function line(key, value) result(text)
+    character(len=*), intent(in) :: key, value
+    character(len=:), allocatable :: text
+    text = key//' = '//value//newline
+  end function line
+
+  pure function reals(values) result(text)
+    real(wp), intent(in) :: values(:)
+    character(len=:), allocatable :: text
+    integer :: i
+    text = '['
+    do i = 1, size(values)
+      if (i > 1) text = text//', '
+      text = text//to_text(values(i))
+    end do
+    text = text//']'
+  end function reals
+
+  pure function integers(values) result(text)
+    integer, intent(in) :: values(:)
+    character(len=:), allocatable :: text
+    integer :: i
+    text = '['
+    do i = 1, size(values)
+      if (i > 1) text = text//', '
+      text = text//to_text(values(i))
+    end do
+    text = text//']'
+  end function integers
+
+  !> A TOML text: quotes, backslashes and control characters escaped.
+  pure function quoted(string) result(text)
+    character(len=*), intent(in) :: string
+    character(len=:), allocatable :: text
+    character(len=4) :: hexadecimal
+    integer :: i, code
+    text = '"'
+    do i = 1, len(string)
+      code = iachar(string(i:i))
+      if (string(i:i) == '"' .or. string(i:i) == '\') then
+        text = text//'\'//string(i:i)
+      else if ((code >= 0 .and. code < 32) .or. code == 127) then
+        write (hexadecimal, '(z4.4)') code
+        text = text//'\u'//hexadecimal
+      else
+        text = text//string(i:i)
+      end if
+    end do
+    text = text//'"'
+  end function quoted
+
+end module case_echo

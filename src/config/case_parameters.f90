@@ -1,0 +1,158 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Parameters by name: 'x0', 'v0', 'crank_angle' of the start, and 'family.parameter' of a law.
+module case_parameters
+  use case_type, only: case_t
+  use case_values, only: allowed_range, any_number, bounds_t
+  use errors, only: error_t, fail
+  use kinds, only: wp
+  use law_table, only: law_choice_t, parameter_row_t, parameters_of
+  use status, only: exit_bad_case
+  implicit none
+  private
+
+  public :: canonical_name, is_start, find_parameter, parameter_bounds, parameter_unit, &
+    parameter_names, parameter_value, set_parameter, row_bounds
+
+contains
+
+  !> The full name of a parameter: 'ratio' is short for 'drive.ratio'.
+  pure function canonical_name(name) result(path)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: path
+    path = trim(name)
+    if (path == 'ratio') path = 'drive.ratio'
+  end function canonical_name
+
+  !> Whether a name belongs to the start and not to a law.
+  pure logical function is_start(path)
+    character(len=*), intent(in) :: path
+    is_start = path == 'x0' .or. path == 'v0' .or. path == 'crank_angle'
+  end function is_start
+
+  !> Positions of the scalar parameter `path` of the chosen laws: law in `laws`, row in its
+  !> parameters. Both 0 if the laws have no such parameter or it is a list.
+  pure subroutine find_parameter(laws, path, law, row)
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: law, row
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i, j
+    law = 0
+    row = 0
+    do i = 1, size(laws)
+      rows = parameters_of(laws(i)%family, laws(i)%name)
+      do j = 1, size(rows)
+        if (rows(j)%list .or. trim(rows(j)%family)//'.'//trim(rows(j)%name) /= canonical_name(path)) cycle
+        law = i
+        row = j
+      end do
+    end do
+  end subroutine find_parameter
+
+  !> Bounds and unit of a row of the law table.
+  pure type(bounds_t) function row_bounds(row)
+    type(parameter_row_t), intent(in) :: row
+    row_bounds = bounds_t(lower=row%lower, upper=row%upper, lower_open=row%lower_open, unit=row%unit)
+  end function row_bounds
+
+  !> Bounds and unit of the parameter `path`; `found` is false if there is none.
+  pure subroutine parameter_bounds(laws, path, bounds, found)
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: path
+    type(bounds_t), intent(out) :: bounds
+    logical, intent(out) :: found
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: law, row
+    found = .true.
+    select case (path)
+    case ('x0')
+      bounds = any_number('m')
+    case ('v0')
+      bounds = any_number('m/s')
+    case ('crank_angle')
+      bounds = any_number('rad')
+    case default
+      call find_parameter(laws, path, law, row)
+      found = law > 0
+      if (.not. found) return
+      rows = parameters_of(laws(law)%family, laws(law)%name)
+      bounds = row_bounds(rows(row))
+    end select
+  end subroutine parameter_bounds
+
+  !> SI unit of the parameter `path`, '1' for none; '' if the case has no such parameter.
+  pure function parameter_unit(the_case, path) result(unit)
+    type(case_t), intent(in) :: the_case
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: unit
+    type(bounds_t) :: bounds
+    logical :: found
+    call parameter_bounds(the_case%laws, path, bounds, found)
+    unit = ''
+    if (found) unit = trim(bounds%unit)
+  end function parameter_unit
+
+  !> Names of the scalar parameters of the chosen laws, for messages.
+  pure function parameter_names(laws) result(names)
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=:), allocatable :: names
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i, j
+    names = ''
+    do i = 1, size(laws)
+      rows = parameters_of(laws(i)%family, laws(i)%name)
+      do j = 1, size(rows)
+        if (rows(j)%list) cycle
+        if (len(names) > 0) names = names//', '
+        names = names//trim(rows(j)%family)//'.'//trim(rows(j)%name)
+      end do
+    end do
+  end function parameter_names
+
+  !> Value of the parameter `path` of a law; `absent` if the chosen laws have none.
+  pure real(wp) function parameter_value(laws, path, absent)
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: absent
+    integer :: law, row
+    parameter_value = absent
+    call find_parameter(laws, path, law, row)
+    if (law > 0) parameter_value = laws(law)%parameters(row)%values(1)
+  end function parameter_value
+
+  !> Replaces the scalar parameter `path` ('family.parameter' or 'ratio') in the laws. An unknown
+  !> name or a value out of bounds gives code 65 and changes nothing. Where break-away friction
+  !> equals sliding friction, setting the kinetic coefficient moves the static one with it.
+  pure subroutine set_parameter(case_laws, path, value, error)
+    type(law_choice_t), intent(inout) :: case_laws(:)
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value
+    type(error_t), allocatable, intent(out) :: error
+    type(bounds_t) :: bounds
+    character(len=:), allocatable :: problem
+    integer :: law, row, static_law, static_row
+    logical :: found
+    call find_parameter(case_laws, path, law, row)
+    if (law == 0) then
+      call fail(error, exit_bad_case, 'parameter '''//trim(path)//''': unknown; allowed '//parameter_names(case_laws))
+      return
+    end if
+    call parameter_bounds(case_laws, path, bounds, found)
+    problem = allowed_range(value, bounds)
+    if (len(problem) > 0) then
+      call fail(error, exit_bad_case, 'parameter '''//trim(path)//''': '//problem)
+      return
+    end if
+    if (path == 'friction.kinetic_coefficient') then
+      call find_parameter(case_laws, 'friction.static_coefficient', static_law, static_row)
+      associate (kinetic => case_laws(law)%parameters(row)%values(1), &
+                 static => case_laws(static_law)%parameters(static_row)%values(1))
+        if (static == kinetic) static = value
+      end associate
+    end if
+    case_laws(law)%parameters(row)%values(1) = value
+  end subroutine set_parameter
+
+end module case_parameters

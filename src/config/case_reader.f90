@@ -1,0 +1,122 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> From a case file (docs/case-file.md) to a case. Every problem of a file is reported at once, a
+!> line each: `FILE:LINE: key 'friction.damping': found ..., allowed ...`.
+module case_reader
+  use axis_reader, only: read_axes, read_sweep
+  use case_check, only: check_case
+  use case_echo, only: echo_case
+  use case_source, only: case_source_t, enter_table, has_problems, open_source, problems_of, report_unknown
+  use case_type, only: case_t
+  use case_values, only: any_number, at_least, between, more_than, take_choice, take_integer, take_real, take_text
+  use errors, only: error_t
+  use kinds, only: wp
+  use law_reader, only: read_laws
+  use toml_bindings, only: read_text_file
+  implicit none
+  private
+
+  public :: load_case, load_case_text
+
+contains
+
+  !> Reads the file `path`, puts the overrides ('key.path=value' in TOML syntax, blank-padded) on top
+  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it.
+  subroutine load_case(path, overrides, the_case, error)
+    character(len=*), intent(in) :: path, overrides(:)
+    type(case_t), intent(out) :: the_case
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text
+    call read_text_file(path, text, error)
+    if (allocated(error)) return
+    call load_case_text(text, path, overrides, the_case, error)
+  end subroutine load_case
+
+  !> The same for a text that is already in memory; `name` stands for the file in messages.
+  subroutine load_case_text(text, name, overrides, the_case, error)
+    character(len=*), intent(in) :: text, name, overrides(:)
+    type(case_t), intent(out) :: the_case
+    type(error_t), allocatable, intent(out) :: error
+    type(case_source_t) :: source
+    the_case%path = name
+    the_case%raw_text = text
+    the_case%title = ''
+    call open_source(source, text, name, overrides, error)
+    if (allocated(error)) return
+    call take_text(source, 'title', the_case%title)
+    call read_laws(source, the_case%laws)
+    call read_start(source, the_case)
+    call read_run(source, the_case)
+    call read_integrator(source, the_case)
+    call read_attractors(source, the_case)
+    call read_axes(source, the_case)
+    call read_sweep(source, the_case)
+    call read_trajectory(source, the_case)
+    call report_unknown(source)
+    if (.not. has_problems(source)) call check_case(source, the_case)
+    call problems_of(source, error)
+    if (allocated(error)) return
+    the_case%resolved_text = echo_case(the_case)
+  end subroutine load_case_text
+
+  subroutine read_start(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    logical :: found
+    call enter_table(source, 'start', found)
+    associate (start => the_case%start)
+      call take_real(source, 'start.x0', any_number('m'), start%x0)
+      call take_real(source, 'start.v0', any_number('m/s'), start%v0)
+      call take_real(source, 'start.crank_angle', any_number('rad'), start%crank_angle)
+    end associate
+  end subroutine read_start
+
+  subroutine read_run(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    logical :: found
+    call enter_table(source, 'run', found)
+    associate (run => the_case%run)
+      call take_real(source, 'run.duration', more_than(0.0_wp, 's'), run%duration)
+      run%window = run%duration/4
+      call take_real(source, 'run.window', more_than(0.0_wp, 's'), run%window)
+      call take_choice(source, 'run.stop', ['captured', 'duration'], run%stop)
+      call take_real(source, 'run.extension', at_least(1.0_wp, '1'), run%extension)
+      call take_real(source, 'run.domain', more_than(0.0_wp, 'm'), run%domain)
+    end associate
+  end subroutine read_run
+
+  subroutine read_integrator(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    logical :: found
+    call enter_table(source, 'integrator', found)
+    associate (integrator => the_case%integrator)
+      call take_choice(source, 'integrator.flight', ['auto    ', 'exact   ', 'adaptive'], integrator%flight)
+      call take_real(source, 'integrator.tolerance', between(1e-15_wp, 1e-3_wp, '1'), integrator%tolerance)
+      call take_integer(source, 'integrator.event_budget', 1, integrator%event_budget)
+    end associate
+  end subroutine read_integrator
+
+  subroutine read_attractors(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    logical :: found
+    call enter_table(source, 'attractors', found)
+    associate (attractors => the_case%attractors)
+      call take_integer(source, 'attractors.sample', 1, attractors%sample)
+      call take_integer(source, 'attractors.seed', 0, attractors%seed)
+      call take_integer(source, 'attractors.max_period', 1, attractors%max_period)
+    end associate
+  end subroutine read_attractors
+
+  subroutine read_trajectory(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    logical :: found
+    call enter_table(source, 'trajectory', found)
+    call take_integer(source, 'trajectory.samples_per_period', 2, the_case%trajectory%samples_per_period)
+  end subroutine read_trajectory
+
+end module case_reader

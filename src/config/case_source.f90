@@ -1,0 +1,377 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The text of a case while it is read: its entries with overrides applied, the keys that may
+!> occur, and the problems found so far with their places.
+module case_source
+  use errors, only: error_t, fail
+  use status, only: exit_bad_case
+  use suggest, only: nearest_word
+  use text, only: join, replace_all, starts_with, to_text
+  use toml_bindings, only: read_toml, toml_array, toml_boolean, toml_entry_t, toml_float, toml_integer, &
+    toml_string, toml_table
+  implicit none
+  private
+
+  public :: open_source, find, list_size, know, know_all_below, enter_table, report, &
+    report_unknown, problems_of, description, has_problems
+
+  type, public :: source_entry_t
+    type(toml_entry_t) :: entry
+    !> The override `key=value` that gave it; not allocated for the file.
+    character(len=:), allocatable :: override
+  end type source_entry_t
+
+  type :: problem_t
+    integer :: line
+    character(len=:), allocatable :: text
+  end type problem_t
+
+  integer, parameter :: path_length = 96
+
+  type, public :: case_source_t
+    !> Name of the file in messages.
+    character(len=:), allocatable :: name
+    type(source_entry_t), allocatable :: entries(:)
+    !> Paths of the keys that may occur.
+    character(len=path_length), allocatable :: known(:)
+    type(problem_t), allocatable :: problems(:)
+  end type case_source_t
+
+contains
+
+  !> Parses `text` and puts the overrides ('key.path=value' in TOML syntax) on top of it.
+  subroutine open_source(source, text, name, overrides, error)
+    type(case_source_t), intent(out) :: source
+    character(len=*), intent(in) :: text, name, overrides(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(toml_entry_t), allocatable :: entries(:)
+    integer :: i
+    source%name = name
+    allocate (source%known(0), source%problems(0))
+    call read_toml(text, name, entries, error)
+    if (allocated(error)) return
+    allocate (source%entries(size(entries)))
+    do i = 1, size(entries)
+      source%entries(i)%entry = entries(i)
+    end do
+    do i = 1, size(overrides)
+      call apply_override(source, trim(overrides(i)), error)
+      if (allocated(error)) return
+    end do
+  end subroutine open_source
+
+  subroutine apply_override(source, override, error)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: override
+    type(error_t), allocatable, intent(out) :: error
+    type(toml_entry_t), allocatable :: entries(:)
+    character(len=:), allocatable :: key, problem
+    integer :: mark
+    mark = index(override, '=')
+    key = trim(adjustl(override(1:max(mark - 1, 0))))
+    problem = key_problem(source, key)
+    if (mark == 0) problem = 'found no ''='', allowed KEY=VALUE'
+    if (len(problem) == 0) then
+      ! The value is parsed under a short name: 'axis[1].count' is a path, not a TOML key.
+      call read_toml('v = '//override(mark + 1:), '', entries, error)
+      if (allocated(error)) then
+        problem = error%message(index(error%message, ': ') + 2:)
+      else if (any_other_key(entries)) then
+        problem = 'found more than one value'
+      end if
+    end if
+    if (len(problem) > 0) then
+      call fail(error, exit_bad_case, '--set '//override//': '//problem)
+      return
+    end if
+    call put(source, key, entries, override)
+  end subroutine apply_override
+
+  pure logical function any_other_key(entries)
+    type(toml_entry_t), intent(in) :: entries(:)
+    integer :: i
+    any_other_key = .false.
+    do i = 1, size(entries)
+      if (.not. is_or_is_below(entries(i)%path, 'v')) any_other_key = .true.
+    end do
+  end function any_other_key
+
+  !> What is wrong with the key of an override, '' if nothing.
+  pure function key_problem(source, key) result(problem)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable :: problem
+    integer :: i
+    problem = ''
+    if (len(key) == 0) problem = 'the key is missing'
+    if (verify(key, 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.[]') > 0) then
+      problem = 'found the key '''//key//''', allowed letters, digits, _ and the index of a list'
+    end if
+    do i = 1, len(key)
+      if (key(i:i) /= ']') cycle
+      if (find(source, key(1:i)) == 0) problem = 'there is no element '''//key(1:i)//''' to change'
+    end do
+  end function key_problem
+
+  !> Puts the entries of a value 'v' in the place of `key` and of everything below it.
+  subroutine put(source, key, entries, override)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: key, override
+    type(toml_entry_t), intent(in) :: entries(:)
+    type(source_entry_t) :: added(size(entries))
+    logical :: kept(size(source%entries))
+    integer :: i, at
+    do i = 1, size(entries)
+      added(i)%entry = entries(i)
+      added(i)%entry%path = key//entries(i)%path(2:)
+      added(i)%override = override
+    end do
+    at = find(source, key)
+    if (at == 0) at = size(source%entries) + 1
+    do i = 1, size(kept)
+      kept(i) = .not. is_or_is_below(source%entries(i)%entry%path, key)
+    end do
+    source%entries = [pack(source%entries(:at - 1), kept(:at - 1)), added, &
+                      pack(source%entries(at:), kept(at:))]
+  end subroutine put
+
+  !> Position of a path in the entries, 0 if it is absent; the search may begin at `from`.
+  pure integer function find(source, path, from)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    integer, intent(in), optional :: from
+    integer :: i, first
+    first = 1
+    if (present(from)) first = from
+    do i = first, size(source%entries)
+      find = i
+      if (source%entries(i)%entry%path == path) return
+    end do
+    find = 0
+  end function find
+
+  !> Number of elements of the list at `path`, 0 if there is none.
+  pure integer function list_size(source, path)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    integer :: at
+    list_size = 0
+    at = find(source, path)
+    if (at == 0) return
+    if (source%entries(at)%entry%kind == toml_array) list_size = int(source%entries(at)%entry%integer)
+  end function list_size
+
+  !> Declares that the key `path` may occur.
+  pure subroutine know(source, path)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    call append(source%known, path)
+  end subroutine know
+
+  pure subroutine append(list, word)
+    character(len=path_length), allocatable, intent(inout) :: list(:)
+    character(len=*), intent(in) :: word
+    character(len=path_length), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer)) = word
+    call move_alloc(longer, list)
+  end subroutine append
+
+  !> Accepts every key of a table whose contents cannot be judged.
+  pure subroutine know_all_below(source, path)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    integer :: i
+    do i = 1, size(source%entries)
+      if (is_or_is_below(source%entries(i)%entry%path, path)) call know(source, source%entries(i)%entry%path)
+    end do
+  end subroutine know_all_below
+
+  !> Whether the table `path` is in the source; anything else under that name is a problem.
+  subroutine enter_table(source, path, found)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    logical, intent(out) :: found
+    integer :: at
+    at = find(source, path)
+    found = at > 0
+    do at = 1, size(source%entries)
+      if (starts_with(source%entries(at)%entry%path, path//'.')) found = .true.
+    end do
+    at = find(source, path)
+    if (at == 0) return
+    if (source%entries(at)%entry%kind == toml_table) return
+    call report(source, path, 'found '//description(source%entries(at)%entry)//', allowed a table ['//path//']')
+    call know_all_below(source, path)
+  end subroutine enter_table
+
+  !> Notes a problem with the key `path` (or the table that lacks it); `shown` replaces the key in
+  !> the message.
+  subroutine report(source, path, problem, shown)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path, problem
+    character(len=*), intent(in), optional :: shown
+    character(len=:), allocatable :: above, place
+    integer :: at, line
+    above = path
+    do
+      at = find(source, above)
+      if (at > 0 .or. len(above) == 0) exit
+      above = above(1:max(scan(above, '.[', back=.true.) - 1, 0))
+    end do
+    place = source%name
+    line = 0
+    if (at > 0) then
+      line = source%entries(at)%entry%line
+      place = place//':'//to_text(line)
+      if (allocated(source%entries(at)%override)) then
+        line = huge(line)
+        place = '--set '//source%entries(at)%override
+      end if
+    end if
+    above = path
+    if (present(shown)) above = shown
+    call insert(source, problem_t(line, place//': key '''//above//''': '//problem))
+  end subroutine report
+
+  !> Keeps the problems in the order of the lines, overrides last.
+  subroutine insert(source, problem)
+    type(case_source_t), intent(inout) :: source
+    type(problem_t), intent(in) :: problem
+    integer :: at
+    at = count(source%problems%line <= problem%line)
+    source%problems = [source%problems(:at), problem, source%problems(at + 1:)]
+  end subroutine insert
+
+  !> Whether any problem has been noted.
+  pure logical function has_problems(source)
+    type(case_source_t), intent(in) :: source
+    has_problems = size(source%problems) > 0
+  end function has_problems
+
+  !> The problems as one error, a line each; none leaves `error` unallocated.
+  subroutine problems_of(source, error)
+    type(case_source_t), intent(in) :: source
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: message
+    integer :: i
+    if (.not. has_problems(source)) return
+    message = source%problems(1)%text
+    do i = 2, size(source%problems)
+      message = message//new_line('a')//source%problems(i)%text
+    end do
+    call fail(error, exit_bad_case, message)
+  end subroutine problems_of
+
+  !> Notes every entry that no reader has asked for.
+  subroutine report_unknown(source)
+    type(case_source_t), intent(inout) :: source
+    character(len=:), allocatable :: path, refused
+    integer :: i
+    refused = ''
+    do i = 1, size(source%entries)
+      path = source%entries(i)%entry%path
+      if (is_known(source, path)) cycle
+      if (len(refused) > 0) then
+        if (is_or_is_below(path, refused)) cycle
+      end if
+      refused = unknown_part(source, path)
+      call report(source, path, unknown_text(source, refused), refused)
+    end do
+  end subroutine report_unknown
+
+  !> The highest table of a path that is unknown, or the path itself.
+  pure function unknown_part(source, path) result(part)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: part
+    integer :: i
+    logical :: in_quotes
+    in_quotes = .false.
+    do i = 1, len(path)
+      if (path(i:i) == '"') in_quotes = .not. in_quotes
+      if (path(i:i) /= '.' .or. in_quotes) cycle
+      part = path(1:i - 1)
+      if (.not. is_known(source, part)) return
+    end do
+    part = path
+  end function unknown_part
+
+  !> A known key, a table that holds one, or a part of a known key's value.
+  pure logical function is_known(source, path)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    integer :: i
+    is_known = .true.
+    do i = 1, size(source%known)
+      if (is_or_is_below(path, trim(source%known(i)))) return
+      if (is_or_is_below(trim(source%known(i)), path)) return
+    end do
+    is_known = .false.
+  end function is_known
+
+  pure function unknown_text(source, path) result(text)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: text, above, meant
+    character(len=path_length), allocatable :: allowed(:)
+    integer :: mark
+    mark = scan(path(1:index(path//'"', '"') - 1), '.', back=.true.)
+    above = path(1:mark)
+    allowed = names_below(source, above)
+    text = 'unknown'
+    meant = nearest_word(path(mark + 1:), allowed)
+    if (len(meant) > 0) text = text//' (did you mean '''//meant//'''?)'
+    text = text//'; allowed '//join(allowed, ', ')
+  end function unknown_text
+
+  !> The names that may follow `above` ('' or a table's path with its dot).
+  pure function names_below(source, above) result(names)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: above
+    character(len=path_length), allocatable :: names(:)
+    character(len=path_length) :: name
+    integer :: i
+    allocate (names(0))
+    do i = 1, size(source%known)
+      if (.not. starts_with(source%known(i), above)) cycle
+      name = source%known(i)(len(above) + 1:)
+      name = name(1:scan(trim(name)//'.', '.[') - 1)
+      if (all(names /= name)) call append(names, trim(name))
+    end do
+  end function names_below
+
+  !> Whether `path` is `above` or lies in it: 'drive.sine[2]' is below 'drive.sine' and 'drive'.
+  pure logical function is_or_is_below(path, above)
+    character(len=*), intent(in) :: path, above
+    is_or_is_below = path == above
+    if (is_or_is_below .or. len(path) <= len(above)) return
+    if (path(1:len(above)) /= above) return
+    is_or_is_below = scan(path(len(above) + 1:len(above) + 1), '.[') == 1
+  end function is_or_is_below
+
+  !> What an entry holds, for messages.
+  pure function description(entry) result(text)
+    type(toml_entry_t), intent(in) :: entry
+    character(len=:), allocatable :: text
+    select case (entry%kind)
+    case (toml_integer)
+      text = to_text(entry%integer)
+    case (toml_float)
+      text = to_text(entry%real)
+    case (toml_string)
+      text = '"'//replace_all(entry%string, new_line('a'), '\n')//'"'
+    case (toml_boolean)
+      text = to_text(entry%integer == 1)
+    case (toml_table)
+      text = 'a table'
+    case (toml_array)
+      text = 'a list'
+    case default
+      text = 'a date'
+    end select
+  end function description
+
+end module case_source

@@ -1,0 +1,88 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The case: everything that a run needs, in SI units.
+module case_type
+  use axis, only: axis_t
+  use kinds, only: wp
+  use law_table, only: families, law_choice_t
+  implicit none
+  private
+
+  !> Positions in `case_t%laws`, the order of `families`.
+  integer, parameter, public :: body_law = 1, restoring_law = 2, friction_law = 3, &
+    contact_law = 4, drive_law = 5
+
+  !> State and crank angle at the beginning.
+  type, public :: start_t
+    real(wp) :: x0 = 0, v0 = 0, crank_angle = 0
+  end type start_t
+
+  type, public :: run_t
+    !> Length of a trajectory and of the window of its steady values (s).
+    real(wp) :: duration = 50, window = 12.5_wp
+    !> 'captured' or 'duration'.
+    character(len=8) :: stop = 'captured'
+    !> An uncaptured trajectory goes on up to extension*duration.
+    real(wp) :: extension = 4
+    !> Largest |x| (m).
+    real(wp) :: domain = 1e6_wp
+  end type run_t
+
+  type, public :: integrator_t
+    !> 'auto', 'exact' or 'adaptive'.
+    character(len=8) :: flight = 'auto'
+    !> Relative tolerance of the adaptive flight.
+    real(wp) :: tolerance = 1e-13_wp
+    !> Most events of one trajectory.
+    integer :: event_budget = 1000000
+  end type integrator_t
+
+  type, public :: attractors_t
+    !> Starts per slice from which attractors are discovered.
+    integer :: sample = 256
+    integer :: seed = 1
+    !> Longest period looked for, in drive periods.
+    integer :: max_period = 16
+  end type attractors_t
+
+  type, public :: sweep_t
+    !> Whether the case has a [sweep] table; the rest is meaningless without it.
+    logical :: present = .false.
+    !> The swept parameter, its unit and its values.
+    type(axis_t) :: swept
+    !> 'both', 'up' or 'down'.
+    character(len=8) :: directions = 'both'
+    !> Numbers of brute-force starts over x0 and v0; [0, 0] for none.
+    integer :: starts(2) = 7
+    !> Ranges of those starts (m, m/s).
+    real(wp) :: x0(2) = 0, v0(2) = 0
+    !> Stroboscopic samples kept per value.
+    integer :: samples = 32
+    !> Width to which the limits of a region are bracketed, in units of the parameter.
+    real(wp) :: limit_tolerance = 1e-3_wp
+  end type sweep_t
+
+  type, public :: trajectory_t
+    integer :: samples_per_period = 200
+  end type trajectory_t
+
+  type, public :: case_t
+    character(len=:), allocatable :: title
+    !> Name of the file and its text as read.
+    character(len=:), allocatable :: path, raw_text
+    !> The case with every default filled in, itself a case file.
+    character(len=:), allocatable :: resolved_text
+    type(law_choice_t) :: laws(size(families))
+    type(start_t) :: start
+    type(run_t) :: run
+    type(integrator_t) :: integrator
+    type(attractors_t) :: attractors
+    type(axis_t), allocatable :: axes(:)
+    !> Points of a tile along each axis, 0 = automatic.
+    integer, allocatable :: tile(:)
+    type(sweep_t) :: sweep
+    type(trajectory_t) :: trajectory
+  end type case_t
+
+end module case_type

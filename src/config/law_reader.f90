@@ -1,0 +1,94 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The tables [body], [restoring], [friction], [contact] and [drive], read by the law table.
+module law_reader
+  use case_parameters, only: find_parameter, row_bounds
+  use case_source, only: case_source_t, enter_table, find, know_all_below, report
+  use case_values, only: take_real, take_reals, take_text
+  use law_table, only: families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
+    parameters_of
+  use suggest, only: nearest_word
+  implicit none
+  private
+
+  public :: read_laws
+
+contains
+
+  !> Five laws in the order of `families`. A body without a law is a point mass; any other family
+  !> without a table has the law 'none'.
+  subroutine read_laws(source, choices)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(out) :: choices(size(families))
+    integer :: i
+    do i = 1, size(families)
+      call read_law(source, trim(families(i)), choices(i))
+    end do
+    call resolve_static_friction(choices)
+  end subroutine read_laws
+
+  subroutine read_law(source, family, choice)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: family
+    type(law_choice_t), intent(out) :: choice
+    character(len=:), allocatable :: name, default
+    logical :: found
+    default = 'none'
+    if (family == 'body') default = 'point_mass'
+    choice = law_choice(family, default)
+    call enter_table(source, family, found)
+    name = default
+    call take_text(source, family//'.law', name)
+    if (found .and. default == 'none' .and. find(source, family//'.law') == 0) then
+      call report(source, family//'.law', 'missing, allowed '//law_names(family))
+      call know_all_below(source, family)
+    else if (find_law(family, name) == 0) then
+      call report(source, family//'.law', 'found "'//name//'"'//hint(family, name)//', allowed '//law_names(family))
+      call know_all_below(source, family)
+    else
+      choice = law_choice(family, name)
+      call read_parameters(source, choice)
+    end if
+  end subroutine read_law
+
+  pure function hint(family, name) result(text)
+    character(len=*), intent(in) :: family, name
+    character(len=:), allocatable :: text, meant
+    meant = nearest_word(name, pack(laws%name, laws%family == family))
+    text = ''
+    if (len(meant) > 0) text = ' (did you mean "'//meant//'"?)'
+  end function hint
+
+  subroutine read_parameters(source, choice)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(inout) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    character(len=:), allocatable :: path
+    integer :: i
+    rows = parameters_of(choice%family, choice%name)
+    do i = 1, size(rows)
+      path = trim(rows(i)%family)//'.'//trim(rows(i)%name)
+      if (rows(i)%list) then
+        call take_reals(source, path, row_bounds(rows(i)), choice%parameters(i)%values, &
+                        required=.not. rows(i)%optional)
+      else
+        call take_real(source, path, row_bounds(rows(i)), choice%parameters(i)%values(1), &
+                       required=.not. rows(i)%optional)
+      end if
+    end do
+  end subroutine read_parameters
+
+  !> Break-away friction that is not given equals sliding friction.
+  pure subroutine resolve_static_friction(choices)
+    type(law_choice_t), intent(inout) :: choices(:)
+    integer :: law, static, kinetic
+    call find_parameter(choices, 'friction.static_coefficient', law, static)
+    if (law == 0) return
+    call find_parameter(choices, 'friction.kinetic_coefficient', law, kinetic)
+    associate (parameters => choices(law)%parameters)
+      if (parameters(static)%values(1) < 0) parameters(static)%values = parameters(kinetic)%values
+    end associate
+  end subroutine resolve_static_friction
+
+end module law_reader

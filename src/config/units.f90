@@ -1,0 +1,145 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Quantities with units: "12.5 mm" becomes 0.0125 m.
+module units
+  use constants, only: pi
+  use kinds, only: wp
+  use text, only: join, replace_all
+  implicit none
+  private
+
+  public :: read_quantity, allowed_units
+
+  !> A spelling of a unit: SI value = number*multiplier/divisor. Dividing by a power of ten keeps
+  !> "12.5 mm" equal to 0.0125 to the bit.
+  type :: unit_row_t
+    character(len=8) :: spelling
+    !> The SI unit that names the dimension.
+    character(len=6) :: si
+    real(wp) :: multiplier, divisor
+  end type unit_row_t
+
+  type(unit_row_t), parameter :: rows(36) = [ &
+    unit_row_t('m', 'm', 1.0_wp, 1.0_wp), &
+    unit_row_t('mm', 'm', 1.0_wp, 1e3_wp), &
+    unit_row_t('cm', 'm', 1.0_wp, 1e2_wp), &
+    unit_row_t('um', 'm', 1.0_wp, 1e6_wp), &
+    unit_row_t('km', 'm', 1e3_wp, 1.0_wp), &
+    unit_row_t('m/s', 'm/s', 1.0_wp, 1.0_wp), &
+    unit_row_t('mm/s', 'm/s', 1.0_wp, 1e3_wp), &
+    unit_row_t('cm/s', 'm/s', 1.0_wp, 1e2_wp), &
+    unit_row_t('km/h', 'm/s', 1.0_wp, 3.6_wp), &
+    unit_row_t('m/s^2', 'm/s^2', 1.0_wp, 1.0_wp), &
+    unit_row_t('mm/s^2', 'm/s^2', 1.0_wp, 1e3_wp), &
+    unit_row_t('cm/s^2', 'm/s^2', 1.0_wp, 1e2_wp), &
+    unit_row_t('rad', 'rad', 1.0_wp, 1.0_wp), &
+    unit_row_t('mrad', 'rad', 1.0_wp, 1e3_wp), &
+    unit_row_t('deg', 'rad', pi, 180.0_wp), &
+    unit_row_t('turn', 'rad', 2*pi, 1.0_wp), &
+    unit_row_t('s', 's', 1.0_wp, 1.0_wp), &
+    unit_row_t('ms', 's', 1.0_wp, 1e3_wp), &
+    unit_row_t('us', 's', 1.0_wp, 1e6_wp), &
+    unit_row_t('min', 's', 60.0_wp, 1.0_wp), &
+    unit_row_t('h', 's', 3600.0_wp, 1.0_wp), &
+    unit_row_t('kg', 'kg', 1.0_wp, 1.0_wp), &
+    unit_row_t('g', 'kg', 1.0_wp, 1e3_wp), &
+    unit_row_t('mg', 'kg', 1.0_wp, 1e6_wp), &
+    unit_row_t('t', 'kg', 1e3_wp, 1.0_wp), &
+    unit_row_t('N/m', 'N/m', 1.0_wp, 1.0_wp), &
+    unit_row_t('N/mm', 'N/m', 1e3_wp, 1.0_wp), &
+    unit_row_t('kN/m', 'N/m', 1e3_wp, 1.0_wp), &
+    unit_row_t('mN/m', 'N/m', 1.0_wp, 1e3_wp), &
+    unit_row_t('N s/m', 'N s/m', 1.0_wp, 1.0_wp), &
+    unit_row_t('Ns/m', 'N s/m', 1.0_wp, 1.0_wp), &
+    unit_row_t('N s/mm', 'N s/m', 1e3_wp, 1.0_wp), &
+    unit_row_t('kN s/m', 'N s/m', 1e3_wp, 1.0_wp), &
+    unit_row_t('mN s/m', 'N s/m', 1.0_wp, 1e3_wp), &
+    unit_row_t('kg/s', 'N s/m', 1.0_wp, 1.0_wp), &
+    unit_row_t('%', '1', 1.0_wp, 1e2_wp)]
+
+contains
+
+  !> The value in the SI unit `unit` of a text such as "12.5 mm". If the text is not a number with a
+  !> unit of this quantity, `problem` is allocated and says what is allowed.
+  pure subroutine read_quantity(string, unit, value, problem)
+    character(len=*), intent(in) :: string, unit
+    real(wp), intent(out) :: value
+    character(len=:), allocatable, intent(out) :: problem
+    character(len=:), allocatable :: spelling, trimmed
+    integer :: length, row, status
+    value = 0
+    trimmed = trim(adjustl(string))
+    length = number_length(trimmed)
+    status = 1
+    if (length > 0) read (trimmed(1:length), *, iostat=status) value
+    if (status /= 0) then
+      problem = 'allowed '//allowed_units(unit)
+      return
+    end if
+    spelling = normal_form(trimmed(length + 1:))
+    do row = 1, size(rows)
+      if (rows(row)%si /= unit .or. rows(row)%spelling /= spelling) cycle
+      value = value*rows(row)%multiplier/rows(row)%divisor
+      return
+    end do
+    if (spelling == unit .and. unit /= '1') return
+    problem = 'allowed '//allowed_units(unit)
+    if (len(spelling) == 0) problem = 'a number in quotes needs a unit; '//problem
+  end subroutine read_quantity
+
+  !> What may be written for a quantity of the SI unit `unit`, for messages.
+  pure function allowed_units(unit) result(text)
+    character(len=*), intent(in) :: unit
+    character(len=:), allocatable :: text
+    if (unit == '1') then
+      text = 'a number, or a text with %'
+    else if (any(rows%si == unit)) then
+      text = 'a number in '//trim(unit)//', or a text with one of the units '// &
+             join(pack(rows%spelling, rows%si == unit), ', ')
+    else
+      text = 'a number in '//trim(unit)
+    end if
+  end function allowed_units
+
+  !> Length of the decimal number at the beginning of a text, 0 if there is none.
+  pure integer function number_length(string)
+    character(len=*), intent(in) :: string
+    character(len=:), allocatable :: padded
+    integer :: at, whole, fraction, mark
+    padded = string//'   '
+    at = 1
+    if (scan(padded(1:1), '+-') == 1) at = 2
+    whole = digits_in(padded(at:))
+    at = at + whole
+    fraction = 0
+    if (padded(at:at) == '.') then
+      fraction = digits_in(padded(at + 1:))
+      at = at + 1 + fraction
+    end if
+    number_length = 0
+    if (whole + fraction == 0) return
+    number_length = at - 1
+    if (scan(padded(at:at), 'eE') == 0) return
+    mark = at + 1
+    if (scan(padded(mark:mark), '+-') == 1) mark = mark + 1
+    if (digits_in(padded(mark:)) > 0) number_length = mark - 1 + digits_in(padded(mark:))
+  end function number_length
+
+  !> Number of digits at the beginning of a text that ends with a blank.
+  pure integer function digits_in(string)
+    character(len=*), intent(in) :: string
+    digits_in = verify(string, '0123456789') - 1
+  end function digits_in
+
+  !> One blank between the factors of a unit: 'N*s/m' and 'N  s/m' become 'N s/m'.
+  pure function normal_form(string) result(spelling)
+    character(len=*), intent(in) :: string
+    character(len=:), allocatable :: spelling
+    spelling = trim(adjustl(replace_all(string, '*', ' ')))
+    do while (index(spelling, '  ') > 0)
+      spelling = replace_all(spelling, '  ', ' ')
+    end do
+  end function normal_form
+
+end module units

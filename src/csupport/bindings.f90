@@ -1,0 +1,175 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The interfaces of the C files of this folder; flat arrays and integer status only. The modules
+!> signals, checksum, random, system, files and atomics give them Fortran types.
+module bindings
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int32_t, c_int64_t, c_ptr
+  implicit none
+  private
+
+  public :: c_signals_install, c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
+    c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
+    c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_file_exists, &
+    c_folder_status, c_free_bytes, c_file_bytes, c_reserve_file, c_publish_file, c_remove_file, &
+    c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
+    c_atomic_try_lock, c_yield, c_string_length
+
+  interface
+    integer(c_int) function c_signals_install() bind(c, name='separatrix_signals_install')
+      import :: c_int
+    end function c_signals_install
+
+    integer(c_int) function c_signals_received() bind(c, name='separatrix_signals_received')
+      import :: c_int
+    end function c_signals_received
+
+    subroutine c_signals_clear() bind(c, name='separatrix_signals_clear')
+    end subroutine c_signals_clear
+
+    integer(c_int) function c_signals_raise(number) bind(c, name='separatrix_signals_raise')
+      import :: c_int
+      integer(c_int), value :: number
+    end function c_signals_raise
+
+    pure integer(c_int32_t) function c_crc32(previous, bytes, size) bind(c, name='separatrix_crc32')
+      import :: c_int32_t, c_int64_t, c_ptr
+      integer(c_int32_t), value :: previous
+      type(c_ptr), value :: bytes
+      integer(c_int64_t), value :: size
+    end function c_crc32
+
+    pure subroutine c_philox(counter, key, out) bind(c, name='separatrix_philox')
+      import :: c_int32_t
+      integer(c_int32_t), intent(in) :: counter(4), key(2)
+      integer(c_int32_t), intent(out) :: out(4)
+    end subroutine c_philox
+
+    pure subroutine c_uniform(seed, counter, count, values) bind(c, name='separatrix_uniform')
+      import :: c_double, c_int64_t
+      integer(c_int64_t), value :: seed, counter, count
+      real(c_double), intent(out) :: values(*)
+    end subroutine c_uniform
+
+    real(c_double) function c_monotonic_seconds() bind(c, name='separatrix_monotonic_seconds')
+      import :: c_double
+    end function c_monotonic_seconds
+
+    integer(c_int) function c_utc_now(text, size) bind(c, name='separatrix_utc_now')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end function c_utc_now
+
+    integer(c_int64_t) function c_resident_bytes() bind(c, name='separatrix_resident_bytes')
+      import :: c_int64_t
+    end function c_resident_bytes
+
+    integer(c_int) function c_host_name(text, size) bind(c, name='separatrix_host_name')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end function c_host_name
+
+    integer(c_int) function c_stderr_is_terminal() bind(c, name='separatrix_stderr_is_terminal')
+      import :: c_int
+    end function c_stderr_is_terminal
+
+    integer(c_int) function c_default_environment(name, value) bind(c, name='separatrix_default_environment')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: name(*), value(*)
+    end function c_default_environment
+
+    subroutine c_sleep_microseconds(microseconds) bind(c, name='separatrix_sleep_microseconds')
+      import :: c_int
+      integer(c_int), value :: microseconds
+    end subroutine c_sleep_microseconds
+
+    subroutine c_exit(code) bind(c, name='separatrix_exit')
+      import :: c_int
+      integer(c_int), value :: code
+    end subroutine c_exit
+
+    integer(c_int) function c_file_exists(path) bind(c, name='separatrix_file_exists')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_file_exists
+
+    integer(c_int) function c_folder_status(path) bind(c, name='separatrix_folder_status')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_folder_status
+
+    integer(c_int64_t) function c_free_bytes(path) bind(c, name='separatrix_free_bytes')
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_free_bytes
+
+    integer(c_int64_t) function c_file_bytes(path) bind(c, name='separatrix_file_bytes')
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_file_bytes
+
+    integer(c_int) function c_reserve_file(path) bind(c, name='separatrix_reserve_file')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_reserve_file
+
+    integer(c_int) function c_publish_file(from, to) bind(c, name='separatrix_publish_file')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: from(*), to(*)
+    end function c_publish_file
+
+    integer(c_int) function c_remove_file(path) bind(c, name='separatrix_remove_file')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_remove_file
+
+    subroutine c_error_text(number, text, size) bind(c, name='separatrix_error_text')
+      import :: c_char, c_int
+      integer(c_int), value :: number, size
+      character(kind=c_char), intent(out) :: text(*)
+    end subroutine c_error_text
+
+    integer(c_int64_t) function c_atomic_bytes(count) bind(c, name='separatrix_atomic_bytes')
+      import :: c_int, c_int64_t
+      integer(c_int), value :: count
+    end function c_atomic_bytes
+
+    integer(c_int64_t) function c_atomic_load(words, index) bind(c, name='separatrix_atomic_load')
+      import :: c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: words
+      integer(c_int), value :: index
+    end function c_atomic_load
+
+    subroutine c_atomic_store(words, index, value) bind(c, name='separatrix_atomic_store')
+      import :: c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: words
+      integer(c_int), value :: index
+      integer(c_int64_t), value :: value
+    end subroutine c_atomic_store
+
+    integer(c_int64_t) function c_atomic_fetch_add(words, index, value) bind(c, name='separatrix_atomic_fetch_add')
+      import :: c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: words
+      integer(c_int), value :: index
+      integer(c_int64_t), value :: value
+    end function c_atomic_fetch_add
+
+    integer(c_int) function c_atomic_try_lock(words, index) bind(c, name='separatrix_atomic_try_lock')
+      import :: c_int, c_ptr
+      type(c_ptr), value :: words
+      integer(c_int), value :: index
+    end function c_atomic_try_lock
+
+    subroutine c_yield() bind(c, name='separatrix_yield')
+    end subroutine c_yield
+
+    !> strlen, for strings that the HDF5 library returns.
+    integer(c_int64_t) function c_string_length(string) bind(c, name='strlen')
+      import :: c_int64_t, c_ptr
+      type(c_ptr), value :: string
+    end function c_string_length
+  end interface
+
+end module bindings

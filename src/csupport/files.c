@@ -1,0 +1,113 @@
+/* SPDX-FileCopyrightText: The Separatrix developers */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+
+/* File operations that Fortran lacks. Every status is 0 or errno. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+/* A copy of the folder part of `path`; the caller frees it. */
+static char *folder_of(const char *path) {
+  char *copy = strdup(path);
+  if (copy == NULL)
+    return NULL;
+  char *folder = strdup(dirname(copy));
+  free(copy);
+  return folder;
+}
+
+static int sync_path(const char *path, int flags) {
+  const int descriptor = open(path, flags);
+  if (descriptor < 0)
+    return errno;
+  const int status = fsync(descriptor) == 0 ? 0 : errno;
+  if (close(descriptor) != 0 && status == 0)
+    return errno;
+  return status;
+}
+
+int separatrix_file_exists(const char *path) { return access(path, F_OK) == 0; }
+
+/* Whether a file can be created in the folder of `path`. */
+int separatrix_folder_status(const char *path) {
+  char *folder = folder_of(path);
+  struct stat facts;
+  int status = 0;
+  if (folder == NULL)
+    return ENOMEM;
+  if (stat(folder, &facts) != 0)
+    status = errno;
+  else if (!S_ISDIR(facts.st_mode))
+    status = ENOTDIR;
+  else if (access(folder, W_OK | X_OK) != 0)
+    status = errno;
+  free(folder);
+  return status;
+}
+
+/* Bytes free to this user on the file system of the folder of `path`, -1 if unknown. */
+int64_t separatrix_free_bytes(const char *path) {
+  char *folder = folder_of(path);
+  struct statvfs facts;
+  int64_t result = -1;
+  if (folder != NULL && statvfs(folder, &facts) == 0) {
+    result = (int64_t)facts.f_bavail * (int64_t)facts.f_frsize;
+  }
+  free(folder);
+  return result;
+}
+
+int64_t separatrix_file_bytes(const char *path) {
+  struct stat facts;
+  return stat(path, &facts) == 0 ? (int64_t)facts.st_size : -1;
+}
+
+/* Reserves the blocks of a file so that a full disk or a quota shows before the work starts. File
+   systems without fallocate are left as they are. */
+int separatrix_reserve_file(const char *path) {
+  struct stat facts;
+  int status = 0;
+  const int descriptor = open(path, O_RDWR);
+  if (descriptor < 0)
+    return errno;
+  if (fstat(descriptor, &facts) != 0)
+    status = errno;
+  else if (facts.st_size > 0 && fallocate(descriptor, FALLOC_FL_KEEP_SIZE, 0, facts.st_size) != 0)
+    status = errno;
+  if (status == EOPNOTSUPP || status == ENOSYS)
+    status = 0;
+  if (close(descriptor) != 0 && status == 0)
+    status = errno;
+  return status;
+}
+
+/* Makes the file's content durable, renames it, and makes the new name durable. */
+int separatrix_publish_file(const char *from, const char *to) {
+  int status = sync_path(from, O_RDONLY);
+  if (status != 0)
+    return status;
+  if (rename(from, to) != 0)
+    return errno;
+  char *folder = folder_of(to);
+  if (folder == NULL)
+    return ENOMEM;
+  status = sync_path(folder, O_RDONLY | O_DIRECTORY);
+  free(folder);
+  /* Some file systems cannot sync a folder; the file itself is safe. */
+  return status == EINVAL ? 0 : status;
+}
+
+/* A file that does not exist counts as removed. */
+int separatrix_remove_file(const char *path) { return unlink(path) == 0 || errno == ENOENT ? 0 : errno; }
+
+void separatrix_error_text(int number, char *text, int size) {
+  snprintf(text, (size_t)size, "%s", strerror(number));
+}

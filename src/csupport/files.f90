@@ -1,0 +1,77 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> File operations that Fortran lacks. Errors name the file and the system's reason.
+module files
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+  use bindings, only: c_error_text, c_file_bytes, c_file_exists, c_folder_status, c_free_bytes, &
+    c_publish_file, c_remove_file, c_reserve_file
+  use errors, only: error_t, fail
+  use kinds, only: int64
+  use status, only: exit_cannot_create, exit_io
+  use system, only: from_c
+  implicit none
+  private
+
+  public :: file_exists, check_folder, free_bytes, file_bytes, reserve_file, publish_file, remove_file
+
+contains
+
+  !> Whether something of this name exists.
+  logical function file_exists(path)
+    character(len=*), intent(in) :: path
+    file_exists = c_file_exists(path//c_null_char) == 1
+  end function file_exists
+
+  !> Code 73 unless a file can be created in the folder of `path`.
+  subroutine check_folder(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    call test(c_folder_status(path//c_null_char), exit_cannot_create, 'cannot create', path, error)
+  end subroutine check_folder
+
+  !> Bytes free to this user where `path` lies; -1 if the system does not tell.
+  integer(int64) function free_bytes(path)
+    character(len=*), intent(in) :: path
+    free_bytes = c_free_bytes(path//c_null_char)
+  end function free_bytes
+
+  !> The size of a file in bytes; -1 if it cannot be read.
+  integer(int64) function file_bytes(path)
+    character(len=*), intent(in) :: path
+    file_bytes = c_file_bytes(path//c_null_char)
+  end function file_bytes
+
+  !> Reserves the disk blocks of a file; code 73 on a full disk or quota.
+  subroutine reserve_file(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    call test(c_reserve_file(path//c_null_char), exit_cannot_create, 'cannot reserve the space of', path, error)
+  end subroutine reserve_file
+
+  !> Makes the content of `from` durable, then renames it to `to` (replacing that); code 74.
+  subroutine publish_file(from, to, error)
+    character(len=*), intent(in) :: from, to
+    type(error_t), allocatable, intent(out) :: error
+    call test(c_publish_file(from//c_null_char, to//c_null_char), exit_io, 'cannot sync and rename to', to, error)
+  end subroutine publish_file
+
+  !> Removes a file; one that does not exist counts as removed; code 74.
+  subroutine remove_file(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    call test(c_remove_file(path//c_null_char), exit_io, 'cannot remove', path, error)
+  end subroutine remove_file
+
+  subroutine test(number, code, action, path, error)
+    integer(c_int), intent(in) :: number
+    integer, intent(in) :: code
+    character(len=*), intent(in) :: action, path
+    type(error_t), allocatable, intent(out) :: error
+    character(kind=c_char) :: reason(128)
+    if (number == 0) return
+    call c_error_text(number, reason, int(size(reason), c_int))
+    call fail(error, code, action//' '''//path//''': '//from_c(reason))
+  end subroutine test
+
+end module files

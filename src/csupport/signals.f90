@@ -1,0 +1,42 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Stop signals: SIGUSR1, SIGUSR2 and SIGTERM are counted, SIGXFSZ is ignored.
+module signals
+  use bindings, only: c_signals_clear, c_signals_install, c_signals_raise, c_signals_received
+  use errors, only: error_t, fail
+  use status, only: exit_internal
+  implicit none
+  private
+
+  public :: install_signals, signal_count, clear_signals, raise_signal
+
+  !> Linux signal numbers.
+  integer, parameter, public :: sig_usr1 = 10, sig_usr2 = 12, sig_term = 15, sig_xfsz = 25
+
+contains
+
+  !> Installs the handlers; code 70 if the system refuses.
+  subroutine install_signals(error)
+    type(error_t), allocatable, intent(out) :: error
+    if (c_signals_install() /= 0) call fail(error, exit_internal, 'cannot install the signal handlers')
+  end subroutine install_signals
+
+  !> Stop signals received since the start or the last `clear_signals`.
+  integer function signal_count()
+    signal_count = c_signals_received()
+  end function signal_count
+
+  !> Forgets the signals received so far.
+  subroutine clear_signals()
+    call c_signals_clear()
+  end subroutine clear_signals
+
+  !> Sends a signal to this process; code 70 if the number is unknown.
+  subroutine raise_signal(number, error)
+    integer, intent(in) :: number
+    type(error_t), allocatable, intent(out) :: error
+    if (c_signals_raise(number) /= 0) call fail(error, exit_internal, 'unknown signal')
+  end subroutine raise_signal
+
+end module signals

@@ -1,0 +1,92 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Clock, host, memory and environment of this process.
+module system
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+  use bindings, only: c_default_environment, c_exit, c_host_name, c_monotonic_seconds, &
+    c_resident_bytes, c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
+  use kinds, only: int64, real64
+  implicit none
+  private
+
+  public :: monotonic_seconds, utc_now, resident_bytes, host_name, stderr_is_terminal, &
+    default_environment, sleep_microseconds, exit_program, from_c
+
+contains
+
+  !> Seconds since an arbitrary moment; never goes back.
+  real(real64) function monotonic_seconds()
+    monotonic_seconds = c_monotonic_seconds()
+  end function monotonic_seconds
+
+  !> The time now as 2026-01-31T12:34:56Z; 'unknown' if the system does not tell.
+  function utc_now() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(32)
+    if (c_utc_now(buffer, int(size(buffer), c_int)) == 0) then
+      text = from_c(buffer)
+    else
+      text = 'unknown'
+    end if
+  end function utc_now
+
+  !> Resident memory of this process in bytes; -1 if the system does not tell.
+  integer(int64) function resident_bytes()
+    resident_bytes = c_resident_bytes()
+  end function resident_bytes
+
+  !> The name of this host; 'unknown' if the system does not tell.
+  function host_name() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(256)
+    if (c_host_name(buffer, int(size(buffer), c_int)) == 0) then
+      text = from_c(buffer)
+    else
+      text = 'unknown'
+    end if
+  end function host_name
+
+  !> Whether stderr is a terminal.
+  logical function stderr_is_terminal()
+    stderr_is_terminal = c_stderr_is_terminal() == 1
+  end function stderr_is_terminal
+
+  !> Sets an environment variable unless it is set already.
+  subroutine default_environment(name, value)
+    character(len=*), intent(in) :: name, value
+    integer(c_int) :: ignored
+    ignored = c_default_environment(name//c_null_char, value//c_null_char)
+  end subroutine default_environment
+
+  !> Gives the core away for at least this long.
+  subroutine sleep_microseconds(microseconds)
+    integer, intent(in) :: microseconds
+    call c_sleep_microseconds(int(microseconds, c_int))
+  end subroutine sleep_microseconds
+
+  !> Ends the program with this exit code.
+  subroutine exit_program(code)
+    integer, intent(in) :: code
+    call c_exit(int(code, c_int))
+  end subroutine exit_program
+
+  !> The characters before the first null.
+  pure function from_c(buffer) result(text)
+    character(kind=c_char), intent(in) :: buffer(:)
+    character(len=:), allocatable :: text
+    integer :: length, i
+    length = size(buffer)
+    do i = 1, size(buffer)
+      if (buffer(i) == c_null_char) then
+        length = i - 1
+        exit
+      end if
+    end do
+    allocate (character(len=length) :: text)
+    do i = 1, length
+      text(i:i) = buffer(i)
+    end do
+  end function from_c
+
+end module system

@@ -1,0 +1,203 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix basin`: where every point of a grid ends up.
+module basin_driver
+  use attractors, only: last_regime, regime_names
+  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use case_check, only: require_axes
+  use case_setup, only: automatic_tile, grid_of, output_path, span_of
+  use case_type, only: case_t
+  use catalogue_search, only: search_catalogues
+  use command_line, only: command_t
+  use errors, only: error_t
+  use file_layout, only: add_axes, add_catalogue, add_map_variables
+  use grid, only: grid_t, point_slice
+  use journal, only: json_text
+  use kinds, only: int64, wp
+  use map_file, only: map_file_t
+  use map_schema, only: name_length, schema_t
+  use session, only: describe_file, open_session, session_t
+  use status, only: last_reason, exit_done, reason_names
+  use system, only: monotonic_seconds
+  use text, only: to_text
+  use tiled_run, only: finish_tiles, open_tiles, plan_text, point_work_t, run_tiles
+  use trajectory, only: span_t
+  implicit none
+  private
+
+  public :: run_basin
+
+  !> Bytes of a point in the working file.
+  integer, parameter :: bytes_per_point = 1 + 2 + 1 + 2 + 8 + 8*4
+  integer, parameter :: pilot_points = 64
+
+  type, extends(point_work_t), public :: basin_work_t
+    type(grid_t) :: grid
+    type(span_t) :: span
+    integer :: max_period = 16
+    type(catalogue_t), allocatable :: catalogues(:)
+    type(slice_cache_t) :: cache
+    !> Points per regime, per reason, and per entry of the catalogue.
+    integer(int64) :: regimes(0:last_regime) = 0, reasons(0:last_reason) = 0
+    integer(int64), allocatable :: captured(:)
+    !> Entries of the catalogue before each slice.
+    integer, allocatable :: offset(:)
+  contains
+    procedure :: compute => compute_basin_point
+    procedure :: note => note_basin_point
+  end type basin_work_t
+
+contains
+
+  !> Runs the command; ends the program with the exit code on errors.
+  subroutine run_basin(command)
+    type(command_t), intent(in) :: command
+    type(session_t) :: session
+    type(basin_work_t) :: work
+    type(map_file_t) :: file
+    type(schema_t) :: schema, extra
+    type(error_t), allocatable :: error
+    character(len=name_length), allocatable :: dimensions(:)
+    integer, allocatable :: tile(:)
+    logical :: complete
+    call open_session(command, session)
+    call require_axes(session%the_case, error)
+    call session%stop_if(error)
+    work%variables = basin_variables
+    work%grid = grid_of(session%the_case, session%the_case%axes)
+    work%span = span_of(session%the_case)
+    work%max_period = session%the_case%attractors%max_period
+    tile = automatic_tile(work%grid, session%the_case%tile)
+    if (command%validate) then
+      call session%journal%line('valid', command%path//' is a valid case for basin')
+      call session%end_with(exit_done)
+    end if
+    call search_catalogues(session%team, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
+    call session%stop_if(error)
+    call prepare_counts(work)
+    if (command%dry_run) call report_plan(session, work, tile)
+    call report_catalogue(session, work)
+    call describe_file(session, 'basin', schema)
+    call add_axes(schema, work%grid%axes, dimensions)
+    call add_map_variables(schema, '', dimensions)
+    call open_tiles(session, output_path(command%output, command%path), schema, dimensions, tile, file)
+    call run_tiles(session, file, work, complete)
+    call sum_counts(session, work)
+    call add_catalogue(extra, work%catalogues, work%captured)
+    call finish_tiles(session, file, complete, extra)
+    call report_shares(session, work)
+    call session%end_with(exit_done)
+  end subroutine run_basin
+
+  subroutine prepare_counts(work)
+    type(basin_work_t), intent(inout) :: work
+    integer :: i
+    allocate (work%offset(size(work%catalogues) + 1))
+    work%offset(1) = 0
+    do i = 1, size(work%catalogues)
+      work%offset(i + 1) = work%offset(i) + size(work%catalogues(i)%attractors)
+    end do
+    allocate (work%captured(work%offset(size(work%offset))), source=0_int64)
+  end subroutine prepare_counts
+
+  subroutine compute_basin_point(self, index, values, error)
+    class(basin_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    real(wp), intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    call basin_point(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
+  end subroutine compute_basin_point
+
+  subroutine note_basin_point(self, index, values)
+    class(basin_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    real(wp), intent(in) :: values(:)
+    integer(int64) :: slice
+    integer :: k
+    associate (regime => nint(values(1)), label => nint(values(2)), reason => nint(values(3)))
+      self%regimes(regime) = self%regimes(regime) + 1
+      self%reasons(reason) = self%reasons(reason) + 1
+      if (label == 0 .or. size(self%catalogues) == 0) return
+      slice = point_slice(self%grid, index) + 1
+      do k = 1, size(self%catalogues(slice)%attractors)
+        if (self%catalogues(slice)%attractors(k)%id == label) &
+          self%captured(self%offset(slice) + k) = self%captured(self%offset(slice) + k) + 1
+      end do
+    end associate
+  end subroutine note_basin_point
+
+  subroutine sum_counts(session, work)
+    type(session_t), intent(in) :: session
+    type(basin_work_t), intent(inout) :: work
+    call session%team%sum(work%regimes)
+    call session%team%sum(work%reasons)
+    if (size(work%captured) > 0) call session%team%sum(work%captured)
+  end subroutine sum_counts
+
+  !> Says what a dry run would do, with a rate from a few points, and ends the program.
+  subroutine report_plan(session, work, tile)
+    type(session_t), intent(inout) :: session
+    type(basin_work_t), intent(inout) :: work
+    integer, intent(in) :: tile(:)
+    type(error_t), allocatable :: error
+    real(wp) :: values(basin_variables), start
+    integer :: index(size(work%grid%shape)), i, k
+    start = monotonic_seconds()
+    do i = 1, pilot_points
+      do k = 1, size(index)
+        index(k) = 1 + int(modulo(0.5_wp + i*sqrt(real(k + 1, wp)) + i*0.6180339887498949_wp, 1.0_wp) &
+                           *work%grid%shape(k))
+      end do
+      call work%compute(index, values, error)
+      call session%stop_if(error)
+    end do
+    call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_point, &
+                              (monotonic_seconds() - start)/pilot_points))
+    call session%end_with(exit_done)
+  end subroutine report_plan
+
+  subroutine report_catalogue(session, work)
+    type(session_t), intent(inout) :: session
+    type(basin_work_t), intent(in) :: work
+    integer :: i, k, last
+    if (size(work%catalogues) == 0) then
+      call session%journal%line('catalogue', 'no start is an axis: every point has its own attractor, unlabelled')
+      return
+    end if
+    last = 0
+    do i = 1, size(work%catalogues)
+      last = max(last, maxval([0, work%catalogues(i)%attractors%id]))
+    end do
+    call session%journal%line('catalogue', to_text(last)//' attractors in '//to_text(size(work%catalogues))// &
+      trim(merge(' slices', ' slice ', size(work%catalogues) > 1))//' discovered', '"attractors": '//to_text(last))
+    if (size(work%catalogues) > 1) return
+    do k = 1, size(work%catalogues(1)%attractors)
+      associate (a => work%catalogues(1)%attractors(k))
+        call session%journal%line('attractor', '  '//to_text(a%id)//': '//trim(regime_names(a%features%regime))// &
+          ', period '//to_text(a%period)//', amplitude '//to_text(a%features%amplitude, 5)//' m, '// &
+          to_text(a%features%impacts_per_period, 4)//' impacts per period, multiplier '//to_text(a%multiplier, 4))
+      end associate
+    end do
+  end subroutine report_catalogue
+
+  subroutine report_shares(session, work)
+    type(session_t), intent(inout) :: session
+    type(basin_work_t), intent(in) :: work
+    integer :: i
+    real(wp) :: share
+    do i = 0, last_regime
+      if (work%regimes(i) == 0) cycle
+      share = 100*real(work%regimes(i), wp)/sum(work%regimes)
+      call session%journal%line('share', '  '//trim(regime_names(i))//': '//to_text(share, 6)//' % ('// &
+        to_text(work%regimes(i))//' points)', '"regime": '//json_text(trim(regime_names(i)))//', "percent": '// &
+        to_text(share)//', "points": '//to_text(work%regimes(i)))
+    end do
+    do i = 0, last_reason
+      if (work%reasons(i) > 0) call session%journal%line('reason', '  ended as '//trim(reason_names(i))//': '// &
+        to_text(work%reasons(i))//' points', '"reason": '//json_text(trim(reason_names(i)))//', "points": '// &
+        to_text(work%reasons(i)))
+    end do
+  end subroutine report_shares
+
+end module basin_driver

@@ -1,0 +1,182 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The variables of each kind of file, as docs/file-format.md lists them.
+module file_layout
+  use attractors, only: last_regime, attractor_t, regime_names
+  use axis, only: axis_t
+  use basin, only: catalogue_t
+  use kinds, only: int64, wp
+  use map_schema, only: name_length, schema_t, type_float32, type_float64, type_int16, type_int32, &
+    type_int64, type_int8
+  use motion_state, only: event_names
+  use status, only: last_reason, reason_names
+  use text, only: join, replace_all
+  implicit none
+  private
+
+  public :: axis_dimension, add_axes, add_map_variables, add_catalogue, add_regime, add_reason, add_events
+
+  character(len=*), parameter, public :: coded_unit = '1'
+
+contains
+
+  !> Name of an axis in a file.
+  pure function axis_dimension(name) result(dimension)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: dimension
+    dimension = replace_all(trim(name), '.', '_')
+  end function axis_dimension
+
+  !> Dimensions and coordinate variables of the axes; returns the dimension names.
+  subroutine add_axes(schema, axes, dimensions)
+    type(schema_t), intent(inout) :: schema
+    type(axis_t), intent(in) :: axes(:)
+    character(len=name_length), allocatable, intent(out) :: dimensions(:)
+    integer :: i
+    allocate (dimensions(size(axes)))
+    do i = 1, size(axes)
+      dimensions(i) = axis_dimension(axes(i)%name)
+      call schema%add_dimension(trim(dimensions(i)), size(axes(i)%values, kind=int64))
+      call schema%add_variable(trim(dimensions(i)), type_float64, [dimensions(i)], units=axes(i)%unit, &
+                               long_name=axis_meaning(axes(i)%name), data=axes(i)%values)
+    end do
+  end subroutine add_axes
+
+  pure function axis_meaning(name) result(meaning)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: meaning
+    select case (name)
+    case ('x0')
+      meaning = 'initial position'
+    case ('v0')
+      meaning = 'initial velocity'
+    case ('crank_angle')
+      meaning = 'initial crank angle'
+    case ('drive.ratio')
+      meaning = 'drive angular frequency over natural angular frequency'
+    case default
+      meaning = replace_all(replace_all(trim(name), '.', ' '), '_', ' ')
+    end select
+  end function axis_meaning
+
+  !> Regime with its codes.
+  subroutine add_regime(schema, name, dimensions, tiled)
+    type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in) :: name, dimensions(:)
+    logical, intent(in) :: tiled
+    integer :: i
+    call schema%add_variable(name, type_int8, dimensions, units=coded_unit, &
+      long_name='regime of the motion', flag_values=[(i, i=0, last_regime)], &
+      flag_meanings=join(regime_names, ' '), tiled=tiled)
+  end subroutine add_regime
+
+  !> Why trajectories ended, with codes.
+  subroutine add_reason(schema, name, dimensions, tiled)
+    type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in) :: name, dimensions(:)
+    logical, intent(in) :: tiled
+    integer :: i
+    call schema%add_variable(name, type_int8, dimensions, units=coded_unit, &
+      long_name='why the trajectory ended', flag_values=[(i, i=0, last_reason)], &
+      flag_meanings=join(reason_names, ' '), tiled=tiled)
+  end subroutine add_reason
+
+  !> The variables of a map's points, in the order of `outcome_values`; names get `prefix`.
+  subroutine add_map_variables(schema, prefix, dimensions)
+    type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in) :: prefix, dimensions(:)
+    call add_regime(schema, prefix//'regime', dimensions, .true.)
+    call add('attractor', type_int16, '1', 'label of the attractor in the catalogue, 0 = none')
+    call add_reason(schema, prefix//'reason', dimensions, .true.)
+    call add('period', type_int16, '1', 'period in drive periods, 0 = not periodic')
+    call add('event_word', type_int64, '1', 'events of one period of the motion, three bits each')
+    call add('impacts_per_period', type_float32, '1', 'impacts per drive period')
+    call add('mean_impact_speed', type_float32, 'm/s', 'mean speed just before impact')
+    call add('amplitude', type_float32, 'm', 'half the range of the position')
+    call add('x_max', type_float32, 'm', 'largest position')
+    call add('x_min', type_float32, 'm', 'smallest position')
+    call add('v_max', type_float32, 'm/s', 'largest velocity towards the upper barrier')
+    call add('settle_time', type_float32, 's', 'time from the start to capture by the attractor')
+    call add('grazing_margin', type_float32, 'm', &
+             'smallest distance to a barrier at a turning point that missed it')
+
+  contains
+
+    subroutine add(name, type, units, long_name)
+      character(len=*), intent(in) :: name, units, long_name
+      integer, intent(in) :: type
+      call schema%add_variable(prefix//name, type, dimensions, units=units, long_name=long_name, tiled=.true.)
+    end subroutine add
+
+  end subroutine add_map_variables
+
+  !> The catalogue as a table; `counts(entry)` = points captured.
+  subroutine add_catalogue(schema, catalogues, counts)
+    type(schema_t), intent(inout) :: schema
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer(int64), intent(in) :: counts(:)
+    type(attractor_t), allocatable :: all_of_them(:)
+    integer, allocatable :: slice(:)
+    integer :: i
+    allocate (all_of_them(0), slice(0))
+    do i = 1, size(catalogues)
+      all_of_them = [all_of_them, catalogues(i)%attractors]
+      slice = [slice, spread(i - 1, 1, size(catalogues(i)%attractors))]
+    end do
+    if (size(all_of_them) == 0) return
+    call schema%add_dimension('entry', size(all_of_them, kind=int64))
+    call add('slice', type_int32, '1', 'slice of the parameter axes, C order from 0', real(slice, wp))
+    call add('attractor', type_int16, '1', 'label', real(all_of_them%id, wp))
+    call add('regime', type_int8, '1', 'regime, coded as in the map', real(all_of_them%features%regime, wp))
+    call add('period', type_int16, '1', 'period in drive periods', real(all_of_them%period, wp))
+    call add('event_word', type_int64, '1', 'events of one period', real(all_of_them%features%word, wp))
+    call add('x', type_float64, 'm', 'position at the section, crank angle 0', all_of_them%points(1, 1))
+    call add('v', type_float64, 'm/s', 'velocity at the section, crank angle 0', all_of_them%points(2, 1))
+    call add('multiplier', type_float64, '1', 'largest modulus of the multipliers', all_of_them%multiplier)
+    call add('capture_radius', type_float64, '1', 'radius of the neighbourhood found to contract', &
+             all_of_them%capture_radius)
+    call add('amplitude', type_float64, 'm', 'half the range of the position', all_of_them%features%amplitude)
+    call add('x_max', type_float64, 'm', 'largest position', all_of_them%features%x_max)
+    call add('x_min', type_float64, 'm', 'smallest position', all_of_them%features%x_min)
+    call add('v_max', type_float64, 'm/s', 'largest velocity', all_of_them%features%v_max)
+    call add('impacts_per_period', type_float64, '1', 'impacts per drive period', &
+             all_of_them%features%impacts_per_period)
+    call add('mean_impact_speed', type_float64, 'm/s', 'mean speed before impact', &
+             all_of_them%features%mean_impact_speed)
+    call add('grazing_margin', type_float64, 'm', 'smallest distance to a barrier missed', &
+             all_of_them%features%grazing_margin)
+    call add('count', type_int64, '1', 'points of the map captured', real(counts, wp))
+
+  contains
+
+    subroutine add(name, type, units, long_name, data)
+      character(len=*), intent(in) :: name, units, long_name
+      integer, intent(in) :: type
+      real(wp), intent(in) :: data(:)
+      call schema%add_variable(name, type, ['entry'], units=units, long_name=long_name, data=data, &
+                               group='catalogue')
+    end subroutine add
+
+  end subroutine add_catalogue
+
+  !> The events of a trajectory: rows of `data` are time, x, v before, v after.
+  subroutine add_events(schema, kinds_of_event, data)
+    type(schema_t), intent(inout) :: schema
+    integer, intent(in) :: kinds_of_event(:)
+    real(wp), intent(in) :: data(:, :)
+    integer :: i
+    call schema%add_dimension('event', size(kinds_of_event, kind=int64))
+    call schema%add_variable('event_kind', type_int8, ['event'], units=coded_unit, long_name='kind of event', &
+      flag_values=[(i, i=1, size(event_names))], flag_meanings=join(event_names, ' '), &
+      data=real(kinds_of_event, wp))
+    call schema%add_variable('event_time', type_float64, ['event'], units='s', long_name='time of the event', &
+                             data=data(1, :))
+    call schema%add_variable('event_x', type_float64, ['event'], units='m', long_name='position', data=data(2, :))
+    call schema%add_variable('event_v_before', type_float64, ['event'], units='m/s', &
+                             long_name='velocity just before', data=data(3, :))
+    call schema%add_variable('event_v_after', type_float64, ['event'], units='m/s', &
+                             long_name='velocity just after', data=data(4, :))
+  end subroutine add_events
+
+end module file_layout

@@ -1,0 +1,260 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix info`: what is in a file.
+module info_driver
+  use attractors, only: regime_names
+  use errors, only: error_t
+  use event_words, only: word_text
+  use journal, only: json_text
+  use kinds, only: int64, wp
+  use map_reader, only: open_final, reader_t, variable_info_t
+  use slabs, only: slab, slab_count
+  use status, only: reason_names
+  use text, only: join, to_text
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  implicit none
+  private
+
+  public :: run_info, count_codes
+
+  character(len=*), parameter :: root_texts(6) = [character(len=14) :: 'kind', 'title', 'source', 'date_created', &
+    'format_version', 'complete']
+  character(len=*), parameter :: provenance_texts(8) = [character(len=12) :: 'commit', 'compiler', 'mpi', 'hdf5', &
+    'hosts', 'started', 'finished', 'command_line']
+  character(len=*), parameter :: catalogue_columns(8) = [character(len=18) :: 'attractor', 'slice', 'regime', &
+    'period', 'event_word', 'amplitude', 'impacts_per_period', 'count']
+
+contains
+
+  !> Prints the content of a file; a working file can be looked at as well.
+  subroutine run_info(path, json, error)
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: json
+    type(error_t), allocatable, intent(out) :: error
+    type(reader_t) :: reader
+    type(variable_info_t), allocatable :: variables(:)
+    character(len=:), allocatable :: body
+    call open_final(path, reader, error)
+    if (allocated(error)) return
+    call reader%variables(variables, error)
+    if (allocated(error)) return
+    body = ''
+    call add_attributes(reader, json, body, error)
+    if (.not. allocated(error)) call add_variables(variables, json, body)
+    if (.not. allocated(error)) call add_codes(reader, json, 'regime', regime_names, body, error)
+    if (.not. allocated(error)) call add_codes(reader, json, 'reason', reason_names, body, error)
+    if (.not. allocated(error)) call add_catalogue(reader, json, body, error)
+    if (.not. allocated(error)) call add_limits(reader, json, body, error)
+    if (allocated(error)) return
+    call reader%close(error)
+    if (allocated(error)) return
+    if (json) then
+      write (output_unit, '(a)') '{"path": '//json_text(path)//body//'}'
+    else
+      write (output_unit, '(a)') path//body
+    end if
+  end subroutine run_info
+
+  subroutine add_attributes(reader, json, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    do i = 1, size(root_texts)
+      call add_one('/', trim(root_texts(i)))
+      if (allocated(error)) return
+    end do
+    do i = 1, size(provenance_texts)
+      call add_one('/provenance', trim(provenance_texts(i)))
+      if (allocated(error)) return
+    end do
+
+  contains
+
+    subroutine add_one(object, name)
+      character(len=*), intent(in) :: object, name
+      character(len=:), allocatable :: text
+      real(wp) :: number
+      if (.not. reader%has_attribute(object, name)) return
+      if (name == 'format_version' .or. name == 'complete') then
+        call reader%number_attribute(object, name, number, error)
+        if (.not. allocated(error)) text = to_text(nint(number))
+      else
+        call reader%text_attribute(object, name, text, error)
+        if (.not. allocated(error) .and. json) text = json_text(text)
+      end if
+      if (allocated(error)) return
+      if (json) then
+        body = body//', "'//name//'": '//text
+      else
+        body = body//new_line('a')//'  '//name//': '//text
+      end if
+    end subroutine add_one
+
+  end subroutine add_attributes
+
+  subroutine add_variables(variables, json, body)
+    type(variable_info_t), intent(in) :: variables(:)
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    character(len=:), allocatable :: name, shape_text
+    integer :: i, k
+    if (json) body = body//', "variables": ['
+    if (.not. json) body = body//new_line('a')//'  variables:'
+    do i = 1, size(variables)
+      name = variables(i)%name
+      if (len(variables(i)%group) > 0) name = variables(i)%group//'/'//name
+      shape_text = ''
+      do k = 1, size(variables(i)%lengths)
+        if (k > 1) shape_text = shape_text//', '
+        shape_text = shape_text//to_text(variables(i)%lengths(k))
+      end do
+      if (json) then
+        if (i > 1) body = body//', '
+        body = body//'{"name": '//json_text(name)//', "type": '//json_text(variables(i)%type)//', "shape": ['// &
+          shape_text//']}'
+      else
+        body = body//new_line('a')//'    '//name//' ('//shape_text//') '//variables(i)%type
+      end if
+    end do
+    if (json) body = body//']'
+  end subroutine add_variables
+
+  !> Shares of the codes of a variable, or of its `branch_` twin in a sweep.
+  subroutine add_codes(reader, json, variable, names, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=*), intent(in) :: variable, names(0:)
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: path
+    integer(int64) :: counts(0:ubound(names, 1))
+    integer :: i
+    logical :: first
+    path = '/'//variable
+    if (reader%has('/branch_'//variable)) path = '/branch_'//variable
+    if (.not. reader%has(path)) return
+    call count_codes(reader, path, counts, error)
+    if (allocated(error)) return
+    if (json) body = body//', "'//path(2:)//'": {'
+    if (.not. json) body = body//new_line('a')//'  '//path(2:)//':'
+    first = .true.
+    do i = 0, ubound(names, 1)
+      if (counts(i) == 0) cycle
+      if (json) then
+        if (.not. first) body = body//', '
+        body = body//json_text(trim(names(i)))//': {"points": '//to_text(counts(i))//', "percent": '// &
+          to_text(100*real(counts(i), wp)/sum(counts))//'}'
+      else
+        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(counts(i))//' points, '// &
+          to_text(100*real(counts(i), wp)/sum(counts), 6)//' %'
+      end if
+      first = .false.
+    end do
+    if (json) body = body//'}'
+  end subroutine add_codes
+
+  !> How often each code from 0 occurs in a variable; codes outside the table are not counted.
+  subroutine count_codes(reader, path, counts, error)
+    type(reader_t), intent(in) :: reader
+    character(len=*), intent(in) :: path
+    integer(int64), intent(out) :: counts(0:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), allocatable :: lengths(:), lower(:), extent(:)
+    real(wp), allocatable :: values(:)
+    integer(int64) :: k
+    integer :: i
+    counts = 0
+    call reader%lengths(path, lengths, error)
+    if (allocated(error)) return
+    allocate (lower(size(lengths)), extent(size(lengths)))
+    do k = 1, slab_count(lengths)
+      call slab(lengths, k, lower, extent)
+      call reader%read_block(path, lower, extent, values, error)
+      if (allocated(error)) return
+      do i = 0, ubound(counts, 1)
+        counts(i) = counts(i) + count(nint(values) == i)
+      end do
+    end do
+  end subroutine count_codes
+
+  subroutine add_catalogue(reader, json, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: column(:), table(:, :)
+    character(len=:), allocatable :: line
+    integer :: i, k
+    if (.not. reader%has('/catalogue/attractor')) return
+    do k = 1, size(catalogue_columns)
+      call reader%read_values('/catalogue/'//trim(catalogue_columns(k)), column, error)
+      if (allocated(error)) return
+      if (k == 1) allocate (table(size(column), size(catalogue_columns)))
+      table(:, k) = column
+    end do
+    if (json) body = body//', "catalogue": ['
+    if (.not. json) body = body//new_line('a')//'  catalogue (R, L: impact at upper, lower barrier; S: stick; '// &
+      'C, D: chatter; . : end of a period):'
+    do i = 1, size(table, 1)
+      line = ''
+      do k = 1, size(catalogue_columns)
+        if (len(line) > 0) line = line//', '
+        if (json) line = line//json_text(trim(catalogue_columns(k)))//': '
+        if (.not. json) line = line//trim(catalogue_columns(k))//' '
+        select case (catalogue_columns(k))
+        case ('regime')
+          line = line//quoted(trim(regime_names(nint(table(i, k)))))
+        case ('event_word')
+          line = line//quoted(word_text(nint(table(i, k), int64)))
+        case ('amplitude', 'impacts_per_period')
+          line = line//to_text(table(i, k), 6)
+        case default
+          line = line//to_text(nint(table(i, k), int64))
+        end select
+      end do
+      if (json) body = body//trim(merge(', ', '  ', i > 1))//'{'//line//'}'
+      if (.not. json) body = body//new_line('a')//'    '//line
+    end do
+    if (json) body = body//']'
+
+  contains
+
+    function quoted(text)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: quoted
+      quoted = text
+      if (json) quoted = json_text(text)
+    end function quoted
+
+  end subroutine add_catalogue
+
+  subroutine add_limits(reader, json, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names(:)
+    real(wp), allocatable :: lower(:), upper(:)
+    integer :: i
+    if (.not. reader%has('/limits/name')) return
+    call reader%read_strings('/limits/name', names, error)
+    if (.not. allocated(error)) call reader%read_values('/limits/lower', lower, error)
+    if (.not. allocated(error)) call reader%read_values('/limits/upper', upper, error)
+    if (allocated(error)) return
+    if (json) body = body//', "limits": ['
+    if (.not. json) body = body//new_line('a')//'  limits:'
+    do i = 1, size(names)
+      if (json) then
+        body = body//trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))//', "lower": '// &
+          to_text(lower(i))//', "upper": '//to_text(upper(i))//'}'
+      else
+        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(lower(i), 6)//' .. '//to_text(upper(i), 6)
+      end if
+    end do
+    if (json) body = body//']'
+  end subroutine add_limits
+
+end module info_driver

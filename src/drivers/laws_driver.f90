@@ -1,0 +1,107 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix laws`: the table of laws, for people and as JSON.
+module laws_driver
+  use journal, only: json_text
+  use kinds, only: wp
+  use law_table, only: families, laws, parameter_row_t, parameters_of
+  use text, only: to_text
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  implicit none
+  private
+
+  public :: run_laws
+
+contains
+
+  !> Prints every law with parameters, units, bounds and source.
+  subroutine run_laws(json)
+    logical, intent(in) :: json
+    integer :: i, k
+    logical :: first
+    if (json) write (output_unit, '(a)') '['
+    first = .true.
+    do k = 1, size(families)
+      if (.not. json) write (output_unit, '(a)') '['//trim(families(k))//']'
+      do i = 1, size(laws)
+        if (laws(i)%family /= families(k)) cycle
+        if (json) then
+          call print_json(i, first)
+        else
+          call print_plain(i)
+        end if
+        first = .false.
+      end do
+    end do
+    if (json) write (output_unit, '(a)') ']'
+  end subroutine run_laws
+
+  subroutine print_plain(law)
+    integer, intent(in) :: law
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    associate (row => laws(law))
+      write (output_unit, '(a)') '  law = "'//trim(row%name)//'": '//trim(row%meaning)
+      if (len_trim(row%source) > 0) write (output_unit, '(a)') '    source: '//trim(row%source)
+      rows = parameters_of(trim(row%family), trim(row%name))
+    end associate
+    do i = 1, size(rows)
+      write (output_unit, '(4x,a20,1x,a6,1x,a)') rows(i)%name, rows(i)%unit, &
+        range_text(rows(i))//default_text(rows(i))//': '//trim(rows(i)%meaning)
+    end do
+  end subroutine print_plain
+
+  subroutine print_json(law, first)
+    integer, intent(in) :: law
+    logical, intent(in) :: first
+    type(parameter_row_t), allocatable :: rows(:)
+    character(len=:), allocatable :: list
+    integer :: i
+    associate (row => laws(law))
+      rows = parameters_of(trim(row%family), trim(row%name))
+      list = ''
+      do i = 1, size(rows)
+        if (i > 1) list = list//', '
+        list = list//'{"name": '//json_text(trim(rows(i)%name))//', "unit": '//json_text(trim(rows(i)%unit))// &
+          ', "lower": '//bound_json(rows(i)%lower)//', "upper": '//bound_json(rows(i)%upper)// &
+          ', "lower_open": '//to_text(rows(i)%lower_open)//', "list": '//to_text(rows(i)%list)// &
+          ', "optional": '//to_text(rows(i)%optional)//', "meaning": '//json_text(trim(rows(i)%meaning))//'}'
+      end do
+      write (output_unit, '(a)') trim(merge('  ', ', ', first))//'{"family": '//json_text(trim(row%family))// &
+        ', "law": '//json_text(trim(row%name))//', "meaning": '//json_text(trim(row%meaning))//', "source": '// &
+        json_text(trim(row%source))//', "parameters": ['//list//']}'
+    end associate
+  end subroutine print_json
+
+  pure function bound_json(bound) result(text)
+    real(wp), intent(in) :: bound
+    character(len=:), allocatable :: text
+    text = 'null'
+    if (abs(bound) < huge(bound)) text = to_text(bound)
+  end function bound_json
+
+  pure function range_text(row) result(text)
+    type(parameter_row_t), intent(in) :: row
+    character(len=:), allocatable :: text
+    text = ''
+    if (row%lower > -huge(row%lower)) text = trim(merge('> ', '>=', row%lower_open))//' '//to_text(row%lower)
+    if (row%upper < huge(row%upper)) then
+      if (len(text) > 0) text = text//', '
+      text = text//'<= '//to_text(row%upper)
+    end if
+    if (len(text) == 0) text = 'any'
+    if (row%list) text = 'list, each '//text
+  end function range_text
+
+  pure function default_text(row) result(text)
+    type(parameter_row_t), intent(in) :: row
+    character(len=:), allocatable :: text
+    text = ''
+    if (.not. row%optional) return
+    text = ' (optional'
+    if (row%default >= row%lower .and. abs(row%default) < huge(row%default)) text = text//', default '//to_text(row%default)
+    text = text//')'
+  end function default_text
+
+end module laws_driver

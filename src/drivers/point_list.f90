@@ -1,0 +1,184 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Reads a list of starts: CSV with a header of x0, v0 and optionally ratio, in any order.
+module point_list
+  use contact_law, only: contact_t
+  use errors, only: error_t, fail
+  use kinds, only: wp
+  use status, only: exit_bad_case, exit_no_input
+  use text, only: replace_all, to_text
+  implicit none
+  private
+
+  public :: read_point_list
+
+  integer, parameter :: longest_line = 1024
+
+  type, public :: point_list_t
+    !> Starts [m, m/s] and drive ratio of each.
+    real(wp), allocatable :: x0(:), v0(:), ratio(:)
+    integer :: points = 0
+  end type point_list_t
+
+contains
+
+  !> Reads `path`; without a column `ratio` every point has `default_ratio`. Errors name the line, what was found
+  !> and what is allowed: code 66 for a missing file, 65 for its content.
+  subroutine read_point_list(path, default_ratio, contact, list, error)
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: default_ratio
+    type(contact_t), intent(in) :: contact
+    type(point_list_t), intent(out) :: list
+    type(error_t), allocatable, intent(out) :: error
+    character(len=longest_line) :: line
+    character(len=256) :: message
+    real(wp) :: row(3)
+    integer :: unit, status, number, columns(3), width
+    allocate (list%x0(0), list%v0(0), list%ratio(0))
+    open (newunit=unit, file=path, status='old', action='read', iostat=status, iomsg=message)
+    if (status /= 0) then
+      call fail(error, exit_no_input, "list of points '"//path//"': "//trim(message))
+      return
+    end if
+    number = 0
+    columns = -1
+    do
+      read (unit, '(a)', iostat=status) line
+      if (status /= 0) exit
+      number = number + 1
+      line = replace_all(trim(line), achar(13), '')
+      if (len_trim(line) == 0 .or. line(1:1) == '#') cycle
+      if (columns(1) < 0) then
+        call read_header(path, number, trim(line), columns, width, error)
+      else
+        call read_row(path, number, trim(line), columns, width, default_ratio, contact, row, error)
+        if (.not. allocated(error)) call append(list, row)
+      end if
+      if (allocated(error)) exit
+    end do
+    close (unit)
+    if (allocated(error)) return
+    if (columns(1) < 0 .or. list%points == 0) call fail(error, exit_bad_case, path// &
+      ': found no points, needed is a header x0,v0 (optionally ratio) and a line per point')
+    list%x0 = list%x0(:list%points)
+    list%v0 = list%v0(:list%points)
+    list%ratio = list%ratio(:list%points)
+  end subroutine read_point_list
+
+  !> Positions of x0, v0, ratio in the header; 0 for an absent ratio.
+  subroutine read_header(path, number, line, columns, width, error)
+    character(len=*), intent(in) :: path, line
+    integer, intent(in) :: number
+    integer, intent(out) :: columns(3), width
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name
+    integer :: column
+    columns = 0
+    width = count_fields(line)
+    do column = 1, width
+      name = field(line, column)
+      select case (name)
+      case ('x0')
+        call take(1)
+      case ('v0')
+        call take(2)
+      case ('ratio')
+        call take(3)
+      case default
+        call fail(error, exit_bad_case, path//':'//to_text(number)//": found column '"//name// &
+                  "', allowed are x0, v0, ratio")
+        return
+      end select
+    end do
+    if (.not. allocated(error) .and. any(columns(:2) == 0)) call fail(error, exit_bad_case, path//':'// &
+      to_text(number)//": found the header '"//line//"', needed are the columns x0 and v0")
+
+  contains
+
+    subroutine take(which)
+      integer, intent(in) :: which
+      if (columns(which) > 0) call fail(error, exit_bad_case, path//':'//to_text(number)//": column '"//name// &
+                                        "' is repeated")
+      columns(which) = column
+    end subroutine take
+
+  end subroutine read_header
+
+  subroutine read_row(path, number, line, columns, width, default_ratio, contact, row, error)
+    character(len=*), intent(in) :: path, line
+    integer, intent(in) :: number, columns(3), width
+    real(wp), intent(in) :: default_ratio
+    type(contact_t), intent(in) :: contact
+    real(wp), intent(out) :: row(3)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: names(3) = [character(len=5) :: 'x0', 'v0', 'ratio']
+    character(len=:), allocatable :: where_found, word
+    integer :: k, status
+    where_found = path//':'//to_text(number)//': '
+    row = [0.0_wp, 0.0_wp, default_ratio]
+    if (count_fields(line) /= width) then
+      call fail(error, exit_bad_case, where_found//'found '//to_text(count_fields(line))//' values, the header has '// &
+                to_text(width)//' columns')
+      return
+    end if
+    do k = 1, 3
+      if (columns(k) == 0) cycle
+      word = field(line, columns(k))
+      status = verify(word, '0123456789.eEdD+-')
+      if (len(word) == 0) status = 1
+      if (status == 0) read (word, *, iostat=status) row(k)
+      if (status /= 0 .or. .not. abs(row(k)) <= huge(1.0_wp)) then
+        call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed is a finite number")
+        return
+      end if
+    end do
+    if (row(1) > contact%upper .or. row(1) < contact%lower) then
+      call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))// &
+                ' m, allowed is a position between the barriers')
+    else if (columns(3) > 0 .and. .not. row(3) > 0) then
+      call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed is a number above 0')
+    else if (columns(3) > 0 .and. .not. default_ratio > 0) then
+      call fail(error, exit_bad_case, where_found//'ratio: the case has no drive')
+    end if
+  end subroutine read_row
+
+  pure integer function count_fields(line)
+    character(len=*), intent(in) :: line
+    integer :: i
+    count_fields = 1
+    do i = 1, len(line)
+      if (line(i:i) == ',') count_fields = count_fields + 1
+    end do
+  end function count_fields
+
+  !> The words between commas, without blanks around them.
+  pure function field(line, number) result(word)
+    character(len=*), intent(in) :: line
+    integer, intent(in) :: number
+    character(len=:), allocatable :: word
+    integer :: from, i, comma
+    from = 1
+    do i = 2, number
+      from = from + index(line(from:), ',')
+    end do
+    comma = index(line(from:)//',', ',')
+    word = trim(adjustl(line(from:from + comma - 2)))
+  end function field
+
+  !> Adds a point; storage doubles when it is full.
+  subroutine append(list, row)
+    type(point_list_t), intent(inout) :: list
+    real(wp), intent(in) :: row(3)
+    if (list%points == size(list%x0)) then
+      list%x0 = [list%x0, spread(0.0_wp, 1, max(64, list%points))]
+      list%v0 = [list%v0, spread(0.0_wp, 1, max(64, list%points))]
+      list%ratio = [list%ratio, spread(0.0_wp, 1, max(64, list%points))]
+    end if
+    list%points = list%points + 1
+    list%x0(list%points) = row(1)
+    list%v0(list%points) = row(2)
+    list%ratio(list%points) = row(3)
+  end subroutine append
+
+end module point_list

@@ -1,0 +1,186 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix points`: a list of starts, each run for the whole duration.
+module points_driver
+  use attractors, only: attractor_t
+  use case_setup, only: grid_of, output_path, span_of
+  use command_line, only: command_t
+  use errors, only: error_t, fail
+  use file_layout, only: add_reason, add_regime
+  use files, only: check_folder, file_exists
+  use grid, only: grid_t, machine_with, slice_motion
+  use kinds, only: int64, wp
+  use map_file, only: map_file_t
+  use map_reader, only: open_final, reader_t
+  use map_schema, only: schema_t, type_float64, type_int32
+  use motion, only: motion_t
+  use point_list, only: point_list_t, read_point_list
+  use session, only: describe_file, open_session, session_t
+  use status, only: last_reason, exit_bad_case, exit_cannot_create, exit_done, exit_io, reason_names
+  use text, only: to_text
+  use tiled_run, only: finish_tiles, open_tiles, plan_text, point_work_t, run_tiles
+  use trajectory, only: outcome_t, run_trajectory, span_t
+  implicit none
+  private
+
+  public :: run_points
+
+  integer, parameter :: points_per_tile = 256
+  !> x, v, impacts, last impact speed, regime, reason.
+  integer, parameter :: point_variables = 6
+
+  type, extends(point_work_t) :: list_work_t
+    type(grid_t) :: grid
+    type(span_t) :: span
+    type(point_list_t) :: list
+    type(motion_t) :: moving
+    real(wp) :: ratio = -1
+    integer(int64) :: reasons(0:last_reason) = 0
+  contains
+    procedure :: compute => compute_list_point
+    procedure :: note => note_list_point
+  end type list_work_t
+
+contains
+
+  !> Runs the command; ends the program with the exit code on errors.
+  subroutine run_points(command)
+    type(command_t), intent(in) :: command
+    type(session_t) :: session
+    type(list_work_t) :: work
+    type(map_file_t) :: file
+    type(schema_t) :: schema, extra
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: path
+    integer :: i
+    logical :: complete
+    call open_session(command, session)
+    work%variables = point_variables
+    work%grid = grid_of(session%the_case, session%the_case%axes(:0))
+    work%span = span_of(session%the_case)
+    work%span%stop_when_captured = .false.
+    work%span%extension = 1
+    call slice_motion(work%grid, 0_int64, work%moving, error)
+    if (.not. allocated(error)) work%ratio = work%moving%machine%drive%ratio
+    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%moving%machine%contact, &
+                                                     work%list, error)
+    call session%stop_if(error)
+    path = output_path(command%output, command%path)
+    if (command%validate .or. command%dry_run) then
+      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], 8*7 + 4 + 2, &
+                                2e-4_wp*work%span%duration/50))
+      call session%end_with(exit_done)
+    end if
+    if (session%team%is_root() .and. len(command%csv) > 0) call check_csv(command, error)
+    call session%stop_if(error)
+    call describe_file(session, 'points', schema)
+    call describe_points(work%list, schema)
+    call open_tiles(session, path, schema, ['point'], [points_per_tile], file)
+    call run_tiles(session, file, work, complete)
+    call session%team%sum(work%reasons)
+    call finish_tiles(session, file, complete, extra)
+    if (session%team%is_root() .and. len(command%csv) > 0) call write_csv(command%csv, path, work%list, error)
+    call session%stop_if(error)
+    do i = 0, last_reason
+      if (work%reasons(i) > 0) call session%journal%line('reason', '  ended as '//trim(reason_names(i))//': '// &
+        to_text(work%reasons(i))//' points')
+    end do
+    if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
+    call session%end_with(exit_done)
+  end subroutine run_points
+
+  subroutine check_csv(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    if (file_exists(command%csv) .and. .not. (command%force .or. command%resume)) then
+      call fail(error, exit_cannot_create, "'"//command%csv//"' exists; --force replaces it")
+    else
+      call check_folder(command%csv, error)
+    end if
+  end subroutine check_csv
+
+  subroutine describe_points(list, schema)
+    type(point_list_t), intent(in) :: list
+    type(schema_t), intent(inout) :: schema
+    call schema%add_dimension('point', size(list%x0, kind=int64))
+    call add('x0', 'm', 'initial position', list%x0)
+    call add('v0', 'm/s', 'initial velocity', list%v0)
+    call add('ratio', '1', 'drive angular frequency over natural angular frequency', list%ratio)
+    call schema%add_variable('x', type_float64, ['point'], units='m', long_name='final position', tiled=.true.)
+    call schema%add_variable('v', type_float64, ['point'], units='m/s', long_name='final velocity', tiled=.true.)
+    call schema%add_variable('impacts', type_int32, ['point'], units='1', long_name='number of impacts', tiled=.true.)
+    call schema%add_variable('last_impact_speed', type_float64, ['point'], units='m/s', &
+                             long_name='speed just before the last impact, 0 without impacts', tiled=.true.)
+    call add_regime(schema, 'regime', ['point'], .true.)
+    call add_reason(schema, 'reason', ['point'], .true.)
+
+  contains
+
+    subroutine add(name, units, long_name, data)
+      character(len=*), intent(in) :: name, units, long_name
+      real(wp), intent(in) :: data(:)
+      call schema%add_variable(name, type_float64, ['point'], units=units, long_name=long_name, data=data)
+    end subroutine add
+
+  end subroutine describe_points
+
+  subroutine compute_list_point(self, index, values, error)
+    class(list_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    real(wp), intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(outcome_t) :: outcome
+    type(attractor_t) :: no_catalogue(0)
+    associate (ratio => self%list%ratio(index(1)))
+      if (abs(ratio - self%ratio) > 0) then
+        call machine_with(self%grid, 'drive.ratio', ratio, self%moving, error)
+        if (allocated(error)) return
+        self%ratio = ratio
+      end if
+    end associate
+    call run_trajectory(self%moving, no_catalogue, self%span, self%list%x0(index(1)), self%list%v0(index(1)), &
+                        self%grid%start(3), outcome)
+    values = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &
+              real(outcome%features%regime, wp), real(outcome%reason, wp)]
+  end subroutine compute_list_point
+
+  subroutine note_list_point(self, index, values)
+    class(list_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    real(wp), intent(in) :: values(:)
+    associate (unused => index, reason => nint(values(6)))
+      self%reasons(reason) = self%reasons(reason) + 1
+    end associate
+  end subroutine note_list_point
+
+  !> The table x0,v0,ratio,x,v,impacts,last_impact_speed,reason; numbers read back to the same bits.
+  subroutine write_csv(csv, path, list, error)
+    character(len=*), intent(in) :: csv, path
+    type(point_list_t), intent(in) :: list
+    type(error_t), allocatable, intent(out) :: error
+    type(reader_t) :: reader
+    real(wp), allocatable :: x(:), v(:), impacts(:), speed(:), reason(:)
+    integer :: unit, i, status
+    character(len=256) :: message
+    call open_final(path, reader, error)
+    if (.not. allocated(error)) call reader%read_values('/x', x, error)
+    if (.not. allocated(error)) call reader%read_values('/v', v, error)
+    if (.not. allocated(error)) call reader%read_values('/impacts', impacts, error)
+    if (.not. allocated(error)) call reader%read_values('/last_impact_speed', speed, error)
+    if (.not. allocated(error)) call reader%read_values('/reason', reason, error)
+    if (.not. allocated(error)) call reader%close(error)
+    if (allocated(error)) return
+    open (newunit=unit, file=csv, status='replace', action='write', iostat=status, iomsg=message)
+    if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) 'x0,v0,ratio,x,v,impacts,last_impact_speed,reason'
+    do i = 1, size(x)
+      if (status /= 0) exit
+      write (unit, '(a)', iostat=status, iomsg=message) to_text(list%x0(i))//','//to_text(list%v0(i))//','// &
+        to_text(list%ratio(i))//','//to_text(x(i))//','//to_text(v(i))//','//to_text(nint(impacts(i)))//','// &
+        to_text(speed(i))//','//trim(reason_names(nint(reason(i))))
+    end do
+    if (status == 0) close (unit, iostat=status, iomsg=message)
+    if (status /= 0) call fail(error, exit_io, "'"//csv//"': "//trim(message))
+  end subroutine write_csv
+
+end module points_driver

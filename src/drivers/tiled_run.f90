@@ -1,0 +1,221 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Computes a grid tile by tile on a team: working file, resumption, hand-out, progress, clean stop, final file.
+module tiled_run
+  use command_line, only: command_t
+  use errors, only: error_t
+  use journal, only: duration_text
+  use kinds, only: int64, wp
+  use map_file, only: create_working, map_file_t, open_working, working_path
+  use map_final, only: finalise
+  use map_schema, only: schema_t
+  use parallel, only: make_scheduler
+  use scheduler, only: scheduler_options_t, scheduler_t
+  use session, only: session_t
+  use status, only: exit_resumable
+  use system, only: monotonic_seconds
+  use text, only: to_text
+  use tiles, only: new_tiling, tiling_t
+  implicit none
+  private
+
+  public :: open_tiles, run_tiles, finish_tiles, plan_text
+
+  !> What is computed at the points of a grid.
+  type, abstract, public :: point_work_t
+    integer :: variables = 0
+  contains
+    procedure(compute_point), deferred :: compute
+    procedure(note_point), deferred :: note
+  end type point_work_t
+
+  abstract interface
+    !> Values of the point at `index` (from 1 along each axis).
+    subroutine compute_point(self, index, values, error)
+      import :: error_t, point_work_t, wp
+      class(point_work_t), intent(inout) :: self
+      integer, intent(in) :: index(:)
+      real(wp), intent(out) :: values(:)
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine compute_point
+
+    !> Counts a point that is done, computed now or read back after an interruption.
+    subroutine note_point(self, index, values)
+      import :: point_work_t, wp
+      class(point_work_t), intent(inout) :: self
+      integer, intent(in) :: index(:)
+      real(wp), intent(in) :: values(:)
+    end subroutine note_point
+  end interface
+
+contains
+
+  !> Opens the working file: a new one, or with --resume that of the interrupted run. Ends the program on errors.
+  subroutine open_tiles(session, path, schema, grid, tile_shape, file)
+    type(session_t), intent(inout) :: session
+    character(len=*), intent(in) :: path
+    type(schema_t), intent(in) :: schema
+    character(len=*), intent(in) :: grid(:)
+    integer, intent(in) :: tile_shape(:)
+    type(map_file_t), intent(out) :: file
+    type(error_t), allocatable :: error
+    if (session%command%resume) then
+      call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
+    else
+      call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
+                          error)
+    end if
+    call session%stop_if(error)
+  end subroutine open_tiles
+
+  !> Computes every tile that is not yet done. `complete` is false after a stop.
+  subroutine run_tiles(session, file, work, complete)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    class(point_work_t), intent(inout) :: work
+    logical, intent(out) :: complete
+    class(scheduler_t), allocatable :: scheduler
+    type(error_t), allocatable :: error
+    integer, allocatable :: todo(:)
+    integer(int64) :: total, before, computed(1)
+    integer :: tile, position
+    logical :: whole
+    todo = pack([(tile, tile=1, file%tile_count())], [(.not. file%tile_done(tile), tile=1, file%tile_count())])
+    total = product(file%tiling%lengths)
+    before = note_earlier(session, file, work)
+    if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(todo))// &
+      ' of '//to_text(file%tile_count())//' tiles were done before')
+    call make_scheduler(session%team, scheduler_options_t(session%command%time_limit, &
+                        session%command%ranks_per_node), scheduler, error)
+    if (.not. allocated(error)) call scheduler%start(size(todo), error)
+    call session%stop_if(error)
+    computed = 0
+    do
+      call scheduler%next(position)
+      if (position == 0) exit
+      call run_tile(session, file, work, todo(position), scheduler, total, before, size(todo), whole)
+      if (.not. whole) exit
+      computed = computed + 1
+    end do
+    call scheduler%finish()
+    call session%team%sum(computed)
+    complete = computed(1) == size(todo)
+  end subroutine run_tiles
+
+  !> One tile; left unwritten if a stop is requested on the way.
+  subroutine run_tile(session, file, work, tile, scheduler, total, before, todo, whole)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    class(point_work_t), intent(inout) :: work
+    integer, intent(in) :: tile, todo
+    class(scheduler_t), intent(inout) :: scheduler
+    integer(int64), intent(in) :: total, before
+    logical, intent(out) :: whole
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: values(:, :)
+    integer :: index(size(file%tiling%lengths)), point, points
+    integer(int64) :: lower(size(index)), extent(size(index)), done
+    call file%tiling%block_of(tile, lower, extent)
+    points = int(product(extent))
+    allocate (values(points, work%variables))
+    whole = .true.
+    do point = 1, points
+      index = index_in_block(lower, extent, point)
+      call work%compute(index, values(point, :), error)
+      call session%abort_if(error)
+      call scheduler%poll()
+      if (scheduler%stop_requested()) then
+        whole = .false.
+        return
+      end if
+      if (.not. session%journal%active) cycle
+      done = before + nint(real(total - before, wp)*scheduler%done_count()/max(todo, 1), int64)
+      call session%journal%progress(done, total, before)
+    end do
+    call file%write_tile(tile, values, error)
+    call session%abort_if(error)
+    do point = 1, points
+      call work%note(index_in_block(lower, extent, point), values(point, :))
+    end do
+  end subroutine run_tile
+
+  !> Counts the points of tiles that an interrupted run had done, shared among the ranks; returns their number.
+  integer(int64) function note_earlier(session, file, work) result(points)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    class(point_work_t), intent(inout) :: work
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: values(:, :)
+    integer(int64) :: lower(size(file%tiling%lengths)), extent(size(file%tiling%lengths))
+    integer :: tile, seen, point
+    points = 0
+    seen = 0
+    do tile = 1, file%tile_count()
+      if (.not. file%tile_done(tile)) cycle
+      call file%tiling%block_of(tile, lower, extent)
+      points = points + product(extent)
+      seen = seen + 1
+      if (modulo(seen, session%team%size()) /= session%team%rank()) cycle
+      call file%read_tile(tile, values, error)
+      call session%abort_if(error)
+      do point = 1, size(values, 1)
+        call work%note(index_in_block(lower, extent, point), values(point, :))
+      end do
+    end do
+  end function note_earlier
+
+  !> Index (from 1 along each axis) of a point of a block, last axis fastest.
+  pure function index_in_block(lower, extent, point) result(index)
+    integer(int64), intent(in) :: lower(:), extent(:)
+    integer, intent(in) :: point
+    integer :: index(size(lower)), rest, i
+    rest = point - 1
+    do i = size(lower), 1, -1
+      index(i) = int(lower(i)) + modulo(rest, int(extent(i))) + 1
+      rest = rest/int(extent(i))
+    end do
+  end function index_in_block
+
+  !> The final file, or after a stop the word how to go on and code 75.
+  subroutine finish_tiles(session, file, complete, extra)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    logical, intent(in) :: complete
+    type(schema_t), intent(inout) :: extra
+    type(error_t), allocatable :: error
+    if (.not. complete) then
+      call file%close(session%team, error)
+      call session%stop_if(error)
+      call session%journal%line('stopped', 'stopped early; the tiles done are kept in '// &
+        working_path(file%path)//'; the same command with --resume (without --force) goes on')
+      call session%end_with(exit_resumable)
+    end if
+    call session%provenance%finish(extra)
+    call finalise(file, session%team, extra, error)
+    call session%stop_if(error)
+    call session%journal%line('written', 'wrote '//file%path//' in '// &
+      duration_text(monotonic_seconds() - session%journal%started))
+  end subroutine finish_tiles
+
+  !> Points, tiles and bytes of a grid, and the time that `seconds_per_point` on one core mean.
+  function plan_text(lengths, tile_shape, bytes_per_point, seconds_per_point) result(lines)
+    integer, intent(in) :: lengths(:), tile_shape(:), bytes_per_point
+    real(wp), intent(in) :: seconds_per_point
+    character(len=:), allocatable :: lines
+    type(tiling_t) :: tiling
+    type(error_t), allocatable :: error
+    integer(int64) :: points
+    integer :: i
+    call new_tiling(int(lengths, int64), int(tile_shape, int64), tiling, error)
+    points = product(int(lengths, int64))
+    lines = to_text(lengths(1))
+    do i = 2, size(lengths)
+      lines = lines//' x '//to_text(lengths(i))
+    end do
+    lines = lines//' = '//to_text(points)//' points in '//to_text(tiling%count())//' tiles; '// &
+      to_text(points*bytes_per_point)//' bytes while it runs, less when compressed; about '// &
+      duration_text(points*seconds_per_point)//' on one core (from a small sample), divided by the number of ranks'
+  end function plan_text
+
+end module tiled_run

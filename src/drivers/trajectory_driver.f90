@@ -1,0 +1,181 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix trajectory`: one motion, its time history and every event.
+module trajectory_driver
+  use attractors, only: attractor_t, features_t, regime_names
+  use case_check, only: require_start
+  use case_setup, only: grid_of, output_path, span_of
+  use case_type, only: case_t
+  use command_line, only: command_t
+  use drive_law, only: foot_motion
+  use errors, only: error_t, fail
+  use file_layout, only: add_events
+  use files, only: check_folder, file_exists
+  use grid, only: grid_t, slice_motion
+  use journal, only: duration_text
+  use kinds, only: int64, wp
+  use map_final, only: write_whole
+  use map_schema, only: schema_t, type_float64, type_int8
+  use motion, only: motion_t
+  use motion_state, only: event_names, log_t
+  use session, only: describe_file, open_session, session_t
+  use status, only: exit_cannot_create, exit_done, exit_io, reason_name
+  use text, only: to_text
+  use trajectory, only: outcome_t, run_trajectory, span_t
+  implicit none
+  private
+
+  public :: run_trajectory_command
+
+contains
+
+  !> Runs the command; ends the program with the exit code on errors.
+  subroutine run_trajectory_command(command)
+    type(command_t), intent(in) :: command
+    type(session_t) :: session
+    type(grid_t) :: grid
+    type(span_t) :: span
+    type(motion_t) :: moving
+    type(log_t) :: log
+    type(outcome_t) :: outcome
+    type(schema_t) :: schema
+    type(error_t), allocatable :: error
+    type(attractor_t) :: no_catalogue(0)
+    character(len=:), allocatable :: path
+    call open_session(command, session)
+    call require_start(session%the_case, error)
+    call session%stop_if(error)
+    grid = grid_of(session%the_case, session%the_case%axes(:0))
+    span = span_of(session%the_case)
+    span%extension = 1
+    span%stop_when_captured = .false.
+    call slice_motion(grid, 0_int64, moving, error)
+    call session%stop_if(error)
+    path = output_path(command%output, command%path)
+    if (command%validate .or. command%dry_run) then
+      call session%journal%line('valid', command%path//' is a valid case for trajectory: about '// &
+        to_text(nint(span%duration/moving%machine%period*session%the_case%trajectory%samples_per_period))// &
+        ' samples, well under a second, into '//path)
+      call session%end_with(exit_done)
+    end if
+    if (session%team%is_root()) call refuse_existing(command, path, error)
+    call session%stop_if(error)
+    log%sample_interval = moving%machine%period/session%the_case%trajectory%samples_per_period
+    call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
+    call describe_file(session, 'trajectory', schema)
+    call describe_motion(moving, span, outcome, schema)
+    call add_history(moving, log, schema)
+    call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
+    call session%provenance%finish(schema)
+    if (session%team%is_root()) then
+      call write_whole(path, schema, command%force, error)
+      if (.not. allocated(error) .and. len(command%csv) > 0) call write_events(command%csv, log, error)
+    end if
+    call session%stop_if(error)
+    call report(session, moving, outcome, log, path)
+    call session%end_with(exit_done)
+  end subroutine run_trajectory_command
+
+  subroutine refuse_existing(command, path, error)
+    type(command_t), intent(in) :: command
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    if (.not. command%force) then
+      if (file_exists(path)) call fail(error, exit_cannot_create, "'"//path//"' exists; --force replaces it")
+      if (file_exists(command%csv) .and. .not. allocated(error)) &
+        call fail(error, exit_cannot_create, "'"//command%csv//"' exists; --force replaces it")
+    end if
+    if (.not. allocated(error)) call check_folder(path, error)
+  end subroutine refuse_existing
+
+  !> Attributes: the drive, the barriers, and the steady values over the window.
+  subroutine describe_motion(moving, span, outcome, schema)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(outcome_t), intent(in) :: outcome
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: unreachable
+    unreachable = sqrt(huge(1.0_wp))
+    call schema%add_attribute('', 'drive_period', moving%machine%period)
+    call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
+    if (moving%machine%contact%upper < unreachable) &
+      call schema%add_attribute('', 'barrier_upper', moving%machine%contact%upper)
+    if (moving%machine%contact%lower > -unreachable) &
+      call schema%add_attribute('', 'barrier_lower', moving%machine%contact%lower)
+    call schema%add_attribute('', 'window', span%window)
+    associate (f => outcome%window)
+      call schema%add_attribute('', 'amplitude', f%amplitude)
+      call schema%add_attribute('', 'x_max', f%x_max)
+      call schema%add_attribute('', 'x_min', f%x_min)
+      call schema%add_attribute('', 'v_max', f%v_max)
+      call schema%add_attribute('', 'impacts', nint(f%impacts_per_period*span%window/moving%machine%period))
+      call schema%add_attribute('', 'impacts_per_period', f%impacts_per_period)
+      call schema%add_attribute('', 'mean_impact_speed', f%mean_impact_speed)
+      call schema%add_attribute('', 'regime', trim(regime_names(f%regime)))
+      call schema%add_attribute('', 'reason', reason_name(outcome%reason))
+    end associate
+  end subroutine describe_motion
+
+  subroutine add_history(moving, log, schema)
+    type(motion_t), intent(in) :: moving
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: foot(log%samples)
+    integer :: i
+    do i = 1, log%samples
+      call foot_motion(moving%machine%drive, moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
+    end do
+    call schema%add_dimension('time', int(log%samples, int64))
+    call schema%add_variable('time', type_float64, ['time'], units='s', long_name='time since the start', &
+                             data=log%sample_data(1, :log%samples))
+    call schema%add_variable('x', type_float64, ['time'], units='m', long_name='position', &
+                             data=log%sample_data(2, :log%samples))
+    call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
+                             data=log%sample_data(3, :log%samples))
+    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
+                             data=foot)
+    call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5], &
+      flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier', &
+      data=real(log%sample_mode(:log%samples), wp))
+  end subroutine add_history
+
+  !> The events as a table at full precision.
+  subroutine write_events(path, log, error)
+    character(len=*), intent(in) :: path
+    type(log_t), intent(in) :: log
+    type(error_t), allocatable, intent(out) :: error
+    integer :: unit, i, status
+    character(len=256) :: message
+    open (newunit=unit, file=path, status='replace', action='write', iostat=status, iomsg=message)
+    if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) 'kind,time,x,v_before,v_after'
+    do i = 1, log%events
+      if (status /= 0) exit
+      write (unit, '(a)', iostat=status, iomsg=message) trim(event_names(log%event_kind(i)))//','// &
+        to_text(log%event_data(1, i))//','//to_text(log%event_data(2, i))//','// &
+        to_text(log%event_data(3, i))//','//to_text(log%event_data(4, i))
+    end do
+    if (status == 0) close (unit, iostat=status, iomsg=message)
+    if (status /= 0) call fail(error, exit_io, "'"//path//"': "//trim(message))
+  end subroutine write_events
+
+  subroutine report(session, moving, outcome, log, path)
+    type(session_t), intent(inout) :: session
+    type(motion_t), intent(in) :: moving
+    type(outcome_t), intent(in) :: outcome
+    type(log_t), intent(in) :: log
+    character(len=*), intent(in) :: path
+    associate (f => outcome%window, journal => session%journal)
+      call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
+        ' m, v_max '//to_text(f%v_max, 6)//' m/s, '//to_text(f%impacts_per_period, 5)// &
+        ' impacts per period at '//to_text(f%mean_impact_speed, 6)//' m/s (last '// &
+        to_text(session%the_case%run%window)//' s)', '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
+        to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
+        ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
+      call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, drive period '// &
+        to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
+      call journal%line('written', 'wrote '//path)
+    end associate
+  end subroutine report
+
+end module trajectory_driver

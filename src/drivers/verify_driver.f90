@@ -1,0 +1,281 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix verify`: checksums, invariants, and a random sample of the points run again: in double precision,
+!> which must give what the file holds, and in quadruple precision, which tells how far it can be trusted.
+module verify_driver
+  use attractors, only: regime_names
+  use axis, only: axis_t
+  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use case_reader, only: load_case_text
+  use case_setup, only: grid_of, options_of, span_of
+  use case_type, only: case_t
+  use catalogue_search, only: search_catalogues
+  use command_line, only: command_t
+  use errors, only: error_t, fail
+  use grid, only: grid_t, point_slice, point_start, slice_laws, slice_motion
+  use info_driver, only: count_codes
+  use journal, only: json_text
+  use kinds, only: int64, real32, wp
+  use map_invariants, only: check_invariants
+  use map_reader, only: open_final, reader_t
+  use map_verify, only: verify_file
+  use motion, only: motion_t
+  use random, only: uniform
+  use reference, only: run_reference
+  use serial_team, only: serial_team_t
+  use status, only: exit_io
+  use sweep_driver, only: sweep_axes
+  use text, only: to_text
+  use trajectory, only: outcome_t, run_trajectory, span_t
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  implicit none
+  private
+
+  public :: run_verify
+
+  !> What the rerun of the sample showed.
+  type :: audit_t
+    integer :: points = 0, differing = 0, flips = 0, impact_count_differs = 0
+    real(wp) :: x_deviation = 0, v_deviation = 0
+    character(len=:), allocatable :: first_difference
+  end type audit_t
+
+contains
+
+  !> Verifies the file that `command` names. Code 74 naming what is wrong; label flips against quadruple precision are
+  !> reported, not an error.
+  subroutine run_verify(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    type(reader_t) :: reader
+    type(audit_t) :: audit
+    character(len=:), allocatable :: kind, resolved
+    type(case_t) :: the_case
+    type(error_t), allocatable :: ignored
+    character(len=128) :: no_overrides(0)
+    integer :: datasets
+    integer(int64) :: points
+    call open_final(command%path, reader, error)
+    if (allocated(error)) return
+    call verify_file(command%path, error, datasets)
+    if (.not. allocated(error)) call reader%text_attribute('/', 'kind', kind, error)
+    if (.not. allocated(error)) call reader%read_text('/provenance/resolved_case', resolved, error)
+    if (.not. allocated(error)) call load_case_text(resolved, command%path//' (resolved case)', no_overrides, &
+                                                    the_case, error)
+    if (.not. allocated(error)) call check_invariants(reader, kind, points, error)
+    if (.not. allocated(error)) then
+      select case (kind)
+      case ('basin')
+        call audit_map(reader, the_case, the_case%axes, '', command%sample, command%seed, audit, error)
+      case ('sweep')
+        if (reader%has('/branch_regime')) call audit_map(reader, the_case, sweep_axes(the_case), 'branch_', &
+                                                         command%sample, command%seed, audit, error)
+      case ('points')
+        call audit_points(reader, the_case, command%sample, command%seed, audit, error)
+      end select
+    end if
+    call reader%close(ignored)
+    if (allocated(error)) return
+    call report(command, kind, datasets, points, audit)
+    if (audit%differing > 0) call fail(error, exit_io, "'"//command%path//"': "//to_text(audit%differing)// &
+      ' of '//to_text(audit%points)//' points rerun differ from the file, first '//audit%first_difference)
+  end subroutine run_verify
+
+  !> Reruns random points of a map over `axes`.
+  subroutine audit_map(reader, the_case, axes, prefix, sample, seed, audit, error)
+    type(reader_t), intent(in) :: reader
+    type(case_t), intent(in) :: the_case
+    type(axis_t), intent(in) :: axes(:)
+    character(len=*), intent(in) :: prefix
+    integer, intent(in) :: sample, seed
+    type(audit_t), intent(inout) :: audit
+    type(error_t), allocatable, intent(out) :: error
+    type(serial_team_t) :: alone
+    type(grid_t) :: grid
+    type(catalogue_t), allocatable :: catalogues(:)
+    type(slice_cache_t) :: cache
+    real(wp) :: values(basin_variables), random_numbers(6)
+    integer, allocatable :: index(:)
+    integer(int64), allocatable :: lengths(:), place(:)
+    integer :: i, k
+    grid = grid_of(the_case, axes)
+    call search_catalogues(alone, grid, span_of(the_case), the_case%attractors, catalogues, error)
+    if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
+    if (allocated(error)) return
+    allocate (index(size(axes)), place(size(lengths)))
+    do i = 1, sample
+      call uniform(int(seed, int64), int(i, int64), random_numbers)
+      do k = 1, size(axes)
+        index(k) = 1 + int(random_numbers(k)*grid%shape(k))
+      end do
+      if (size(lengths) == size(axes)) then
+        place = index - 1
+      else
+        place = [index(1) - 1, (index(2) - 1)*grid%shape(3) + index(3) - 1]
+      end if
+      call basin_point(grid, span_of(the_case), the_case%attractors%max_period, catalogues, index, cache, values, error)
+      if (allocated(error)) return
+      call compare_with_file(reader, prefix, place, values, audit, error)
+      if (allocated(error)) return
+      call compare_with_reference(the_case, grid, catalogues, index, nint(values(2)), nint(values(1)), cache%moving, &
+                                  audit, error)
+      if (allocated(error)) return
+    end do
+  end subroutine audit_map
+
+  !> Regime, attractor, reason, period, amplitude and settle time must be what the file holds.
+  subroutine compare_with_file(reader, prefix, place, values, audit, error)
+    type(reader_t), intent(in) :: reader
+    character(len=*), intent(in) :: prefix
+    integer(int64), intent(in) :: place(:)
+    real(wp), intent(in) :: values(:)
+    type(audit_t), intent(inout) :: audit
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: names(13) = [character(len=18) :: 'regime', 'attractor', 'reason', 'period', &
+      'event_word', 'impacts_per_period', 'mean_impact_speed', 'amplitude', 'x_max', 'x_min', 'v_max', &
+      'settle_time', 'grazing_margin']
+    real(wp), allocatable :: stored(:)
+    integer :: k
+    logical :: same
+    audit%points = audit%points + 1
+    do k = 1, size(names)
+      call reader%read_block('/'//prefix//trim(names(k)), place, spread(1_int64, 1, size(place)), stored, error)
+      if (allocated(error)) return
+      if (k <= 5) same = nint(stored(1), int64) == nint(values(k), int64)
+      if (k > 5) same = real(stored(1), real32) == real(values(k), real32) &
+                        .or. (stored(1) /= stored(1) .and. values(k) /= values(k))
+      if (same) cycle
+      audit%differing = audit%differing + 1
+      if (audit%differing == 1) audit%first_difference = trim(names(k))//' at '//place_text(place)//': the file has '// &
+        to_text(stored(1))//', rerun gives '//to_text(values(k))
+      return
+    end do
+  end subroutine compare_with_file
+
+  pure function place_text(place) result(text)
+    integer(int64), intent(in) :: place(:)
+    character(len=:), allocatable :: text
+    integer :: i
+    text = '['
+    do i = 1, size(place)
+      if (i > 1) text = text//', '
+      text = text//to_text(place(i))
+    end do
+    text = text//']'
+  end function place_text
+
+  !> Label from a quadruple-precision run, and how far the double one has drifted at the end of the duration.
+  subroutine compare_with_reference(the_case, grid, catalogues, index, label, regime, moving, audit, error)
+    type(case_t), intent(in) :: the_case
+    type(grid_t), intent(in) :: grid
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer, intent(in) :: index(:), label, regime
+    type(motion_t), intent(in) :: moving
+    type(audit_t), intent(inout) :: audit
+    type(error_t), allocatable, intent(out) :: error
+    type(catalogue_t) :: own
+    type(outcome_t) :: outcome
+    type(span_t) :: span
+    real(wp) :: start(3), results(6, 1)
+    start = point_start(grid, index)
+    span = span_of(the_case)
+    span%stop_when_captured = .false.
+    allocate (own%attractors(0))
+    if (size(catalogues) > 0) own = catalogues(point_slice(grid, index) + 1)
+    call run_trajectory(moving, own%attractors, span, start(1), start(2), start(3), outcome)
+    call run_reference(slice_laws(grid, point_slice(grid, index)), grid%options, span, own%attractors, &
+                       reshape(start, [3, 1]), results, error)
+    if (allocated(error)) return
+    if (size(catalogues) > 0) then
+      if (nint(results(2, 1)) /= label) audit%flips = audit%flips + 1
+    else if (nint(results(3, 1)) /= regime) then
+      audit%flips = audit%flips + 1
+    end if
+    call note_deviation(outcome, results(:, 1), audit)
+  end subroutine compare_with_reference
+
+  subroutine note_deviation(outcome, results, audit)
+    type(outcome_t), intent(in) :: outcome
+    real(wp), intent(in) :: results(6)
+    type(audit_t), intent(inout) :: audit
+    if (outcome%impacts /= nint(results(6), int64)) audit%impact_count_differs = audit%impact_count_differs + 1
+    audit%x_deviation = max(audit%x_deviation, abs(outcome%x - results(4)))
+    audit%v_deviation = max(audit%v_deviation, abs(outcome%v - results(5)))
+  end subroutine note_deviation
+
+  !> Reruns random points of a list.
+  subroutine audit_points(reader, the_case, sample, seed, audit, error)
+    type(reader_t), intent(in) :: reader
+    type(case_t), intent(in) :: the_case
+    integer, intent(in) :: sample, seed
+    type(audit_t), intent(inout) :: audit
+    type(error_t), allocatable, intent(out) :: error
+    type(axis_t) :: axes(3)
+    type(grid_t) :: grid
+    type(motion_t) :: moving
+    type(catalogue_t) :: none
+    type(outcome_t) :: outcome
+    type(span_t) :: span
+    real(wp), allocatable :: column(:), table(:, :)
+    real(wp) :: random_numbers(1), results(6, 1)
+    character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
+    integer :: i, k, point
+    do k = 1, size(names)
+      call reader%read_values('/'//trim(names(k)), column, error)
+      if (allocated(error)) return
+      if (k == 1) allocate (table(size(column), size(names)))
+      table(:, k) = column
+    end do
+    span = span_of(the_case)
+    span%stop_when_captured = .false.
+    span%extension = 1
+    allocate (none%attractors(0))
+    do i = 1, min(sample, size(table, 1))
+      call uniform(int(seed, int64), int(i, int64), random_numbers)
+      point = 1 + int(random_numbers(1)*size(table, 1))
+      axes(1) = axis_t('drive.ratio', '1', [table(point, 3)])
+      grid = grid_of(the_case, axes(:merge(1, 0, table(point, 3) > 0)))
+      call slice_motion(grid, 0_int64, moving, error)
+      if (allocated(error)) return
+      call run_trajectory(moving, none%attractors, span, table(point, 1), table(point, 2), grid%start(3), outcome)
+      audit%points = audit%points + 1
+      if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &
+          .or. outcome%impacts /= nint(table(point, 6)) .or. outcome%reason /= nint(table(point, 7))) then
+        audit%differing = audit%differing + 1
+        if (audit%differing == 1) audit%first_difference = 'point '//to_text(point - 1)
+      end if
+      call run_reference(slice_laws(grid, 0_int64), options_of(the_case), span, none%attractors, &
+                         reshape([table(point, 1), table(point, 2), grid%start(3)], [3, 1]), results, error)
+      if (allocated(error)) return
+      if (nint(results(3, 1)) /= outcome%features%regime) audit%flips = audit%flips + 1
+      call note_deviation(outcome, results(:, 1), audit)
+    end do
+  end subroutine audit_points
+
+  subroutine report(command, kind, datasets, points, audit)
+    type(command_t), intent(in) :: command
+    character(len=*), intent(in) :: kind
+    integer, intent(in) :: datasets
+    integer(int64), intent(in) :: points
+    type(audit_t), intent(in) :: audit
+    if (command%json) then
+      write (output_unit, '(a)') '{"path": '//json_text(command%path)//', "kind": '//json_text(kind)// &
+        ', "datasets": '//to_text(datasets)//', "points": '//to_text(points)//', "rerun": '//to_text(audit%points)// &
+        ', "differing": '//to_text(audit%differing)//', "label_flips": '//to_text(audit%flips)// &
+        ', "impact_counts_differ": '//to_text(audit%impact_count_differs)//', "x_deviation": '// &
+        to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//'}'
+      return
+    end if
+    write (output_unit, '(a)') command%path//': '//kind, &
+      '  checksums of '//to_text(datasets)//' datasets agree', &
+      '  invariants hold at '//to_text(points)//' points'
+    if (audit%points == 0) return
+    write (output_unit, '(a)') &
+      '  '//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file', &
+      '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
+      to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
+      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s'
+  end subroutine report
+
+end module verify_driver

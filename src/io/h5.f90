@@ -1,0 +1,374 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> HDF5 with errors that name file and object: every status is tested here, once. Names of objects
+!> are absolute paths; lengths, corners and extents are in C order; data is bytes.
+module h5
+  use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+  use errors, only: error_t, fail
+  use files, only: free_bytes
+  use h5_access, only: set_parallel_access
+  use hdf5, only: &
+    H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
+    h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
+    H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
+    h5fcreate_f, h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
+    h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
+    H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
+    h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
+    h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_shuffle_f, H5S_SCALAR_F, &
+    H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
+    h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F32LE, &
+    H5T_IEEE_F64LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U32LE, &
+    H5T_STRING, h5tclose_f, h5tcopy_f, h5tequal_f, h5tis_variable_str_f, h5tset_cset_f, hid_t, &
+    hsize_t
+  use kinds, only: int64, int8
+  use status, only: exit_cannot_create, exit_io
+  use team, only: team_t
+  use text, only: to_text
+  use value_types, only: is_float, type_string
+  implicit none
+  private
+
+  public :: h5_create, h5_open, h5_close, h5_flush, h5_exists, h5_create_group, h5_create_dataset, &
+    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
+    h5_version
+
+  !> An open file.
+  type, public :: h5_file_t
+    integer(hid_t) :: id = -1
+    character(len=:), allocatable :: path
+  end type h5_file_t
+
+  !> An open dataset. A scalar has no lengths.
+  type, public :: h5_dataset_t
+    integer(hid_t) :: id = -1
+    integer :: type = 0
+    integer(int64), allocatable :: lengths(:)
+    character(len=:), allocatable :: name, path
+  end type h5_dataset_t
+
+  !> How a dataset is stored. Without a chunk it is contiguous. `fixed`: all space is allocated and
+  !> never filled, so that later writes touch no metadata.
+  type, public :: h5_storage_t
+    integer(int64), allocatable :: chunk(:)
+    logical :: compressed = .false.
+    logical :: fixed = .false.
+  end type h5_storage_t
+
+contains
+
+  !> Whether the step failed; then sets the error, unless there is one already.
+  logical function h5_failed(status, action, object, path, error)
+    integer, intent(in) :: status
+    character(len=*), intent(in) :: action, object, path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: message
+    integer(int64) :: free
+    h5_failed = status < 0 .or. allocated(error)
+    if (.not. h5_failed .or. allocated(error)) return
+    message = 'HDF5 cannot '//action//' '
+    if (object /= '') message = message//''''//object//''' of '
+    message = message//''''//path//''''
+    free = free_bytes(path)
+    if (free >= 0 .and. free < 2**20) message = message//': the disk has '//to_text(free)//' bytes left'
+    call fail(error, merge(exit_cannot_create, exit_io, action == 'create the file'), message)
+  end function h5_failed
+
+  !> Starts the library (again is harmless) without its own error output.
+  subroutine start_library(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: status
+    call h5open_f(status)
+    if (h5_failed(status, 'start for', '', path, error)) return
+    call h5eset_auto_f(0, status)
+    if (h5_failed(status, 'start for', '', path, error)) return
+  end subroutine start_library
+
+  !> The version of the library, as 1.10.8.
+  function h5_version() result(text)
+    character(len=:), allocatable :: text
+    type(error_t), allocatable :: error
+    integer :: major, minor, release, status
+    text = 'unknown'
+    call start_library('', error)
+    if (allocated(error)) return
+    call h5get_libversion_f(major, minor, release, status)
+    if (status == 0) text = to_text(major)//'.'//to_text(minor)//'.'//to_text(release)
+  end function h5_version
+
+  !> Creates a file in this process alone, replacing one of the same name; code 73.
+  subroutine h5_create(path, file, error)
+    character(len=*), intent(in) :: path
+    type(h5_file_t), intent(out) :: file
+    type(error_t), allocatable, intent(out) :: error
+    integer(hid_t) :: access, creation
+    integer :: status, ignored
+    file%path = path
+    call start_library(path, error)
+    if (allocated(error)) return
+    call h5pcreate_f(H5P_FILE_ACCESS_F, access, status)
+    if (h5_failed(status, 'create the file', '', path, error)) return
+    call h5pcreate_f(H5P_FILE_CREATE_F, creation, status)
+    ! Readers with HDF5 1.10 open the file, also after a crash.
+    if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
+    if (status >= 0) call h5pset_link_creation_order_f(creation, ior(H5P_CRT_ORDER_TRACKED_F, H5P_CRT_ORDER_INDEXED_F), status)
+    if (status >= 0) call h5fcreate_f(path, H5F_ACC_TRUNC_F, file%id, status, creation, access)
+    if (h5_failed(status, 'create the file', '', path, error)) return
+    call h5pclose_f(creation, ignored)
+    call h5pclose_f(access, ignored)
+  end subroutine h5_create
+
+  !> Opens a file; with a team of several ranks (collective) all of them together. Code 74.
+  subroutine h5_open(path, file, error, writable, team)
+    character(len=*), intent(in) :: path
+    type(h5_file_t), intent(out) :: file
+    type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: writable
+    class(team_t), intent(in), optional :: team
+    integer(hid_t) :: access
+    integer :: status, flags, ignored
+    file%path = path
+    flags = H5F_ACC_RDONLY_F
+    call start_library(path, error)
+    if (allocated(error)) return
+    if (present(writable)) flags = merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable)
+    call h5pcreate_f(H5P_FILE_ACCESS_F, access, status)
+    if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
+    if (present(team) .and. status >= 0) then
+      if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
+    end if
+    if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
+    if (h5_failed(status, 'open', '', path, error)) return
+    call h5pclose_f(access, ignored)
+  end subroutine h5_open
+
+  !> Closes the file; a file that is not open stays so. Collective if the file was opened by a team.
+  subroutine h5_close(file, error)
+    type(h5_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+    if (file%id < 0) return
+    call h5fclose_f(file%id, status)
+    file%id = -1
+    if (h5_failed(status, 'close', '', file%path, error)) return
+  end subroutine h5_close
+
+  !> Hands all data to the operating system (a file that one process has open).
+  subroutine h5_flush(file, error)
+    type(h5_file_t), intent(in) :: file
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+    call h5fflush_f(file%id, H5F_SCOPE_LOCAL_F, status)
+    if (h5_failed(status, 'flush', '', file%path, error)) return
+  end subroutine h5_flush
+
+  !> Whether an object of this name is in the root or in a group of the root.
+  logical function h5_exists(file, name)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    integer :: status, slash
+    h5_exists = .true.
+    slash = index(name, '/', back=.true.)
+    if (slash > 1) call h5lexists_f(file%id, name(:slash - 1), h5_exists, status)
+    if (h5_exists) call h5lexists_f(file%id, name, h5_exists, status)
+  end function h5_exists
+
+  !> Creates a group unless it exists.
+  subroutine h5_create_group(file, name, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+    integer(hid_t) :: group, creation
+    integer :: status, ignored
+    if (h5_exists(file, name)) return
+    call h5pcreate_f(H5P_GROUP_CREATE_F, creation, status)
+    if (status >= 0) call h5pset_link_creation_order_f(creation, ior(H5P_CRT_ORDER_TRACKED_F, H5P_CRT_ORDER_INDEXED_F), status)
+    if (status >= 0) call h5gcreate_f(file%id, name, group, status, gcpl_id=creation)
+    if (h5_failed(status, 'create', name, file%path, error)) return
+    call h5gclose_f(group, ignored)
+    call h5pclose_f(creation, ignored)
+  end subroutine h5_create_group
+
+  !> The type's identifier in the library.
+  integer(hid_t) function h5_type(type)
+    integer, intent(in) :: type
+    integer(hid_t) :: types(8)
+    types = [H5T_STD_I8LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_U32LE, H5T_IEEE_F32LE, &
+             H5T_IEEE_F64LE, H5T_STRING]
+    h5_type = types(type)
+  end function h5_type
+
+  !> A new identifier of the type of UTF-8 strings of variable length; the caller closes it.
+  subroutine h5_string_type(id, status)
+    integer(hid_t), intent(out) :: id
+    integer, intent(out) :: status
+    call h5tcopy_f(H5T_STRING, id, status)
+    if (status >= 0) call h5tset_cset_f(id, H5T_CSET_UTF8_F, status)
+  end subroutine h5_string_type
+
+  !> Creates a dataset and opens it.
+  subroutine h5_create_dataset(file, name, type, lengths, storage, dataset, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: type
+    integer(int64), intent(in) :: lengths(:)
+    type(h5_storage_t), intent(in) :: storage
+    type(h5_dataset_t), intent(out) :: dataset
+    type(error_t), allocatable, intent(out) :: error
+    integer(hid_t) :: space, creation, type_id
+    integer :: status, ignored
+    dataset%name = name
+    dataset%path = file%path
+    dataset%type = type
+    dataset%lengths = lengths
+    call storage_of(storage, type, creation, status)
+    if (status >= 0) call space_of(lengths, space, status)
+    type_id = h5_type(type)
+    if (type == type_string .and. status >= 0) call h5_string_type(type_id, status)
+    if (status >= 0) call h5dcreate_f(file%id, name, type_id, space, dataset%id, status, creation)
+    if (h5_failed(status, 'create', name, file%path, error)) return
+    if (type == type_string) call h5tclose_f(type_id, ignored)
+    call h5sclose_f(space, ignored)
+    call h5pclose_f(creation, ignored)
+  end subroutine h5_create_dataset
+
+  subroutine storage_of(storage, type, creation, status)
+    type(h5_storage_t), intent(in) :: storage
+    integer, intent(in) :: type
+    integer(hid_t), intent(out) :: creation
+    integer, intent(out) :: status
+    call h5pcreate_f(H5P_DATASET_CREATE_F, creation, status)
+    if (allocated(storage%chunk) .and. status >= 0) then
+      call h5pset_chunk_f(creation, size(storage%chunk), reversed(storage%chunk), status)
+      ! Shuffling helps numbers with an exponent and does nothing for small integers.
+      if (storage%compressed .and. is_float(type) .and. status >= 0) call h5pset_shuffle_f(creation, status)
+      if (storage%compressed .and. status >= 0) call h5pset_deflate_f(creation, 1, status)
+    end if
+    if (storage%fixed .and. status >= 0) then
+      call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, status)
+      if (status >= 0) call h5pset_alloc_time_f(creation, H5D_ALLOC_TIME_EARLY_F, status)
+    end if
+  end subroutine storage_of
+
+  subroutine space_of(lengths, space, status)
+    integer(int64), intent(in) :: lengths(:)
+    integer(hid_t), intent(out) :: space
+    integer, intent(out) :: status
+    if (size(lengths) == 0) then
+      call h5screate_f(H5S_SCALAR_F, space, status)
+    else
+      call h5screate_simple_f(size(lengths), reversed(lengths), space, status)
+    end if
+  end subroutine space_of
+
+  !> HDF5's Fortran interface lists dimensions backwards.
+  pure function reversed(lengths) result(sizes)
+    integer(int64), intent(in) :: lengths(:)
+    integer(hsize_t) :: sizes(size(lengths))
+    sizes = lengths(size(lengths):1:-1)
+  end function reversed
+
+  !> Opens a dataset and finds its type and lengths.
+  subroutine h5_open_dataset(file, name, dataset, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    type(h5_dataset_t), intent(out) :: dataset
+    type(error_t), allocatable, intent(out) :: error
+    integer(hid_t) :: space
+    integer(hsize_t), allocatable :: sizes(:), most(:)
+    integer :: status, rank
+    dataset%name = name
+    dataset%path = file%path
+    call h5dopen_f(file%id, name, dataset%id, status)
+    if (status >= 0) call h5dget_space_f(dataset%id, space, status)
+    if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
+    if (h5_failed(status, 'open', name, file%path, error)) return
+    allocate (sizes(rank), most(rank))
+    if (rank > 0) call h5sget_simple_extent_dims_f(space, sizes, most, status)
+    dataset%lengths = sizes(rank:1:-1)
+    if (status >= 0) call h5sclose_f(space, status)
+    if (status >= 0) call find_type(dataset, status)
+    if (h5_failed(status, 'open', name, file%path, error)) return
+  end subroutine h5_open_dataset
+
+  subroutine find_type(dataset, status)
+    type(h5_dataset_t), intent(inout) :: dataset
+    integer, intent(out) :: status
+    integer(hid_t) :: found
+    logical :: equal
+    integer :: type, ignored
+    call h5dget_type_f(dataset%id, found, status)
+    if (status < 0) return
+    do type = 1, type_string - 1
+      call h5tequal_f(found, h5_type(type), equal, status)
+      if (status >= 0 .and. equal) dataset%type = type
+    end do
+    call h5tis_variable_str_f(found, equal, status)
+    if (status >= 0 .and. equal) dataset%type = type_string
+    if (dataset%type == 0) status = -1
+    call h5tclose_f(found, ignored)
+  end subroutine find_type
+
+  !> Closes a dataset; one that is not open stays so.
+  subroutine h5_close_dataset(dataset, error)
+    type(h5_dataset_t), intent(inout) :: dataset
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+    if (dataset%id < 0) return
+    call h5dclose_f(dataset%id, status)
+    dataset%id = -1
+    if (h5_failed(status, 'close', dataset%name, dataset%path, error)) return
+  end subroutine h5_close_dataset
+
+  !> Writes the values of a block (corner from 0), or of the whole dataset.
+  subroutine h5_write(dataset, bytes, error, lower, extent)
+    type(h5_dataset_t), intent(in) :: dataset
+    integer(int8), intent(in), contiguous, target :: bytes(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), intent(in), optional :: lower(:), extent(:)
+    integer(hid_t) :: memory, space
+    integer :: status, ignored
+    if (size(bytes) == 0) return
+    call select_block(dataset, memory, space, status, lower, extent)
+    if (status >= 0) call h5dwrite_f(dataset%id, h5_type(dataset%type), c_loc(bytes), status, memory, space)
+    if (h5_failed(status, 'write', dataset%name, dataset%path, error)) return
+    call h5sclose_f(memory, ignored)
+    call h5sclose_f(space, ignored)
+  end subroutine h5_write
+
+  !> Reads the values of a block (corner from 0), or of the whole dataset.
+  subroutine h5_read(dataset, bytes, error, lower, extent)
+    type(h5_dataset_t), intent(in) :: dataset
+    integer(int8), intent(out), contiguous, target :: bytes(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), intent(in), optional :: lower(:), extent(:)
+    integer(hid_t) :: memory, space
+    integer :: status, ignored
+    type(c_ptr) :: address
+    if (size(bytes) == 0) return
+    address = c_loc(bytes)
+    call select_block(dataset, memory, space, status, lower, extent)
+    if (status >= 0) call h5dread_f(dataset%id, h5_type(dataset%type), address, status, memory, space)
+    if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return
+    call h5sclose_f(memory, ignored)
+    call h5sclose_f(space, ignored)
+  end subroutine h5_read
+
+  subroutine select_block(dataset, memory, space, status, lower, extent)
+    type(h5_dataset_t), intent(in) :: dataset
+    integer(hid_t), intent(out) :: memory, space
+    integer, intent(out) :: status
+    integer(int64), intent(in), optional :: lower(:), extent(:)
+    call h5dget_space_f(dataset%id, space, status)
+    if (status < 0) return
+    if (present(lower)) then
+      call space_of(extent, memory, status)
+      if (status >= 0) call h5sselect_hyperslab_f(space, H5S_SELECT_SET_F, reversed(lower), reversed(extent), status)
+    else
+      call space_of(dataset%lengths, memory, status)
+    end if
+  end subroutine select_block
+
+end module h5

@@ -1,0 +1,186 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The final file: compressed, with a checksum per dataset, independent of tiles and ranks. Under
+!> its own name it exists only complete and verified.
+module map_final
+  use errors, only: error_t, fail
+  use files, only: check_folder, file_exists, publish_file, remove_file
+  use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read, h5_write
+  use h5_attributes, only: h5_put_numbers, h5_read_strings, h5_write_strings
+  use kinds, only: int64, int8, real64
+  use map_file, only: map_file_t, working_path
+  use map_layout, only: create_objects, path_of, write_data
+  use map_schema, only: schema_t, type_int64, type_string
+  use map_verify, only: seal, verify_file
+  use slabs, only: slab, slab_count
+  use status, only: exit_cannot_create, exit_io, exit_resumable
+  use team, only: team_t
+  use text, only: to_text
+  use value_types, only: bytes_of
+  implicit none
+  private
+
+  public :: finalise, write_whole
+
+contains
+
+  !> Turns the working file, all of whose tiles are done, into the final file. Collective; the file is
+  !> closed afterwards. `extra`: what is known only now, as summary tables; its attributes replace
+  !> those of the same name. Code 75 if tiles are missing, 74 if the disk fails or data is damaged
+  !> (then the working file can be resumed).
+  subroutine finalise(file, team, extra, error)
+    type(map_file_t), intent(inout) :: file
+    class(team_t), intent(in) :: team
+    type(schema_t), intent(in) :: extra
+    type(error_t), allocatable, intent(out) :: error
+    integer :: mismatches, tile, left
+    ! Closed and opened again so that each rank sees what the others wrote.
+    call file%close(team, error)
+    if (.not. allocated(error)) call file%open(team, error)
+    if (.not. allocated(error)) call file%recheck(team, mismatches, error)
+    if (.not. allocated(error)) call file%close(team, error)
+    if (allocated(error)) return
+    left = count([(.not. file%tile_done(tile), tile=1, file%tile_count())])
+    if (mismatches > 0) then
+      call fail(error, exit_io, to_text(mismatches)//' tiles of '''//working_path(file%path)// &
+                ''' do not match their checksums; --resume computes them again')
+    else if (left > 0) then
+      call fail(error, exit_resumable, to_text(left)//' tiles of '''//working_path(file%path)//''' are not done')
+    end if
+    if (allocated(error)) return
+    if (team%is_root()) call repack(file, extra, error)
+    call team%agree(error)
+  end subroutine finalise
+
+  subroutine repack(file, extra, error)
+    type(map_file_t), intent(in) :: file
+    type(schema_t), intent(in) :: extra
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: ignored
+    type(h5_file_t) :: part
+    type(schema_t) :: schema
+    schema = file%schema
+    call schema%append(extra)
+    call h5_open(working_path(file%path), part, error)
+    if (allocated(error)) return
+    call build(file%path, schema, error, part, size(file%schema%variables))
+    call h5_close(part, ignored)
+    if (allocated(error)) then
+      error%code = exit_io
+      error%message = error%message//'; '''//working_path(file%path)//''' is complete, --resume tries again'
+      return
+    end if
+    call remove_file(working_path(file%path), error)
+  end subroutine repack
+
+  !> Writes a file that needs no working file, by one process. Code 73 if it exists and `force` is
+  !> false.
+  subroutine write_whole(path, schema, force, error)
+    character(len=*), intent(in) :: path
+    type(schema_t), intent(in) :: schema
+    logical, intent(in) :: force
+    type(error_t), allocatable, intent(out) :: error
+    type(schema_t) :: complete, nothing
+    if (file_exists(path) .and. .not. force) then
+      call fail(error, exit_cannot_create, ''''//path//''' exists; --force replaces it')
+      return
+    end if
+    call check_folder(path, error)
+    if (allocated(error)) return
+    complete = schema
+    call complete%append(nothing)
+    call build(path, complete, error)
+  end subroutine write_whole
+
+  !> Writes, reads back and publishes the final file. The first `copied` variables come from the
+  !> working file, the others from the schema.
+  subroutine build(path, schema, error, part, copied)
+    character(len=*), intent(in) :: path
+    type(schema_t), intent(in) :: schema
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_file_t), intent(in), optional :: part
+    integer, intent(in), optional :: copied
+    type(error_t), allocatable :: ignored
+    type(h5_file_t) :: new
+    character(len=:), allocatable :: name
+    name = path//'.new'
+    call h5_create(name, new, error)
+    if (.not. allocated(error)) call create_objects(new, schema, error)
+    if (.not. allocated(error)) call fill(new, schema, error, part, copied)
+    if (.not. allocated(error)) call h5_put_numbers(new, '/', 'complete', type_int64, [1.0_real64], error)
+    if (allocated(error)) then
+      call h5_close(new, ignored)
+    else
+      call h5_close(new, error)
+    end if
+    if (.not. allocated(error)) call verify_file(name, error)
+    if (.not. allocated(error)) call publish_file(name, path, error)
+    if (allocated(error)) call remove_file(name, ignored)
+  end subroutine build
+
+  subroutine fill(new, schema, error, part, copied)
+    type(h5_file_t), intent(in) :: new
+    type(schema_t), intent(in) :: schema
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_file_t), intent(in), optional :: part
+    integer, intent(in), optional :: copied
+    integer :: i, from_part
+    from_part = 0
+    if (present(copied)) from_part = copied
+    do i = 1, size(schema%variables)
+      associate (variable => schema%variables(i))
+        if (i <= from_part) then
+          call copy(part, new, path_of(variable%group, variable%name), error)
+        else
+          call write_data(new, schema, variable, error)
+        end if
+        if (.not. allocated(error)) call seal(new, path_of(variable%group, variable%name), error)
+        if (allocated(error)) return
+      end associate
+    end do
+    do i = 1, size(schema%texts)
+      call seal(new, path_of(schema%texts(i)%group, schema%texts(i)%name), error)
+      if (allocated(error)) return
+    end do
+  end subroutine fill
+
+  !> Copies a dataset slab by slab.
+  subroutine copy(part, new, name, error)
+    type(h5_file_t), intent(in) :: part, new
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_dataset_t) :: from, to
+    call h5_open_dataset(part, name, from, error)
+    if (.not. allocated(error)) call h5_open_dataset(new, name, to, error)
+    if (.not. allocated(error)) call copy_values(from, to, error)
+    if (.not. allocated(error)) call h5_close_dataset(to, error)
+    if (.not. allocated(error)) call h5_close_dataset(from, error)
+  end subroutine copy
+
+  subroutine copy_values(from, to, error)
+    type(h5_dataset_t), intent(in) :: from, to
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: strings(:)
+    integer(int8), allocatable :: bytes(:)
+    integer(int64) :: lower(size(from%lengths)), extent(size(from%lengths)), k
+    if (from%type == type_string) then
+      call h5_read_strings(from, strings, error)
+      if (.not. allocated(error)) call h5_write_strings(to, strings, error)
+    else if (size(from%lengths) == 0) then
+      allocate (bytes(bytes_of(from%type)))
+      call h5_read(from, bytes, error)
+      if (.not. allocated(error)) call h5_write(to, bytes, error)
+    else
+      do k = 1, slab_count(from%lengths)
+        call slab(from%lengths, k, lower, extent)
+        if (allocated(bytes)) deallocate (bytes)
+        allocate (bytes(product(extent)*bytes_of(from%type)))
+        call h5_read(from, bytes, error, lower, extent)
+        if (.not. allocated(error)) call h5_write(to, bytes, error, lower, extent)
+        if (allocated(error)) return
+      end do
+    end if
+  end subroutine copy_values
+
+end module map_final

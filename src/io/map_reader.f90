@@ -1,0 +1,261 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Reading a file of Separatrix.
+module map_reader
+  use errors, only: error_t, fail
+  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
+    h5_open_dataset, h5_read
+  use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
+  use h5_list, only: h5_children
+  use kinds, only: int64, int8, real64
+  use map_layout, only: path_of
+  use status, only: exit_io, exit_no_input
+  use files, only: file_exists
+  use value_types, only: bytes_of, from_bytes, type_names, type_string
+  implicit none
+  private
+
+  public :: open_final
+
+  !> What `variables` tells about a dataset. `group` '' is the root.
+  type, public :: variable_info_t
+    character(len=:), allocatable :: group, name, type
+    !> Lengths in C order; none = a scalar.
+    integer(int64), allocatable :: lengths(:)
+  end type variable_info_t
+
+  type, public :: reader_t
+    character(len=:), allocatable :: path
+    type(h5_file_t), private :: file
+  contains
+    procedure :: variables
+    procedure :: has
+    procedure :: lengths
+    procedure :: read_values
+    procedure :: read_block
+    procedure :: read_strings
+    procedure :: read_text
+    procedure :: has_attribute
+    procedure :: text_attribute
+    procedure :: number_attribute
+    procedure :: close => close_reader
+  end type reader_t
+
+contains
+
+  !> Opens a file for reading, also a working file. Code 66 if there is none, 74 if it is not HDF5 or
+  !> not one of Separatrix.
+  subroutine open_final(path, reader, error)
+    character(len=*), intent(in) :: path
+    type(reader_t), intent(out) :: reader
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: format
+    reader%path = path
+    if (.not. file_exists(path)) then
+      call fail(error, exit_no_input, 'there is no file '''//path//'''')
+      return
+    end if
+    call h5_open(path, reader%file, error)
+    if (allocated(error)) return
+    format = ''
+    if (reader%has_attribute('/', 'format')) call reader%text_attribute('/', 'format', format, error)
+    if (allocated(error)) return
+    if (format /= 'separatrix') call fail(error, exit_io, ''''//path//''' is not a file of Separatrix')
+  end subroutine open_final
+
+  !> The variables of the root and of its groups in the order of the file, without dimensions that have
+  !> no coordinates.
+  subroutine variables(self, list, error)
+    class(reader_t), intent(in) :: self
+    type(variable_info_t), allocatable, intent(out) :: list(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names(:)
+    logical, allocatable :: are_groups(:)
+    integer :: i
+    allocate (list(0))
+    call add_group(self, '', list, error)
+    if (allocated(error)) return
+    call h5_children(self%file, '/', names, are_groups, error)
+    if (allocated(error)) return
+    do i = 1, size(names)
+      if (are_groups(i)) call add_group(self, trim(names(i)), list, error)
+      if (allocated(error)) return
+    end do
+  end subroutine variables
+
+  subroutine add_group(self, group, list, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: group
+    type(variable_info_t), allocatable, intent(inout) :: list(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names(:), path
+    logical, allocatable :: are_groups(:)
+    type(h5_dataset_t) :: dataset
+    integer :: i
+    call h5_children(self%file, '/'//group, names, are_groups, error)
+    if (allocated(error)) return
+    do i = 1, size(names)
+      if (are_groups(i)) cycle
+      path = path_of(group, trim(names(i)))
+      if (is_bare_dimension(self, path)) cycle
+      call h5_open_dataset(self%file, path, dataset, error)
+      if (allocated(error)) return
+      call push(list, group, trim(names(i)), dataset)
+      call h5_close_dataset(dataset, error)
+      if (allocated(error)) return
+    end do
+  end subroutine add_group
+
+  subroutine push(list, group, name, dataset)
+    type(variable_info_t), allocatable, intent(inout) :: list(:)
+    character(len=*), intent(in) :: group, name
+    type(h5_dataset_t), intent(in) :: dataset
+    type(variable_info_t), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    associate (last => longer(size(longer)))
+      last%group = group
+      last%name = name
+      last%type = trim(type_names(dataset%type))
+      last%lengths = dataset%lengths
+    end associate
+    call move_alloc(longer, list)
+  end subroutine push
+
+  !> A dimension scale without coordinates has neither a checksum nor a unit.
+  logical function is_bare_dimension(self, path)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    is_bare_dimension = h5_has_attribute(self%file, path, 'CLASS')
+    if (is_bare_dimension) is_bare_dimension = .not. h5_has_attribute(self%file, path, 'checksum')
+    if (is_bare_dimension) is_bare_dimension = .not. h5_has_attribute(self%file, path, 'units')
+  end function is_bare_dimension
+
+  !> Whether there is an object of this path ('/regime', '/catalogue/x').
+  logical function has(self, path)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    has = h5_exists(self%file, path)
+  end function has
+
+  !> The lengths of a variable in C order.
+  subroutine lengths(self, path, values, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(int64), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_dataset_t) :: dataset
+    call h5_open_dataset(self%file, path, dataset, error)
+    if (allocated(error)) return
+    values = dataset%lengths
+    call h5_close_dataset(dataset, error)
+  end subroutine lengths
+
+  !> The values of a numeric variable in C order.
+  subroutine read_values(self, path, values, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    real(real64), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_dataset_t) :: dataset
+    integer(int8), allocatable :: bytes(:)
+    call h5_open_dataset(self%file, path, dataset, error)
+    if (allocated(error)) return
+    if (dataset%type == type_string) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not numeric')
+      return
+    end if
+    allocate (values(product(dataset%lengths)))
+    allocate (bytes(size(values, kind=int64)*bytes_of(dataset%type)))
+    call h5_read(dataset, bytes, error)
+    if (allocated(error)) return
+    call from_bytes(dataset%type, bytes, values)
+    call h5_close_dataset(dataset, error)
+  end subroutine read_values
+
+  !> The values of a block of a numeric variable in C order; `lower` from 0.
+  subroutine read_block(self, path, lower, extent, values, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: lower(:), extent(:)
+    real(real64), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_dataset_t) :: dataset
+    integer(int8), allocatable :: bytes(:)
+    call h5_open_dataset(self%file, path, dataset, error)
+    if (allocated(error)) return
+    allocate (values(product(extent)), bytes(product(extent)*bytes_of(dataset%type)))
+    call h5_read(dataset, bytes, error, lower, extent)
+    if (allocated(error)) return
+    call from_bytes(dataset%type, bytes, values)
+    call h5_close_dataset(dataset, error)
+  end subroutine read_block
+
+  !> The strings of a variable of strings.
+  subroutine read_strings(self, path, strings, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: strings(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_dataset_t) :: dataset
+    call h5_open_dataset(self%file, path, dataset, error)
+    if (allocated(error)) return
+    if (dataset%type /= type_string) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not text')
+      return
+    end if
+    call h5_read_strings(dataset, strings, error)
+    if (allocated(error)) return
+    call h5_close_dataset(dataset, error)
+  end subroutine read_strings
+
+  !> The text of a scalar dataset ('/provenance/case_text').
+  subroutine read_text(self, path, text, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: strings(:)
+    call self%read_strings(path, strings, error)
+    if (allocated(error)) return
+    text = strings(1)
+  end subroutine read_text
+
+  !> Whether an object ('/', '/provenance', '/regime') has an attribute.
+  logical function has_attribute(self, object, name)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: object, name
+    has_attribute = h5_has_attribute(self%file, object, name)
+  end function has_attribute
+
+  !> The value of a text attribute.
+  subroutine text_attribute(self, object, name, text, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: object, name
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+    call h5_get_text(self%file, object, name, text, error)
+  end subroutine text_attribute
+
+  !> The first value of a numeric attribute.
+  subroutine number_attribute(self, object, name, value, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: object, name
+    real(real64), intent(out) :: value
+    type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: values(:)
+    value = 0
+    call h5_get_numbers(self%file, object, name, values, error)
+    if (allocated(error)) return
+    value = values(1)
+  end subroutine number_attribute
+
+  !> Closes the file.
+  subroutine close_reader(self, error)
+    class(reader_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    call h5_close(self%file, error)
+  end subroutine close_reader
+
+end module map_reader

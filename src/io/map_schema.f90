@@ -1,0 +1,282 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The description of a file: dimensions, variables, attributes and texts. Groups are named without
+!> slashes ('catalogue'); '' is the root.
+module map_schema
+  use kinds, only: int64, real64
+  use value_types, only: type_float32, type_float64, type_int16, type_int32, type_int64, type_int8, &
+    type_string
+  implicit none
+  private
+
+  public :: type_int8, type_int16, type_int32, type_int64, type_float32, type_float64, type_string
+
+  !> Longest name of a dimension.
+  integer, parameter, public :: name_length = 64
+
+  type, public :: dimension_t
+    character(len=:), allocatable :: name
+    integer(int64) :: length = 0
+  end type dimension_t
+
+  !> A variable named like its only dimension is that dimension's coordinate.
+  type, public :: variable_t
+    character(len=:), allocatable :: group
+    character(len=:), allocatable :: name
+    !> One of the type codes above.
+    integer :: type = type_float64
+    !> Names in C order; none = a scalar.
+    character(len=name_length), allocatable :: dimensions(:)
+    character(len=:), allocatable :: units
+    character(len=:), allocatable :: long_name
+    !> The codes of a coded variable and their names, separated by blanks.
+    integer, allocatable :: flag_values(:)
+    character(len=:), allocatable :: flag_meanings
+    !> Written tile by tile; its dimensions are those of the grid.
+    logical :: tiled = .false.
+    !> Values in C order, zeros if not given; or, of a variable of strings, the strings.
+    real(real64), allocatable :: data(:)
+    character(len=:), allocatable :: strings(:)
+  end type variable_t
+
+  !> A text, or numbers (`type_int64` or `type_float64`).
+  type, public :: attribute_t
+    character(len=:), allocatable :: group, name
+    integer :: type = type_string
+    character(len=:), allocatable :: text
+    real(real64) :: number = 0
+  end type attribute_t
+
+  !> A scalar dataset that holds a text of any length.
+  type, public :: text_t
+    character(len=:), allocatable :: group, name, text
+  end type text_t
+
+  type, public :: schema_t
+    type(dimension_t), allocatable :: dimensions(:)
+    type(variable_t), allocatable :: variables(:)
+    type(attribute_t), allocatable :: attributes(:)
+    type(text_t), allocatable :: texts(:)
+  contains
+    procedure :: add_dimension
+    procedure :: add_variable
+    procedure :: add_text
+    procedure, private :: add_text_attribute
+    procedure, private :: add_integer_attribute
+    procedure, private :: add_real_attribute
+    generic :: add_attribute => add_text_attribute, add_integer_attribute, add_real_attribute
+    procedure :: append
+    procedure :: length_of
+    procedure :: lengths_of
+    procedure :: find_text_attribute
+  end type schema_t
+
+contains
+
+  !> Adds a dimension.
+  subroutine add_dimension(self, name, length)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(int64), intent(in) :: length
+    type(dimension_t) :: dimension
+    call complete(self)
+    dimension%name = name
+    dimension%length = length
+    call push_dimension(self%dimensions, dimension)
+  end subroutine add_dimension
+
+  !> Adds a variable. `dimensions`: names in C order. What is not given is absent from the file.
+  subroutine add_variable(self, name, type, dimensions, units, long_name, flag_values, flag_meanings, &
+                          tiled, data, strings, group)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: type
+    character(len=*), intent(in) :: dimensions(:)
+    character(len=*), intent(in), optional :: units, long_name, flag_meanings, strings(:), group
+    integer, intent(in), optional :: flag_values(:)
+    logical, intent(in), optional :: tiled
+    real(real64), intent(in), optional :: data(:)
+    type(variable_t) :: variable
+    call complete(self)
+    variable%group = ''
+    variable%name = name
+    variable%type = type
+    allocate (variable%dimensions(size(dimensions)))
+    variable%dimensions = dimensions
+    if (present(group)) variable%group = group
+    if (present(units)) variable%units = units
+    if (present(long_name)) variable%long_name = long_name
+    if (present(flag_values)) variable%flag_values = flag_values
+    if (present(flag_meanings)) variable%flag_meanings = flag_meanings
+    if (present(tiled)) variable%tiled = tiled
+    if (present(data)) variable%data = data
+    if (present(strings)) then
+      allocate (character(len=len(strings)) :: variable%strings(size(strings)))
+      variable%strings(:) = strings
+    end if
+    call push_variable(self%variables, variable)
+  end subroutine add_variable
+
+  !> Adds a scalar dataset with a text.
+  subroutine add_text(self, group, name, text)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: group, name, text
+    type(text_t) :: item
+    call complete(self)
+    item%group = group
+    item%name = name
+    item%text = text
+    call push_text(self%texts, item)
+  end subroutine add_text
+
+  !> Adds an attribute of a group. A later one of the same name replaces an earlier one.
+  subroutine add_text_attribute(self, group, name, text)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: group, name, text
+    type(attribute_t) :: attribute
+    attribute%group = group
+    attribute%name = name
+    attribute%text = text
+    call complete(self)
+    call push_attribute(self%attributes, attribute)
+  end subroutine add_text_attribute
+
+  !> As `add_text_attribute`.
+  subroutine add_integer_attribute(self, group, name, value)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: group, name
+    integer, intent(in) :: value
+    type(attribute_t) :: attribute
+    attribute%group = group
+    attribute%name = name
+    attribute%type = type_int64
+    attribute%number = value
+    call complete(self)
+    call push_attribute(self%attributes, attribute)
+  end subroutine add_integer_attribute
+
+  !> As `add_text_attribute`.
+  subroutine add_real_attribute(self, group, name, value)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: group, name
+    real(real64), intent(in) :: value
+    type(attribute_t) :: attribute
+    attribute%group = group
+    attribute%name = name
+    attribute%type = type_float64
+    attribute%number = value
+    call complete(self)
+    call push_attribute(self%attributes, attribute)
+  end subroutine add_real_attribute
+
+  !> Adds everything of another schema behind what is here.
+  subroutine append(self, other)
+    class(schema_t), intent(inout) :: self
+    type(schema_t), intent(in) :: other
+    integer :: i
+    call complete(self)
+    if (.not. allocated(other%dimensions)) return
+    do i = 1, size(other%dimensions)
+      call push_dimension(self%dimensions, other%dimensions(i))
+    end do
+    do i = 1, size(other%variables)
+      call push_variable(self%variables, other%variables(i))
+    end do
+    do i = 1, size(other%attributes)
+      call push_attribute(self%attributes, other%attributes(i))
+    end do
+    do i = 1, size(other%texts)
+      call push_text(self%texts, other%texts(i))
+    end do
+  end subroutine append
+
+  !> The length of a dimension; -1 if there is none of this name.
+  pure integer(int64) function length_of(self, name)
+    class(schema_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    integer :: i
+    length_of = -1
+    do i = 1, size(self%dimensions)
+      if (self%dimensions(i)%name == name) length_of = self%dimensions(i)%length
+    end do
+  end function length_of
+
+  !> The lengths of several dimensions.
+  pure function lengths_of(self, names) result(lengths)
+    class(schema_t), intent(in) :: self
+    character(len=*), intent(in) :: names(:)
+    integer(int64) :: lengths(size(names))
+    integer :: i
+    do i = 1, size(names)
+      lengths(i) = self%length_of(trim(names(i)))
+    end do
+  end function lengths_of
+
+  !> The value of a text attribute; '' if there is none.
+  pure function find_text_attribute(self, group, name) result(text)
+    class(schema_t), intent(in) :: self
+    character(len=*), intent(in) :: group, name
+    character(len=:), allocatable :: text
+    integer :: i
+    text = ''
+    if (.not. allocated(self%attributes)) return
+    do i = 1, size(self%attributes)
+      associate (attribute => self%attributes(i))
+        if (attribute%group == group .and. attribute%name == name .and. allocated(attribute%text)) text = attribute%text
+      end associate
+    end do
+  end function find_text_attribute
+
+  !> Gives the lists that are not there yet their length 0.
+  subroutine complete(self)
+    class(schema_t), intent(inout) :: self
+    if (.not. allocated(self%dimensions)) allocate (self%dimensions(0))
+    if (.not. allocated(self%variables)) allocate (self%variables(0))
+    if (.not. allocated(self%attributes)) allocate (self%attributes(0))
+    if (.not. allocated(self%texts)) allocate (self%texts(0))
+  end subroutine complete
+
+  ! gfortran 12 leaks array constructors of types with allocatable components; hence these four.
+
+  subroutine push_dimension(list, item)
+    type(dimension_t), allocatable, intent(inout) :: list(:)
+    type(dimension_t), intent(in) :: item
+    type(dimension_t), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer)) = item
+    call move_alloc(longer, list)
+  end subroutine push_dimension
+
+  subroutine push_variable(list, item)
+    type(variable_t), allocatable, intent(inout) :: list(:)
+    type(variable_t), intent(in) :: item
+    type(variable_t), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer)) = item
+    call move_alloc(longer, list)
+  end subroutine push_variable
+
+  subroutine push_attribute(list, item)
+    type(attribute_t), allocatable, intent(inout) :: list(:)
+    type(attribute_t), intent(in) :: item
+    type(attribute_t), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer)) = item
+    call move_alloc(longer, list)
+  end subroutine push_attribute
+
+  subroutine push_text(list, item)
+    type(text_t), allocatable, intent(inout) :: list(:)
+    type(text_t), intent(in) :: item
+    type(text_t), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer)) = item
+    call move_alloc(longer, list)
+  end subroutine push_text
+
+end module map_schema

@@ -1,0 +1,141 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Checksums of datasets: computed, written, verified.
+module map_verify
+  use checksum, only: crc32, crc32_text
+  use errors, only: error_t, fail
+  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read
+  use h5_attributes, only: h5_get_numbers, h5_has_attribute, h5_put_numbers, h5_read_strings
+  use h5_list, only: h5_children
+  use kinds, only: int64, int8, real64
+  use map_layout, only: path_of
+  use slabs, only: slab, slab_count
+  use status, only: exit_io
+  use value_types, only: bytes_of, type_string, type_uint32
+  implicit none
+  private
+
+  public :: seal, verify_file
+
+contains
+
+  !> The CRC-32 of a dataset: of the bytes of its values in C order; of strings, each followed by a
+  !> zero byte.
+  subroutine dataset_checksum(file, name, value, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    integer(int64), intent(out) :: value
+    type(error_t), allocatable, intent(out) :: error
+    type(h5_dataset_t) :: dataset
+    character(len=:), allocatable :: strings(:)
+    integer :: i
+    value = 0
+    call h5_open_dataset(file, name, dataset, error)
+    if (allocated(error)) return
+    if (dataset%type == type_string) then
+      call h5_read_strings(dataset, strings, error)
+      if (allocated(error)) return
+      do i = 1, size(strings)
+        value = crc32_text(trim(strings(i))//achar(0), value)
+      end do
+    else
+      call checksum_of_slabs(dataset, value, error)
+      if (allocated(error)) return
+    end if
+    call h5_close_dataset(dataset, error)
+  end subroutine dataset_checksum
+
+  subroutine checksum_of_slabs(dataset, value, error)
+    type(h5_dataset_t), intent(in) :: dataset
+    integer(int64), intent(inout) :: value
+    type(error_t), allocatable, intent(out) :: error
+    integer(int8), allocatable :: bytes(:)
+    integer(int64) :: lower(size(dataset%lengths)), extent(size(dataset%lengths)), k
+    if (size(dataset%lengths) == 0) then
+      allocate (bytes(bytes_of(dataset%type)))
+      call h5_read(dataset, bytes, error)
+      if (.not. allocated(error)) value = crc32(bytes, value)
+      return
+    end if
+    do k = 1, slab_count(dataset%lengths)
+      call slab(dataset%lengths, k, lower, extent)
+      if (allocated(bytes)) deallocate (bytes)
+      allocate (bytes(product(extent)*bytes_of(dataset%type)))
+      call h5_read(dataset, bytes, error, lower, extent)
+      if (allocated(error)) return
+      value = crc32(bytes, value)
+    end do
+  end subroutine checksum_of_slabs
+
+  !> Gives a dataset the attribute `checksum`.
+  subroutine seal(file, name, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: value
+    call dataset_checksum(file, name, value, error)
+    if (allocated(error)) return
+    call h5_put_numbers(file, name, 'checksum', type_uint32, [real(value, real64)], error)
+  end subroutine seal
+
+  !> Reads a final file whole. Code 74, naming the dataset, if it is not complete or a checksum is
+  !> wrong. `count`: datasets verified.
+  subroutine verify_file(path, error, count)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    integer, intent(out), optional :: count
+    type(error_t), allocatable :: ignored
+    type(h5_file_t) :: file
+    real(real64), allocatable :: complete(:)
+    integer :: verified
+    verified = 0
+    call h5_open(path, file, error)
+    if (allocated(error)) return
+    call h5_get_numbers(file, '/', 'complete', complete, error)
+    if (.not. allocated(error)) then
+      if (nint(complete(1)) /= 1) call fail(error, exit_io, ''''//path//''' is not complete')
+    end if
+    if (.not. allocated(error)) call verify_group(file, '', verified, error)
+    call h5_close(file, ignored)
+    if (present(count)) count = verified
+  end subroutine verify_file
+
+  recursive subroutine verify_group(file, group, verified, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: group
+    integer, intent(inout) :: verified
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names(:), path
+    logical, allocatable :: are_groups(:)
+    integer :: i
+    call h5_children(file, '/'//group, names, are_groups, error)
+    if (allocated(error)) return
+    do i = 1, size(names)
+      path = path_of(group, trim(names(i)))
+      if (are_groups(i)) then
+        call verify_group(file, path(2:), verified, error)
+      else if (h5_has_attribute(file, path, 'checksum')) then
+        call verify_dataset(file, path, error)
+        verified = verified + 1
+      end if
+      if (allocated(error)) return
+    end do
+  end subroutine verify_group
+
+  subroutine verify_dataset(file, name, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: expected(:)
+    integer(int64) :: found
+    call h5_get_numbers(file, name, 'checksum', expected, error)
+    if (allocated(error)) return
+    call dataset_checksum(file, name, found, error)
+    if (allocated(error)) return
+    if (nint(expected(1), int64) /= found) then
+      call fail(error, exit_io, 'dataset '''//name//''' of '''//file%path//''' does not match its checksum')
+    end if
+  end subroutine verify_dataset
+
+end module map_verify

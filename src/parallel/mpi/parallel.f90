@@ -1,0 +1,67 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Starts the program's team and makes schedulers: the build with MPI.
+module parallel
+  use errors, only: error_t
+  use mpi_f08, only: MPI_Comm, MPI_COMM_WORLD, MPI_Init, MPI_Initialized
+  use mpi_scheduler, only: mpi_scheduler_t, new_mpi_scheduler
+  use mpi_team, only: mpi_team_t, new_mpi_team
+  use scheduler, only: scheduler_options_t, scheduler_t
+  use serial_scheduler, only: serial_scheduler_t
+  use system, only: default_environment
+  use team, only: team_t
+  implicit none
+  private
+
+  public :: start_team, join_team, make_scheduler
+
+  !> What `--version` says about MPI.
+  character(len=*), parameter, public :: mpi_name = 'MPI'
+
+contains
+
+  !> The team of the whole program; starts MPI if nobody has. Also without mpirun.
+  subroutine start_team(team)
+    class(team_t), allocatable, intent(out) :: team
+    type(mpi_team_t) :: ours
+    logical :: running
+    call MPI_Initialized(running)
+    if (.not. running) then
+      ! The default layer of OpenMPI 4.1 can lose data on a full disk without an error.
+      call default_environment('OMPI_MCA_io', 'romio321')
+      call MPI_Init()
+    end if
+    call new_mpi_team(MPI_COMM_WORLD, ours, owns_mpi=.not. running)
+    team = ours
+  end subroutine start_team
+
+  !> The team of a caller's communicator, given by its Fortran handle. MPI is running.
+  subroutine join_team(communicator, team)
+    integer, intent(in) :: communicator
+    class(team_t), allocatable, intent(out) :: team
+    type(mpi_team_t) :: ours
+    type(MPI_Comm) :: handle
+    handle%MPI_VAL = communicator
+    call new_mpi_team(handle, ours, owns_mpi=.false.)
+    team = ours
+  end subroutine join_team
+
+  !> The scheduler that belongs to the team. Collective.
+  subroutine make_scheduler(team, options, scheduler, error)
+    class(team_t), intent(in) :: team
+    type(scheduler_options_t), intent(in) :: options
+    class(scheduler_t), allocatable, intent(out) :: scheduler
+    type(error_t), allocatable, intent(out) :: error
+    type(mpi_scheduler_t) :: ours
+    select type (team)
+    type is (mpi_team_t)
+      call new_mpi_scheduler(team, options, ours, error)
+      scheduler = ours
+    class default
+      allocate (serial_scheduler_t :: scheduler)
+      scheduler%options = options
+    end select
+  end subroutine make_scheduler
+
+end module parallel

@@ -1,0 +1,92 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Hands out the positions 1..n of a work list to the ranks of a team, one at a time. Children:
+!> serial_scheduler, mpi_scheduler. The loop of every rank:
+!>
+!>     call scheduler%start(n, error)
+!>     do
+!>       call scheduler%next(position)
+!>       if (position == 0) exit
+!>       (trajectories, with `call scheduler%poll()` between them; if `stop_requested()` then leave
+!>        the loop without calling `next`, which counts the position before as done)
+!>     end do
+!>     call scheduler%finish()
+module scheduler
+  use errors, only: error_t
+  use kinds, only: real64
+  use signals, only: signal_count
+  use system, only: monotonic_seconds
+  implicit none
+  private
+
+  type, public :: scheduler_options_t
+    !> Seconds after `start` at which the run stops; 0 = none.
+    real(real64) :: time_limit = 0
+    !> Splits the ranks of a host into nodes of at most this many ranks; 0 = as the hosts are.
+    integer :: ranks_per_node = 0
+  end type scheduler_options_t
+
+  type, abstract, public :: scheduler_t
+    type(scheduler_options_t) :: options
+    real(real64) :: started = 0
+  contains
+    procedure(start_with), deferred :: start
+    procedure(next_of), deferred :: next
+    procedure(act), deferred :: poll
+    procedure(act), deferred :: request_stop
+    procedure(is_true), deferred :: stop_requested
+    procedure(count_of), deferred :: done_count
+    procedure(act), deferred :: finish
+    procedure :: stop_is_due
+  end type scheduler_t
+
+  abstract interface
+    !> Collective: begins a list of `n` positions, the same on every rank.
+    subroutine start_with(self, n, error)
+      import :: error_t, scheduler_t
+      class(scheduler_t), intent(inout) :: self
+      integer, intent(in) :: n
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine start_with
+
+    !> The next position; 0 = none left, or a stop was requested. The position that this rank got
+    !> before counts as done.
+    subroutine next_of(self, position)
+      import :: scheduler_t
+      class(scheduler_t), intent(inout) :: self
+      integer, intent(out) :: position
+    end subroutine next_of
+
+    !> `poll`: cheap; looks for signals, the time limit and messages. `request_stop`: all ranks stop
+    !> soon. `finish`: collective; every rank calls it once after its last position.
+    subroutine act(self)
+      import :: scheduler_t
+      class(scheduler_t), intent(inout) :: self
+    end subroutine act
+
+    !> Whether this rank should leave its work now.
+    logical function is_true(self)
+      import :: scheduler_t
+      class(scheduler_t), intent(in) :: self
+    end function is_true
+
+    !> Positions done. While the work runs only rank 0 knows it, apart from blocks that other nodes
+    !> have not reported; after `finish` it is exact on every rank.
+    integer function count_of(self)
+      import :: scheduler_t
+      class(scheduler_t), intent(in) :: self
+    end function count_of
+  end interface
+
+contains
+
+  !> Whether a signal came or the time is over.
+  logical function stop_is_due(self)
+    class(scheduler_t), intent(in) :: self
+    stop_is_due = signal_count() > 0
+    if (stop_is_due .or. self%options%time_limit <= 0) return
+    stop_is_due = monotonic_seconds() - self%started >= self%options%time_limit
+  end function stop_is_due
+
+end module scheduler

@@ -1,0 +1,132 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Tiles: blocks of a grid of 1 to 6 dimensions. Pure integer arithmetic. Points and tiles are
+!> numbered in C order (the last dimension runs fastest), tiles from 1, points and corners from 0.
+module tiles
+  use errors, only: error_t, fail
+  use kinds, only: int64
+  use status, only: exit_internal
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: new_tiling
+
+  !> Most dimensions of a grid.
+  integer, parameter, public :: max_dimensions = 6
+
+  type, public :: tiling_t
+    !> Lengths of the grid and of a tile.
+    integer(int64), allocatable :: lengths(:), shape(:)
+  contains
+    procedure :: count => count_tiles
+    procedure :: block_of
+    procedure :: points
+    procedure :: corner
+    procedure :: point_indices
+    procedure :: subscripts
+  end type tiling_t
+
+contains
+
+  !> The tiling of a grid; the tile shape is cut to the grid. Code 70 if the ranks differ or a
+  !> length is not positive.
+  subroutine new_tiling(lengths, shape, tiling, error)
+    integer(int64), intent(in) :: lengths(:), shape(:)
+    type(tiling_t), intent(out) :: tiling
+    type(error_t), allocatable, intent(out) :: error
+    tiling%lengths = lengths
+    if (size(lengths) /= size(shape)) then
+      call fail(error, exit_internal, 'a grid of '//to_text(size(lengths))//' dimensions has a tile of '// &
+                to_text(size(shape)))
+    else if (size(lengths) < 1 .or. size(lengths) > max_dimensions) then
+      call fail(error, exit_internal, 'a grid has 1 to 6 dimensions, not '//to_text(size(lengths)))
+    else if (any(lengths < 1) .or. any(shape < 1)) then
+      call fail(error, exit_internal, 'lengths of grids and tiles are positive')
+    else
+      tiling%shape = min(lengths, shape)
+    end if
+  end subroutine new_tiling
+
+  !> The number of tiles.
+  pure integer function count_tiles(self)
+    class(tiling_t), intent(in) :: self
+    count_tiles = int(product(tiles_along(self)))
+  end function count_tiles
+
+  !> Lower corner (from 0) and extents of a tile (from 1), in grid points.
+  pure subroutine block_of(self, tile, lower, extent)
+    class(tiling_t), intent(in) :: self
+    integer, intent(in) :: tile
+    integer(int64), intent(out) :: lower(:), extent(:)
+    lower = unravel(int(tile - 1, int64), tiles_along(self))*self%shape
+    extent = min(self%shape, self%lengths - lower)
+  end subroutine block_of
+
+  !> The lower corner of a tile.
+  pure function corner(self, tile) result(lower)
+    class(tiling_t), intent(in) :: self
+    integer, intent(in) :: tile
+    integer(int64) :: lower(size(self%lengths))
+    integer(int64) :: extent(size(self%lengths))
+    call self%block_of(tile, lower, extent)
+  end function corner
+
+  !> The number of points of a tile.
+  pure integer function points(self, tile)
+    class(tiling_t), intent(in) :: self
+    integer, intent(in) :: tile
+    integer(int64) :: lower(size(self%lengths)), extent(size(self%lengths))
+    call self%block_of(tile, lower, extent)
+    points = int(product(extent))
+  end function points
+
+  !> The C-order indices in the grid (from 0) of the points of a tile, in the C order of the tile.
+  pure function point_indices(self, tile) result(indices)
+    class(tiling_t), intent(in) :: self
+    integer, intent(in) :: tile
+    integer(int64), allocatable :: indices(:)
+    integer(int64) :: lower(size(self%lengths)), extent(size(self%lengths)), i
+    call self%block_of(tile, lower, extent)
+    allocate (indices(product(extent)))
+    do i = 1, size(indices, kind=int64)
+      indices(i) = ravel(lower + unravel(i - 1, extent), self%lengths)
+    end do
+  end function point_indices
+
+  !> The subscripts (from 0, one per dimension) of a C-order index of the grid (from 0).
+  pure function subscripts(self, index) result(place)
+    class(tiling_t), intent(in) :: self
+    integer(int64), intent(in) :: index
+    integer(int64) :: place(size(self%lengths))
+    place = unravel(index, self%lengths)
+  end function subscripts
+
+  pure function tiles_along(self) result(counts)
+    class(tiling_t), intent(in) :: self
+    integer(int64) :: counts(size(self%lengths))
+    counts = (self%lengths + self%shape - 1)/self%shape
+  end function tiles_along
+
+  pure function unravel(index, lengths) result(place)
+    integer(int64), intent(in) :: index, lengths(:)
+    integer(int64) :: place(size(lengths)), rest
+    integer :: i
+    rest = index
+    do i = size(lengths), 1, -1
+      place(i) = mod(rest, lengths(i))
+      rest = rest/lengths(i)
+    end do
+  end function unravel
+
+  pure integer(int64) function ravel(place, lengths)
+    integer(int64), intent(in) :: place(:), lengths(:)
+    integer :: i
+    ravel = 0
+    do i = 1, size(lengths)
+      ravel = ravel*lengths(i) + place(i)
+    end do
+  end function ravel
+
+end module tiles

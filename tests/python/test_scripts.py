@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scripts around the build."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+CTEST = """<testsuite>
+  <testcase name="a" status="run"/>
+  <testcase name="b" status="disabled"><skipped message="Disabled"/></testcase>
+  {more}
+</testsuite>"""
+PYTEST = """<testsuites><testsuite>
+  <testcase name="c"/>
+  <testcase name="d"><skipped/></testcase>
+</testsuite></testsuites>"""
+
+
+@pytest.mark.parametrize(
+    ("more", "line", "code"),
+    [
+        ("", "2 passed, 0 failed", 0),
+        ('<testcase name="e" status="fail"><failure/></testcase>', "2 passed, 1 failed", 1),
+        ('<testcase name="e" status="notrun"><skipped/></testcase>', "2 passed, 1 failed", 1),
+    ],
+)
+def test_counts_of_ctest_and_pytest_are_added(source_dir, tmp_path, more, line, code):
+    files = [tmp_path / "ctest.xml", tmp_path / "pytest.xml"]
+    files[0].write_text(CTEST.format(more=more))
+    files[1].write_text(PYTEST)
+    command = [sys.executable, str(source_dir / "scripts" / "count_tests.py"), *map(str, files)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.stdout.splitlines()[-1] == line
+    assert result.returncode == code
+
+
+def test_the_version_is_the_same_everywhere(source_dir):
+    cmake = re.search(r"VERSION (\d+\.\d+\.\d+) ", (source_dir / "CMakeLists.txt").read_text())
+    citation = re.search(r"^version: (\S+)$", (source_dir / "CITATION.cff").read_text(), re.MULTILINE)
+    assert cmake.group(1) == citation.group(1)
+
+
+def write_build_info(source_dir, tmp_path, tree) -> str:
+    output = tmp_path / "build_info.f90"
+    folder = source_dir / "scripts" / "cmake"
+    options = {
+        "TEMPLATE": folder / "build_info.f90.in",
+        "OUTPUT": output,
+        "SOURCE_DIR": tree,
+        "VERSION": "1.2.3",
+        "COMPILER": "It's a compiler",
+        "FLAGS": "-flag " * 30,
+        "MPI": "none",
+        "HDF5": "1",
+    }
+    command = ["cmake", *(f"-D{key}={value}" for key, value in options.items())]
+    subprocess.run([*command, "-P", str(folder / "write_build_info.cmake")], check=True)
+    return output.read_text()
+
+
+def test_build_info_is_valid_fortran_and_names_the_commit(source_dir, tmp_path):
+    tree = tmp_path / "tree"
+    tree.mkdir()
+    git = ["git", "-C", str(tree), "-c", "user.name=a", "-c", "user.email=a@b"]
+    assert "commit = 'unknown'" in write_build_info(source_dir, tmp_path, tree)
+    subprocess.run([*git, "init", "-q"], check=True)
+    subprocess.run([*git, "commit", "-q", "--allow-empty", "-m", "first"], check=True)
+    head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True)
+    text = write_build_info(source_dir, tmp_path, tree)
+    assert f"commit = '{head.stdout[:12]}'" in text
+    assert max(map(len, text.splitlines())) <= 132
+    assert "'It''s a compiler'" in text
