@@ -8,7 +8,7 @@ module attractors
   implicit none
   private
 
-  public :: regime_of, find_capture, pack_attractor, unpack_attractor
+  public :: regime_of, find_capture, find_box, pack_attractor, unpack_attractor
 
   !> Regimes of a motion.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
@@ -21,6 +21,8 @@ module attractors
   integer, parameter, public :: longest_period = 64
 
   integer, parameter :: packed_scalars = 16
+  !> Share of its size by which a box of section points is widened on each side.
+  real(wp), parameter :: box_margin = 0.05_wp
   !> Length of a packed attractor.
   integer, parameter, public :: packed_size = packed_scalars + 5*longest_period
 
@@ -101,6 +103,24 @@ contains
       if (found > 0) return
     end do
   end function find_capture
+
+  !> Index of the motion that is not periodic whose box of section points holds a state; 0 if none.
+  pure integer function find_box(catalogue, state) result(found)
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(state_t), intent(in) :: state
+    real(wp) :: point(2), margin(2)
+    integer :: k
+    found = 0
+    point = [state%x, state%v]
+    do k = 1, size(catalogue)
+      if (catalogue(k)%period /= 0 .or. catalogue(k)%rests) cycle
+      margin = box_margin*(catalogue(k)%points(:, 2) - catalogue(k)%points(:, 1))
+      if (all(point >= catalogue(k)%points(:, 1) - margin .and. point <= catalogue(k)%points(:, 2) + margin)) then
+        found = k
+        return
+      end if
+    end do
+  end function find_box
 
   !> An attractor as plain numbers, to be sent between ranks.
   pure function pack_attractor(attractor) result(packed)

@@ -4,7 +4,7 @@
 !> Builds the catalogue of attractors of one machine from a sample of starts. Serial and in a fixed order; frozen
 !> before any trajectory of a map is labelled.
 module discover
-  use attractors, only: attractor_t, find_capture, longest_period, regime_of
+  use attractors, only: attractor_t, find_box, find_capture, longest_period, regime_of
   use cycle, only: refine_cycle
   use kinds, only: int64, wp
   use motion, only: advance_period, motion_t, start_state
@@ -44,9 +44,10 @@ contains
         if (known .or. .not. ok) exit
         call recognise(moving, state, min(max_period, longest_period), found, ok)
         if (ok) then
-          catalogue = [catalogue, found]
+          if (.not. holds(catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
+        if (find_box(catalogue, state) > 0) exit
         if (2*patience > span%extension*span%duration) then
           call add_aperiodic(moving, state, catalogue)
           exit
@@ -55,6 +56,15 @@ contains
       end do
     end do
   end subroutine discover_attractors
+
+  !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
+  pure logical function holds(catalogue, found)
+    type(attractor_t), intent(in) :: catalogue(:), found
+    type(state_t) :: state
+    state%x = found%points(1, 1)
+    state%v = found%points(2, 1)
+    holds = find_capture(catalogue, state, .not. found%rests) > 0
+  end function holds
 
   !> Runs for `patience` [s] unless captured before.
   pure subroutine settle(moving, catalogue, patience, state, known, ok)

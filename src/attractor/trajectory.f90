@@ -4,7 +4,7 @@
 !> One trajectory from its start to its label: a pure function of the machine, the frozen catalogue and
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
-  use attractors, only: attractor_t, features_t, find_capture, regime_of
+  use attractors, only: attractor_t, features_t, find_box, find_capture, regime_of
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, reset_tally, state_t, tally_t
@@ -79,8 +79,8 @@ contains
     call run_until(moving, catalogue, span, course, span%duration, outcome, log)
     outcome%window = regime_of(course%tally, span%window/moving%machine%period)
     call note_state(course, outcome)
-    if (course%reason == 0 .and. course%captured == 0) &
-      call run_until(moving, catalogue, span, course, span%extension*span%duration, outcome)
+    if (course%reason == 0 .and. course%captured == 0 .and. size(catalogue) > 0) &
+      call wait_for_capture(moving, catalogue, span, course, outcome)
     call conclude(catalogue, course, outcome)
   end subroutine run_trajectory
 
@@ -100,8 +100,7 @@ contains
     ended = course%reason /= 0 .or. (course%captured > 0 .and. span%stop_when_captured)
   end function ended
 
-  !> Moves on to a time since the start, looking at every stroboscopic section on the way whether the
-  !> motion has been captured; beyond the duration it ends there.
+  !> Moves on to a time since the start, looking at every stroboscopic section on the way.
   pure subroutine run_until(moving, catalogue, span, course, time_end, outcome, log)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -110,32 +109,54 @@ contains
     real(wp), intent(in) :: time_end
     type(outcome_t), intent(inout) :: outcome
     type(log_t), intent(inout), optional :: log
-    real(wp) :: to_section
-    integer(int64) :: slips_before
-    logical :: whole
     do while (course%elapsed < time_end)
-      to_section = moving%machine%period - course%state%time
-      if (course%elapsed + to_section > time_end) then
+      if (course%elapsed + (moving%machine%period - course%state%time) > time_end) then
         call advance(moving, course%state, course%state%time + (time_end - course%elapsed), course%tally, &
                      course%reason, log)
         course%elapsed = time_end
         return
       end if
-      whole = course%state%time <= 0
-      slips_before = course%slips + course%tally%slips
-      call advance_period(moving, course%state, course%tally, course%reason, log)
-      course%elapsed = course%elapsed + to_section
-      if (course%reason /= 0) return
-      course%captured = find_capture(catalogue, course%state, .not. whole .or. &
-                                     course%slips + course%tally%slips > slips_before)
-      if (course%captured == 0) then
-        outcome%settle_time = -1
-      else
-        if (outcome%settle_time < 0) outcome%settle_time = course%elapsed
-        if (span%stop_when_captured .or. course%elapsed > span%duration) return
-      end if
+      call run_to_section(moving, catalogue, course, outcome, log)
+      if (ended(course, span)) return
     end do
   end subroutine run_until
+
+  !> Goes on after the duration, section by section, until captured or the extension is over.
+  pure subroutine wait_for_capture(moving, catalogue, span, course, outcome)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(span_t), intent(in) :: span
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    do
+      call run_to_section(moving, catalogue, course, outcome)
+      if (course%reason /= 0 .or. course%captured > 0) return
+      if (course%elapsed >= span%extension*span%duration) return
+    end do
+  end subroutine wait_for_capture
+
+  !> To the next stroboscopic section: has the motion been captured there?
+  pure subroutine run_to_section(moving, catalogue, course, outcome, log)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: start
+    integer(int64) :: slips_before
+    start = course%state%time
+    slips_before = course%slips + course%tally%slips
+    call advance_period(moving, course%state, course%tally, course%reason, log)
+    course%elapsed = course%elapsed + (moving%machine%period - start)
+    if (course%reason /= 0) return
+    course%captured = find_capture(catalogue, course%state, start > 0 .or. &
+                                   course%slips + course%tally%slips > slips_before)
+    if (course%captured == 0) then
+      outcome%settle_time = -1
+    else if (outcome%settle_time < 0) then
+      outcome%settle_time = course%elapsed
+    end if
+  end subroutine run_to_section
 
   !> Starts the statistics window.
   pure subroutine open_window(course)
@@ -160,6 +181,7 @@ contains
     type(course_t), intent(in) :: course
     type(outcome_t), intent(inout) :: outcome
     real(wp) :: margin
+    integer :: box
     if (course%reason /= 0) then
       outcome%reason = course%reason
       return
@@ -173,28 +195,12 @@ contains
       outcome%features%grazing_margin = min(margin, outcome%features%grazing_margin)
     else
       outcome%reason = reason_time_over
-      outcome%attractor = in_box(catalogue, course%state)
+      box = find_box(catalogue, course%state)
+      if (box > 0) outcome%attractor = catalogue(box)%id
       outcome%features = outcome%window
       outcome%features%word = 0
       outcome%features%grazing_margin = margin
     end if
   end subroutine conclude
-
-  !> Label of the motion that is not periodic whose box of section points holds a state; 0 if none.
-  pure integer function in_box(catalogue, state) result(label)
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(state_t), intent(in) :: state
-    real(wp) :: point(2)
-    integer :: k
-    label = 0
-    point = [state%x, state%v]
-    do k = 1, size(catalogue)
-      if (catalogue(k)%period /= 0 .or. catalogue(k)%rests) cycle
-      if (all(point >= catalogue(k)%points(:, 1) .and. point <= catalogue(k)%points(:, 2))) then
-        label = catalogue(k)%id
-        return
-      end if
-    end do
-  end function in_box
 
 end module trajectory

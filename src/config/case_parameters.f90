@@ -7,7 +7,7 @@ module case_parameters
   use case_values, only: allowed_range, any_number, bounds_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: law_choice_t, parameter_row_t, parameters_of
+  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of
   use status, only: exit_bad_case
   implicit none
   private
@@ -132,7 +132,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(bounds_t) :: bounds
     character(len=:), allocatable :: problem
-    integer :: law, row, static_law, static_row
+    integer :: law, row
     logical :: found
     call find_parameter(case_laws, path, law, row)
     if (law == 0) then
@@ -145,14 +145,7 @@ contains
       call fail(error, exit_bad_case, 'parameter '''//trim(path)//''': '//problem)
       return
     end if
-    if (path == 'friction.kinetic_coefficient') then
-      call find_parameter(case_laws, 'friction.static_coefficient', static_law, static_row)
-      associate (kinetic => case_laws(law)%parameters(row)%values(1), &
-                 static => case_laws(static_law)%parameters(static_row)%values(1))
-        if (static == kinetic) static = value
-      end associate
-    end if
-    case_laws(law)%parameters(row)%values(1) = value
+    call change_parameter(case_laws, canonical_name(path), value, found)
   end subroutine set_parameter
 
 end module case_parameters

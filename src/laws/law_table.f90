@@ -10,7 +10,7 @@ module law_table
   implicit none
   private
 
-  public :: find_law, law_names, parameters_of, law_choice, value_of, list_of, set_value
+  public :: find_law, law_names, parameters_of, law_choice, value_of, list_of, set_value, change_parameter
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=9) :: &
@@ -228,6 +228,33 @@ contains
     real(wp), intent(in) :: values(:)
     choice%parameters(position_of(choice, parameter))%values = values
   end subroutine set_value
+
+  !> Changes the scalar parameter `path` = 'family.parameter' among `choices`; `found` is false if none has it. A static
+  !> coefficient that equals the kinetic one moves with it.
+  pure subroutine change_parameter(choices, path, value, found)
+    type(law_choice_t), intent(inout) :: choices(:)
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value
+    logical, intent(out) :: found
+    type(parameter_row_t), allocatable :: rows(:)
+    character(len=:), allocatable :: name
+    real(wp) :: before
+    integer :: i, k
+    found = .false.
+    name = trim(path(index(path, '.') + 1:))
+    do i = 1, size(choices)
+      if (choices(i)%family /= path(:index(path, '.') - 1)) cycle
+      rows = parameters_of(choices(i)%family, choices(i)%name)
+      k = findloc(rows%name == name .and. .not. rows%list, .true., dim=1)
+      if (k == 0) cycle
+      found = .true.
+      before = choices(i)%parameters(k)%values(1)
+      choices(i)%parameters(k)%values = [value]
+      k = findloc(rows%name == 'static_coefficient', .true., dim=1)
+      if (name /= 'kinetic_coefficient' .or. k == 0) cycle
+      if (.not. abs(choices(i)%parameters(k)%values(1) - before) > 0) choices(i)%parameters(k)%values = [value]
+    end do
+  end subroutine change_parameter
 
   pure integer function position_of(choice, parameter)
     type(law_choice_t), intent(in) :: choice

@@ -7,7 +7,7 @@ module grid
   use axis, only: axis_t
   use errors, only: error_t
   use kinds, only: int64, wp
-  use law_table, only: law_choice_t, set_value
+  use law_table, only: change_parameter, law_choice_t
   use motion, only: motion_t, prepare_motion
   use motion_state, only: options_t
   use oscillator, only: build_oscillator, oscillator_t
@@ -102,13 +102,14 @@ contains
     type(law_choice_t), allocatable :: laws(:)
     integer(int64) :: rest
     integer :: i, position, along
+    logical :: known
     laws = grid%laws
     rest = slice
     do i = size(grid%parameter_axes), 1, -1
       along = grid%parameter_axes(i)
       position = int(modulo(rest, int(grid%shape(along), int64)))
       rest = rest/grid%shape(along)
-      call set_by_path(laws, grid%axes(along)%name, grid%axes(along)%values(position + 1))
+      call change_parameter(laws, grid%axes(along)%name, grid%axes(along)%values(position + 1), known)
     end do
   end function slice_laws
 
@@ -120,8 +121,9 @@ contains
     type(motion_t), intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
+    logical :: known
     laws = grid%laws
-    call set_by_path(laws, path, value)
+    call change_parameter(laws, path, value, known)
     call machine_of(laws, grid%options, moving, error)
   end subroutine machine_with
 
@@ -135,17 +137,6 @@ contains
     if (allocated(error)) return
     call prepare_motion(machine, options, moving, error)
   end subroutine machine_of
-
-  pure subroutine set_by_path(laws, path, value)
-    type(law_choice_t), intent(inout) :: laws(:)
-    character(len=*), intent(in) :: path
-    real(wp), intent(in) :: value
-    integer :: i, dot
-    dot = index(path, '.')
-    do i = 1, size(laws)
-      if (laws(i)%family == path(:dot - 1)) call set_value(laws(i), trim(path(dot + 1:)), [value])
-    end do
-  end subroutine set_by_path
 
   !> Starts that sample a slice: `count` points of the additive recurrence of Roberts (2018) over the ranges of
   !> the start axes, shifted by `seed`; one start if no start is an axis. Rows x0, v0, crank angle.
