@@ -195,9 +195,11 @@ contains
       sample = state
       sample%time = log%next_sample*log%sample_interval
       if (sample%time >= state%time + elapsed) exit
-      call evaluate(flow, segment, sample%time - state%time, now)
-      sample%x = now%x
-      sample%v = now%v
+      if (sample%time > state%time) then
+        call evaluate(flow, segment, sample%time - state%time, now)
+        sample%x = now%x
+        sample%v = now%v
+      end if
       call record_sample(log, sample)
     end do
   end subroutine sample_segment

@@ -12,6 +12,7 @@ module motion
     fly_exact
   use exact_flow, only: flow_t, prepare_flow
   use kinds, only: wp
+  use layer_transit, only: cross_layer, prepare_transit, transit_t
   use motion_state, only: append_word, event_barrier_release, event_chatter_lower, &
     event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_stick, &
     event_turning_point, flight_adaptive, flight_exact, log_t, mode_lower_barrier, mode_slip_minus, &
@@ -40,6 +41,8 @@ module motion
     type(oscillator_t) :: machine
     type(options_t) :: options
     type(flow_t) :: flow
+    !> Passage through the Stribeck layer, where it can be made in one stroke.
+    type(transit_t) :: transit
     !> Slips outside the Stribeck layer are flown on the closed form.
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
@@ -59,6 +62,7 @@ contains
     moving%layer = machine%friction%layer_speed
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive
+    if (moving%exact) call prepare_transit(machine, moving%flow, layer_exit*moving%layer, moving%transit)
     if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0)) then
       call fail(error, exit_bad_case, 'integrator.flight = "exact": this machine has modes without a '// &
                 'closed form (Stribeck layer, nonlinear or missing spring, damping ratio above 0.9); '// &
@@ -133,7 +137,7 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp) :: barrier, exit_speed, before
+    real(wp) :: barrier, before
     integer :: outcome, direction
     logical :: inside
     direction = merge(1, -1, state%mode == mode_slip_plus)
@@ -146,10 +150,7 @@ contains
         call fly_exact(moving%flow, state, time_end, moving%layer, barrier, tally, outcome, log)
         if (outcome == flight_speed_reached .and. moving%layer > 0) outcome = flight_layer_left
       else
-        exit_speed = huge(1.0_wp)
-        if (moving%exact) exit_speed = layer_exit*moving%layer
-        call fly_adaptive(moving%machine, moving%options, state, time_end, exit_speed, barrier, tally, &
-                          outcome, log)
+        call cross(moving, state, direction, time_end, barrier, tally, outcome, log)
       end if
     end if
     if (state%time > before) tally%slips = tally%slips + 1
@@ -165,6 +166,52 @@ contains
       reason = reason_step_failed
     end select
   end subroutine slip_on
+
+  !> A slip within the Stribeck layer, or of a machine without closed form: in one stroke if the body passes straight
+  !> through the layer, else by the adaptive flight.
+  pure subroutine cross(moving, state, direction, time_end, barrier, tally, outcome, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: time_end, barrier
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: outcome
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: crossed
+    real(wp) :: exit_speed
+    logical :: inward, straight
+    inward = abs(state%v) >= moving%layer
+    straight = moving%transit%available .and. (inward .or. .not. abs(state%v) > 0)
+    crossed = state
+    if (straight) call cross_layer(moving%transit, moving%flow, direction, inward, time_end, crossed%time, crossed%x, &
+                                   straight)
+    if (straight) straight = direction*(crossed%x - barrier) < 0
+    exit_speed = huge(1.0_wp)
+    if (moving%exact) exit_speed = layer_exit*moving%layer
+    if (.not. straight) then
+      call fly_adaptive(moving%machine, moving%options, state, time_end, exit_speed, barrier, tally, outcome, log)
+      return
+    end if
+    if (present(log)) call sample_crossing(moving, state, crossed%time, barrier, log)
+    state = crossed
+    state%v = merge(0.0_wp, direction*exit_speed, inward)
+    outcome = merge(flight_speed_reached, flight_layer_left, inward)
+    if (direction > 0) tally%v_max = max(tally%v_max, state%v)
+  end subroutine cross
+
+  !> Writes down the samples that fall into a crossing, from a copy flown adaptively.
+  pure subroutine sample_crossing(moving, state, time_end, barrier, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: time_end, barrier
+    type(log_t), intent(inout) :: log
+    type(state_t) :: copy
+    type(tally_t) :: unused
+    integer :: outcome
+    if (log%sample_interval <= 0 .or. log%next_sample*log%sample_interval >= time_end) return
+    copy = state
+    call fly_adaptive(moving%machine, moving%options, copy, time_end, huge(1.0_wp), barrier, unused, outcome, log)
+  end subroutine sample_crossing
 
   !> Impact: Newton's law, then away from the barrier, at rest on it, or the end of a chatter sequence.
   pure subroutine collide(moving, state, direction, time_end, tally, log)

@@ -1,0 +1,241 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Crossing the thin Stribeck layer in one stroke. The speed w takes the place of the time as the independent variable
+!> (Henon's trick), so that the end of the layer is known:
+!>   dt/dw = 1/A,  dx/dw = s w/A,  A = s (f(t) - omega^2 y) - 2 g w - (E/m) exp(-(w/v_s)^delta),
+!> y the distance from the sliding equilibrium, s the direction. The exponential at the collocation points does
+!> not depend on the motion, and time and place change little on the way, so a fixed-point iteration on Gauss points converges in
+!> a few rounds. Where it does not, or the motion does not pass straight through, the adaptive flight takes over.
+module layer_transit
+  use constants, only: pi
+  use elementary, only: exponential, sine_cosine
+  use exact_flow, only: flow_t
+  use kinds, only: wp
+  use oscillator, only: oscillator_t
+  implicit none
+  private
+
+  public :: prepare_transit, cross_layer
+
+  integer, parameter :: points = 14, pieces = 3, order = 10, most_rounds = 30
+  !> Ends of the pieces in units of v_s, for delta = 1 and 2; the last end is the edge of the layer.
+  real(wp), parameter :: inner_ends(2, 2) = reshape([2.0_wp, 6.0_wp, 1.0_wp, 2.5_wp], [2, 2])
+  !> Gauss points are too few for more than double precision: the reference library goes without.
+  logical, parameter :: precise_enough = epsilon(1.0_wp) > 1e-17_wp
+  !> The acceleration may not fall below this share of that at the start.
+  real(wp), parameter :: smallest_share = 0.25_wp
+
+  type, public :: transit_t
+    logical :: available = .false.
+    !> Edges of the layer at which it is entered and left [m/s].
+    real(wp) :: entry = 0, exit = 0
+    !> Ends of the pieces [m/s], from rest outwards; with the edge of entry (1) and of exit (2).
+    real(wp) :: ends(0:pieces, 2) = 0
+    !> Gauss points of each piece [m/s] and excess deceleration there [m/s^2].
+    real(wp) :: speed(points, pieces, 2) = 0, excess(points, pieces, 2) = 0
+    !> On [-1, 1]: weights, and integrals from -1 to each point.
+    real(wp) :: weight(points) = 0, integral(points, points) = 0
+    !> Sum over harmonics of the size of the (order + 1)th derivative of the forcing.
+    real(wp) :: remainder = 0
+  end type transit_t
+
+contains
+
+  !> Collocation points for a machine whose layer is left at `exit` [m/s].
+  pure subroutine prepare_transit(machine, flow, exit, transit)
+    type(oscillator_t), intent(in) :: machine
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in) :: exit
+    type(transit_t), intent(out) :: transit
+    real(wp) :: node(points)
+    integer :: which, k, n, delta
+    associate (law => machine%friction)
+      delta = nint(law%stribeck_exponent)
+      transit%available = precise_enough .and. flow%available .and. law%layer_speed > 0 &
+        .and. .not. abs(law%stribeck_exponent - delta) > 0 .and. (delta == 1 .or. delta == 2)
+      if (.not. transit%available) return
+      transit%entry = law%layer_speed
+      transit%exit = exit
+      call gauss(node, transit%weight, transit%integral)
+      do which = 1, 2
+        transit%ends(1:2, which) = inner_ends(:, delta)*law%stribeck_velocity
+        transit%ends(pieces, which) = merge(transit%entry, transit%exit, which == 1)
+        do k = 1, pieces
+          associate (low => transit%ends(k - 1, which), high => transit%ends(k, which))
+            transit%speed(:, k, which) = 0.5_wp*(low + high) + 0.5_wp*(high - low)*node
+          end associate
+          transit%excess(:, k, which) = law%excess/machine%mass &
+            *exponential(-(transit%speed(:, k, which)/law%stribeck_velocity)**delta)
+        end do
+      end do
+    end associate
+    do n = 1, flow%harmonics
+      transit%remainder = transit%remainder + sqrt(flow%f_cos(n)**2 + flow%f_sin(n)**2) &
+                          *(n*flow%drive_frequency)**(order + 1)
+    end do
+  end subroutine prepare_transit
+
+  !> Crosses the layer from its edge to rest (`inward`) or from rest to its outer edge, slipping in `direction`, from `time`
+  !> [s] at `x` [m]; `ok` is false, and nothing changed, where it must be left to the adaptive flight.
+  pure subroutine cross_layer(transit, flow, direction, inward, time_end, time, x, ok)
+    type(transit_t), intent(in) :: transit
+    type(flow_t), intent(in) :: flow
+    integer, intent(in) :: direction
+    logical, intent(in) :: inward
+    real(wp), intent(in) :: time_end
+    real(wp), intent(inout) :: time, x
+    logical, intent(out) :: ok
+    real(wp) :: taylor(0:order), elapsed, y, start_rate, factorial
+    integer :: k, i, which
+    call expand_forcing(flow, time, taylor)
+    which = merge(1, 2, inward)
+    elapsed = 0
+    y = x - flow%equilibrium(direction)
+    start_rate = direction*(taylor(0) - flow%natural**2*y)
+    ok = (start_rate < 0) .eqv. inward
+    if (.not. ok) return
+    do i = 1, pieces
+      k = merge(pieces + 1 - i, i, inward)
+      call cross_piece(transit, flow, taylor, real(direction, wp), which, k, inward, start_rate, elapsed, y, ok)
+      if (.not. ok) return
+    end do
+    factorial = 1
+    do i = 2, order + 1
+      factorial = factorial*i
+    end do
+    ok = time + elapsed <= time_end .and. transit%remainder*elapsed**(order + 1) &
+         <= epsilon(1.0_wp)*factorial*abs(start_rate)
+    if (.not. ok) return
+    time = time + elapsed
+    x = y + flow%equilibrium(direction)
+  end subroutine cross_layer
+
+  !> One piece: fixed-point iteration for time and place at the Gauss points.
+  pure subroutine cross_piece(transit, flow, taylor, direction, which, k, inward, start_rate, elapsed, y, ok)
+    type(transit_t), intent(in) :: transit
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in) :: taylor(0:order), direction, start_rate
+    integer, intent(in) :: which, k
+    logical, intent(in) :: inward
+    real(wp), intent(inout) :: elapsed, y
+    logical, intent(out) :: ok
+    real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half
+    integer :: round, i
+    half = 0.5_wp*(transit%ends(k, which) - transit%ends(k - 1, which))
+    time = elapsed
+    place = y
+    ok = .false.
+    do round = 1, most_rounds
+      rate = direction*(polynomial(taylor, time) - flow%natural**2*place) &
+             - 2*flow%decay*transit%speed(:, k, which) - transit%excess(:, k, which)
+      if (inward) rate = -rate
+      if (minval(rate) < smallest_share*abs(start_rate)) return
+      inverse = half/rate
+      run = direction*transit%speed(:, k, which)*inverse
+      before = time
+      if (inward) then
+        ! From the outer end: what is left of the whole integral.
+        time = elapsed + dot_product(transit%weight, inverse)
+        place = y + dot_product(transit%weight, run)
+        do i = 1, points
+          time = time - transit%integral(:, i)*inverse(i)
+          place = place - transit%integral(:, i)*run(i)
+        end do
+      else
+        time = elapsed
+        place = y
+        do i = 1, points
+          time = time + transit%integral(:, i)*inverse(i)
+          place = place + transit%integral(:, i)*run(i)
+        end do
+      end if
+      if (maxval(abs(time - before)) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
+        elapsed = elapsed + dot_product(transit%weight, inverse)
+        y = y + dot_product(transit%weight, run)
+        ok = .true.
+        return
+      end if
+    end do
+  end subroutine cross_piece
+
+  !> Taylor coefficients of the forcing about `time`.
+  pure subroutine expand_forcing(flow, time, taylor)
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in) :: time
+    real(wp), intent(out) :: taylor(0:order)
+    real(wp) :: s1, c1, s, c, next, value, slope, w
+    integer :: n, i
+    taylor = 0
+    call sine_cosine(flow%drive_frequency*time, s1, c1)
+    s = s1
+    c = c1
+    do n = 1, flow%harmonics
+      w = n*flow%drive_frequency
+      value = flow%f_cos(n)*c + flow%f_sin(n)*s
+      slope = w*(flow%f_sin(n)*c - flow%f_cos(n)*s)
+      do i = 0, order
+        taylor(i) = taylor(i) + value
+        next = -w*w*value/((i + 1)*(i + 2))
+        value = slope
+        slope = next
+      end do
+      next = c*c1 - s*s1
+      s = s*c1 + c*s1
+      c = next
+    end do
+  end subroutine expand_forcing
+
+  !> Values at `t` of a polynomial, coefficients by rising power.
+  pure function polynomial(coefficients, t) result(total)
+    real(wp), intent(in) :: coefficients(0:order), t(points)
+    real(wp) :: total(points)
+    integer :: i
+    total = coefficients(order)
+    do i = order - 1, 0, -1
+      total = total*t + coefficients(i)
+    end do
+  end function polynomial
+
+  !> Gauss-Legendre points on [-1, 1], weights, and the integrals of the Lagrange polynomials from -1 to each point.
+  pure subroutine gauss(node, weight, integral)
+    real(wp), intent(out) :: node(points), weight(points), integral(points, points)
+    real(wp) :: p(-1:points), table(-1:points, points), slope, sine, cosine
+    integer :: j, k, m, i
+    do j = 1, points
+      call sine_cosine(pi*(j - 0.25_wp)/(points + 0.5_wp), sine, cosine)
+      node(j) = -cosine
+      do i = 1, 20
+        p = legendre(node(j))
+        slope = points*(node(j)*p(points) - p(points - 1))/(node(j)**2 - 1)
+        node(j) = node(j) - p(points)/slope
+      end do
+      p = legendre(node(j))
+      table(:, j) = p
+      slope = points*(node(j)*p(points) - p(points - 1))/(node(j)**2 - 1)
+      weight(j) = 2/((1 - node(j)**2)*slope**2)
+    end do
+    do j = 1, points
+      do k = 1, points
+        integral(j, k) = (node(j) + 1)*weight(k)/2
+        do m = 1, points - 1
+          integral(j, k) = integral(j, k) + weight(k)/2*table(m, k)*(table(m + 1, j) - table(m - 1, j))
+        end do
+      end do
+    end do
+  end subroutine gauss
+
+  !> Legendre polynomials of degree 0 to `points`; index -1 is unused.
+  pure function legendre(t) result(p)
+    real(wp), intent(in) :: t
+    real(wp) :: p(-1:points)
+    integer :: m
+    p(-1) = 0
+    p(0) = 1
+    p(1) = t
+    do m = 1, points - 1
+      p(m + 1) = ((2*m + 1)*t*p(m) - m*p(m - 1))/(m + 1)
+    end do
+  end function legendre
+
+end module layer_transit
