@@ -9,7 +9,7 @@ module cycle
   use elementary, only: sine_cosine
   use kinds, only: int64, wp
   use motion, only: advance_period, motion_t, start_state
-  use motion_state, only: reset_tally, state_t, tally_t
+  use motion_state, only: mode_slip_minus, mode_slip_plus, reset_tally, state_t, tally_t
   implicit none
   private
 
@@ -83,8 +83,9 @@ contains
     type(tally_t), intent(in) :: tally
     real(wp) :: scale(2), floor
     floor = 1e-3_wp
-    if (moving%machine%restoring%stiffness > 0) &
+    if (moving%machine%restoring%stiffness > 0) then
       floor = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
+    end if
     scale(1) = max((tally%x_max - tally%x_min)/2, floor, tiny(floor))
     scale(2) = scale(1)*moving%machine%drive_frequency
   end function scale_of
@@ -236,12 +237,15 @@ contains
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     type(tally_t), intent(in) :: reference(:)
-    real(wp) :: radius, point(2), image(2), d(2), l11, l21, l22, promised, sine, cosine
+    real(wp) :: radius, point(2), image(2), second(2), d(2), l11, l21, l22, promised, sine, cosine
     type(tally_t) :: tally
+    type(state_t) :: state
     integer :: i, ring, k
-    logical :: ok
+    logical :: ok, at_rest
     contracts = .false.
     do i = 1, attractor%period
+      state = start_state(moving, attractor%points(1, i), attractor%points(2, i), 0.0_wp)
+      at_rest = state%mode /= mode_slip_plus .and. state%mode /= mode_slip_minus
       associate (s => attractor%metric(:, i))
         ! Cholesky factor of the metric: S = L L'.
         l11 = sqrt(s(1))
@@ -258,6 +262,8 @@ contains
             point = attractor%points(:, i) + attractor%scale*d
             if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
             call map_point(moving, point, attractor%period, image, tally, ok)
+            ! Around a section point at rest every start slips first; there the next round must have the events.
+            if (ok .and. at_rest) call map_point(moving, image, attractor%period, second, tally, ok)
             if (.not. ok .or. .not. same_events(tally, reference(i))) return
             d = (image - attractor%points(:, i))/attractor%scale
             if (sqrt(s(1)*d(1)**2 + 2*s(2)*d(1)*d(2) + s(3)*d(2)**2) > promised*radius + 1e-12_wp) return

@@ -67,7 +67,10 @@ contains
     type(log_t), intent(inout), optional :: log
     type(course_t) :: course
     course%state = start_state(moving, x, v, crank_angle)
-    if (present(log)) log%origin = -course%state%time
+    if (present(log)) then
+      log%origin = -course%state%time
+      if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
+    end if
     call reset_tally(course%tally, course%state)
     call run_until(moving, catalogue, span, course, span%duration - span%window, outcome, log)
     if (ended(course, span)) then
@@ -79,8 +82,9 @@ contains
     call run_until(moving, catalogue, span, course, span%duration, outcome, log)
     outcome%window = regime_of(course%tally, span%window/moving%machine%period)
     call note_state(course, outcome)
-    if (course%reason == 0 .and. course%captured == 0 .and. size(catalogue) > 0) &
+    if (course%reason == 0 .and. course%captured == 0 .and. size(catalogue) > 0) then
       call wait_for_capture(moving, catalogue, span, course, outcome)
+    end if
     call conclude(catalogue, course, outcome)
   end subroutine run_trajectory
 

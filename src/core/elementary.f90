@@ -41,15 +41,18 @@ contains
   pure elemental subroutine sine_cosine(angle, sine, cosine)
     real(real64), intent(in) :: angle
     real(real64), intent(out) :: sine, cosine
-    real(real64) :: quarters, r, z, half, w, sin_r, cos_r, sin_sign, cos_sign
+    real(real64) :: quarters, high, low, tail, r, z, half, w, sin_r, cos_r, sin_sign, cos_sign
     integer(int64) :: quadrant
     quarters = anint(angle*two_over_pi)
-    r = (angle - quarters*half_pi_high) - quarters*half_pi_low
+    high = angle - quarters*half_pi_high
+    low = quarters*half_pi_low
+    r = high - low
+    tail = (high - r) - low
     z = r*r
-    sin_r = r + r*z*(s1 + z*(s2 + z*(s3 + z*(s4 + z*(s5 + z*s6)))))
+    sin_r = r + (r*z*(s1 + z*(s2 + z*(s3 + z*(s4 + z*(s5 + z*s6))))) + tail*(1.0_real64 - 0.5_real64*z))
     half = 0.5_real64*z
     w = 1.0_real64 - half
-    cos_r = w + (((1.0_real64 - w) - half) + z*z*(c1 + z*(c2 + z*(c3 + z*(c4 + z*(c5 + z*c6))))))
+    cos_r = w + (((1.0_real64 - w) - half) + (z*z*(c1 + z*(c2 + z*(c3 + z*(c4 + z*(c5 + z*c6))))) - r*tail))
     quadrant = iand(int(quarters, int64), 3_int64)
     sin_sign = merge(-1.0_real64, 1.0_real64, quadrant >= 2)
     cos_sign = merge(-1.0_real64, 1.0_real64, quadrant == 1 .or. quadrant == 2)
@@ -65,6 +68,7 @@ contains
     twos = anint(bounded*one_over_ln2)
     y = 1.0_real64 + reduced_minus_one((bounded - twos*ln2_high) - twos*ln2_low)
     y = scale(y, int(twos))
+    if (x /= x) y = x
   end function exponential
 
   !> e**x - 1 without cancellation near zero.

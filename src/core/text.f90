@@ -63,7 +63,7 @@ contains
     character(len=40) :: buffer, form
     integer :: exponent, mark
     if (value == 0) then
-      text = '0.0'
+      text = trim(adjustl(merge('-0.0', ' 0.0', sign(1.0_real64, value) < 0)))
       return
     end if
     write (form, '(a,i0,a,i0,a)') '(es', digits + 10, '.', max(digits - 1, 0), 'e3)'

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The interfaces of the C files of this folder; flat arrays and integer status only. The modules
-!> signals, checksum, random, system, files and atomics give them Fortran types.
+!> signals, checksum, random, system, files, atomics and statistics give them Fortran types.
 module bindings
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int32_t, c_int64_t, c_ptr
   implicit none
@@ -13,9 +13,16 @@ module bindings
     c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_file_exists, &
     c_folder_status, c_free_bytes, c_file_bytes, c_reserve_file, c_publish_file, c_remove_file, &
     c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
-    c_atomic_try_lock, c_yield, c_string_length
+    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit
 
   interface
+    real(c_double) function c_share_upper_limit(found, sample, confidence) &
+        bind(c, name='separatrix_share_upper_limit')
+      import :: c_double, c_int64_t
+      integer(c_int64_t), value :: found, sample
+      real(c_double), value :: confidence
+    end function c_share_upper_limit
+
     integer(c_int) function c_signals_install() bind(c, name='separatrix_signals_install')
       import :: c_int
     end function c_signals_install

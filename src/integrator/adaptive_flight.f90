@@ -274,8 +274,9 @@ contains
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
-    if (tally%wants_v_max .and. slip%direction > 0) &
+    if (tally%wants_v_max .and. slip%direction > 0) then
       tally%v_max = max(tally%v_max, y(2), maximum_until(path(:, 2), fraction))
+    end if
     if (.not. present(log)) return
     if (log%sample_interval <= 0) return
     do

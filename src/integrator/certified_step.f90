@@ -43,7 +43,11 @@ contains
       step = 2*rate/bound
       discriminant = curvature**2/4 + 2*third_bound*rate/3
       if (third_bound > 0 .and. discriminant >= 0) then
-        longer = 3*(curvature/2 + sqrt(discriminant))/third_bound
+        if (curvature >= 0) then
+          longer = 3*(curvature/2 + sqrt(discriminant))/third_bound
+        else
+          longer = 2*rate/(sqrt(discriminant) - curvature/2)
+        end if
         step = max(step, longer)
       end if
     end if

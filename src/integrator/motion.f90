@@ -154,6 +154,8 @@ contains
       end if
     end if
     if (state%time > before) tally%slips = tally%slips + 1
+    ! Rounding may carry a body that leaves a barrier a bit beyond it.
+    state%x = min(max(state%x, moving%machine%contact%lower), moving%machine%contact%upper)
     call note_position(tally, state)
     select case (outcome)
     case (flight_barrier)
@@ -232,19 +234,21 @@ contains
     state%v = after
     state%mode = merge(mode_slip_minus, mode_slip_plus, direction > 0)
     if (.not. abs(after) > 0) then
-      call come_to_rest(moving, state, event_stick, tally, log)
+      call come_to_rest(moving, state, event_turning_point, tally, log)
       return
     end if
     left = chatter_time(moving%machine, state, direction, abs(after))
     if (left < 0) return
     tally%chatters = tally%chatters + 1
     tally%sticks = tally%sticks + 1
-    state%time = min(state%time + left, time_end)
+    ! The log has the instant of accumulation even where the clock stops before it.
+    state%time = state%time + left
     state%v = 0
     state%mode = merge(mode_upper_barrier, mode_lower_barrier, direction > 0)
     call append_word(tally, merge(word_chatter_upper, word_chatter_lower, direction > 0))
     if (present(log)) call record_event(log, merge(event_chatter_upper, event_chatter_lower, direction > 0), &
                                         state, 0.0_wp)
+    state%time = min(state%time, time_end)
   end subroutine collide
 
   !> Zero velocity: the forces choose the next mode. `passing` is the event written down if the body does not stay.

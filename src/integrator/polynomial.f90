@@ -33,15 +33,22 @@ contains
     real(wp), intent(in) :: p(0:degree)
     real(wp) :: b(0:degree, deepest + 1), right(0:degree), from(deepest + 1), width(deepest + 1)
     integer :: top, changes
+    logical :: low
     b(:, 1) = bernstein(p)
     from(1) = 0
     width(1) = 1
     top = 1
     do while (top > 0)
       changes = sign_changes(b(:, top))
-      if (changes == 0 .and. maxval(b(:, top)) > 0) then
+      low = changes == 1 .and. b(0, top) <= 0 .and. b(degree, top) > 0
+      if ((changes == 0 .and. maxval(b(:, top)) > 0) .or. (low .and. from(top) <= 0)) then
+        ! Positive throughout, or rising from zero at the start.
         top = top - 1
-      else if ((changes == 1 .and. b(0, top) >= 0) .or. top > deepest .or. changes == 0) then
+      else if (low .or. changes == 0) then
+        ! Already fallen where the interval begins.
+        t = from(top)
+        return
+      else if ((changes == 1 .and. b(0, top) >= 0) .or. top > deepest) then
         t = fall_between(p, from(top), from(top) + width(top))
         return
       else
@@ -109,8 +116,8 @@ contains
       ratio = 1
       do k = 0, i
         b(i) = b(i) + ratio*p(k)
-        ratio = ratio*real(i - k, wp)/real(degree - k, wp)
         if (k == degree) exit
+        ratio = ratio*real(i - k, wp)/real(degree - k, wp)
       end do
     end do
   end function bernstein

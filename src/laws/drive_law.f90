@@ -150,6 +150,7 @@ contains
     allocate (law%cosine(0), law%sine(0))
     count = 64
     do while (count <= 4*max_harmonics)
+      if (.not. all([(lever_assembles(lever, i*two_pi/count), i=0, count - 1)])) return
       samples = [(lever_foot(lever, i*two_pi/count), i=0, count - 1)]
       call transform(samples, cosine, sine)
       size_of_motion = maxval(abs(samples))

@@ -55,7 +55,7 @@ contains
       law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
       if (law%excess > 0) law%layer_speed = law%stribeck_velocity &
-        *negligible_exponent**(1.0_wp/law%stribeck_exponent)
+        *exponential(logarithm(negligible_exponent)/law%stribeck_exponent)
     end select
   end function friction_of
 

@@ -1,0 +1,23 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Confidence limits of counted shares.
+module statistics
+  use bindings, only: c_share_upper_limit
+  use kinds, only: int64, real64
+  implicit none
+  private
+
+  public :: share_upper_limit
+
+contains
+
+  !> The share that, with probability `confidence`, is not exceeded when `found` of `sample` were seen (Clopper and
+  !> Pearson 1934); 1 for an empty sample.
+  real(real64) function share_upper_limit(found, sample, confidence)
+    integer, intent(in) :: found, sample
+    real(real64), intent(in) :: confidence
+    share_upper_limit = c_share_upper_limit(int(found, int64), int(sample, int64), confidence)
+  end function share_upper_limit
+
+end module statistics
