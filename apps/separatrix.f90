@@ -7,6 +7,7 @@ program separatrix
   use command_line, only: command_t, help_text, read_command_line
   use errors, only: error_t
   use info_driver, only: run_info
+  use launcher, only: launched_rank
   use laws_driver, only: run_laws
   use points_driver, only: run_points
   use sweep_driver, only: run_sweep
@@ -19,13 +20,16 @@ program separatrix
 
   type(command_t) :: command
   type(error_t), allocatable :: error
+  logical :: first
 
+  ! What the processes of mpirun do not share is done and said by the first of them.
+  first = launched_rank() == 0
   call read_command_line(command, error)
   if (.not. allocated(error)) then
     if (command%help) then
-      write (output_unit, '(a)', advance='no') help_text(command%name)
+      if (first) write (output_unit, '(a)', advance='no') help_text(command%name)
     else if (command%version) then
-      call print_version()
+      if (first) call print_version()
     else
       select case (command%name)
       case ('basin')
@@ -37,16 +41,16 @@ program separatrix
       case ('points')
         call run_points(command)
       case ('laws')
-        call run_laws(command%json)
+        if (first) call run_laws(command%json)
       case ('info')
-        call run_info(command%path, command%json, error)
+        if (first) call run_info(command%path, command%json, error)
       case ('verify')
-        call run_verify(command, error)
+        if (first) call run_verify(command, error)
       end select
     end if
   end if
   if (allocated(error)) then
-    write (error_unit, '(a)') 'separatrix: '//error%message
+    if (first) write (error_unit, '(a)') 'separatrix: '//error%message
     call exit_program(error%code)
   end if
 end program separatrix

@@ -168,35 +168,47 @@ def _draw_regions(ax: Axes, result: xr.Dataset, name: str) -> list[Patch]:
     for region in regions(result, name, lines):
         _name_region(ax, region, (region.upper - region.lower) / (high - low))
     for place, line in enumerate(lines):
-        gaps = [abs(line.middle - other.middle) for k, other in enumerate(lines) if k != place]
-        _name_limit(ax, line, min(gaps, default=high - low) / (high - low))
+        gaps = [other.middle - line.middle for k, other in enumerate(lines) if k != place]
+        _name_limit(ax, line, min(gaps, key=abs, default=high - low) / (high - low))
     if not lines:
         return []
     return [Line2D([], [], color="black", linewidth=0.7, label="limit of a region")]
 
 
 def _name_limit(ax: Axes, line: Boundary, gap: float) -> None:
-    """Write the value of a limit above it, with as many digits as its bracket is worth."""
+    """Write the value of a limit above it, with as many digits as its bracket is worth.
+
+    `gap` is the way to the nearest limit as a share of the axis; two close ones are turned and moved apart.
+    """
     digits = int(np.clip(-np.floor(np.log10(max(line.upper - line.lower, 1e-6))), 0, 6))
-    _write_above(
-        ax, line.middle, f"{line.middle:.{digits}f}", 2.0, fontsize=6.0, rotation=0 if gap > 0.05 else 60
-    )
+    text = f"{line.middle:.{digits}f}"
+    if abs(gap) > 0.05:
+        _write_above(ax, line.middle, text, (0.0, 2.0), fontsize=6.0)
+    else:
+        _write_above(ax, line.middle, text, (-2.0 if gap > 0 else 5.0, 2.0), rotation=60, fontsize=6.0)
 
 
 def _name_region(ax: Axes, region: Region, share: float) -> None:
     if share < 0.01:
         return
-    text = region.text if share > 0.14 else region.text.replace(" ", "\n")
-    _write_above(ax, (region.lower + region.upper) / 2, text, 10.0, rotation=0 if share > 0.08 else 60)
+    centre = (region.lower + region.upper) / 2
+    if share > 0.08:
+        text = region.text if share > 0.14 else region.text.replace(" ", "\n")
+        _write_above(ax, centre, text, (0.0, 10.0))
+    else:
+        # beyond the turned values of the limits on both sides
+        _write_above(ax, centre, region.text.replace(" ", "\n"), (13.0, 22.0), rotation=60)
 
 
-def _write_above(ax: Axes, place: float, text: str, height: float, rotation: float, **options: float) -> None:
-    """Write text `height` points above the axes; turned text starts at its place instead of straddling it."""
+def _write_above(
+    ax: Axes, place: float, text: str, offset: tuple[float, float], rotation: float = 0, **options: float
+) -> None:
+    """Write text `offset` points from a place; turned text starts there instead of straddling it."""
     ax.annotate(
         text,
         (place, 1.0),
         xycoords=("data", "axes fraction"),
-        xytext=(0.0, height),
+        xytext=offset,
         textcoords="offset points",
         ha="left" if rotation else "center",
         va="bottom",

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
-from separatrix.case import describe_case, version_text
+from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -180,8 +180,9 @@ def _caption(result: xr.Dataset) -> list[str]:
 
 
 def _start_text(result: xr.Dataset) -> str:
-    # + 0.0: no minus sign before zero
-    x, v = (float(result[name].values[0]) + 0.0 for name in ("x", "v"))
+    # the first sample is the start but for rounding
+    start = resolved_case(result).get("start", {})
+    x, v = (float(start.get(f"{name}0", result[name].values[0])) for name in ("x", "v"))
     return f"$x_0$ = {x:g} m, $v_0$ = {v:g} m/s"
 
 

@@ -77,6 +77,7 @@ contains
     else
       range = 'a finite number'
     end if
+    if (range /= 'a finite number' .and. .not. abs(value) <= huge(1.0_wp)) range = 'a finite number, '//range
     problem = 'found '//to_text(value)//unit//', allowed '//range//unit
   end function allowed_range
 

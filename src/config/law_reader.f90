@@ -4,11 +4,12 @@
 !> The tables [body], [restoring], [friction], [contact] and [drive], read by the law table.
 module law_reader
   use case_parameters, only: find_parameter, row_bounds
-  use case_source, only: case_source_t, enter_table, find, know_all_below, report
+  use case_source, only: case_source_t, description, enter_table, find, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
   use law_table, only: families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
     parameters_of
   use suggest, only: nearest_word
+  use toml_bindings, only: toml_string
   implicit none
   private
 
@@ -33,14 +34,24 @@ contains
     character(len=*), intent(in) :: family
     type(law_choice_t), intent(out) :: choice
     character(len=:), allocatable :: name, default
+    integer :: at
     logical :: found
     default = 'none'
     if (family == 'body') default = 'point_mass'
     choice = law_choice(family, default)
     call enter_table(source, family, found)
+    at = find(source, family//'.law')
+    if (at > 0) then
+      if (source%entries(at)%entry%kind /= toml_string) then
+        call report(source, family//'.law', 'found '//description(source%entries(at)%entry)//', allowed '// &
+                    law_names(family))
+        call know_all_below(source, family)
+        return
+      end if
+    end if
     name = default
     call take_text(source, family//'.law', name)
-    if (found .and. default == 'none' .and. find(source, family//'.law') == 0) then
+    if (found .and. default == 'none' .and. at == 0) then
       call report(source, family//'.law', 'missing, allowed '//law_names(family))
       call know_all_below(source, family)
     else if (find_law(family, name) == 0) then

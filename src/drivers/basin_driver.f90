@@ -19,9 +19,8 @@ module basin_driver
   use map_schema, only: name_length, schema_t
   use session, only: describe_file, open_session, session_t
   use status, only: last_reason, exit_done, reason_names
-  use system, only: monotonic_seconds
   use text, only: to_text
-  use tiled_run, only: finish_tiles, open_tiles, plan_text, point_work_t, run_tiles
+  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
   implicit none
   private
@@ -29,8 +28,9 @@ module basin_driver
   public :: run_basin
 
   !> Bytes of a point in the working file.
-  integer, parameter :: bytes_per_point = 1 + 2 + 1 + 2 + 8 + 8*4
-  integer, parameter :: pilot_points = 64
+  integer, parameter, public :: bytes_per_point = 1 + 2 + 1 + 2 + 8 + 8*4
+  !> Slices up to which a dry run builds the catalogues.
+  integer, parameter :: most_dry_slices = 16
 
   type, extends(point_work_t), public :: basin_work_t
     type(grid_t) :: grid
@@ -59,6 +59,7 @@ contains
     type(schema_t) :: schema, extra
     type(error_t), allocatable :: error
     character(len=name_length), allocatable :: dimensions(:)
+    character(len=:), allocatable :: path
     integer, allocatable :: tile(:)
     logical :: complete
     call open_session(command, session)
@@ -73,7 +74,15 @@ contains
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
     end if
-    call search_catalogues(session%team, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
+    path = output_path(command%output, command%path)
+    if (.not. command%dry_run) call session%begin(path, tiled=.true.)
+    if (command%dry_run .and. work%grid%slices > most_dry_slices) then
+      ! Too many catalogues for a dry run: every point discovers its own attractor instead, which takes longer.
+      allocate (work%catalogues(0))
+      call prepare_counts(work)
+      call report_plan(session, work, tile)
+    end if
+    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
     call session%stop_if(error)
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)
@@ -81,7 +90,7 @@ contains
     call describe_file(session, 'basin', schema)
     call add_axes(schema, work%grid%axes, dimensions)
     call add_map_variables(schema, '', dimensions)
-    call open_tiles(session, output_path(command%output, command%path), schema, dimensions, tile, file)
+    call open_tiles(session, path, schema, dimensions, tile, file)
     call run_tiles(session, file, work, complete)
     call sum_counts(session, work)
     call add_catalogue(extra, work%catalogues, work%captured)
@@ -141,19 +150,10 @@ contains
     type(basin_work_t), intent(inout) :: work
     integer, intent(in) :: tile(:)
     type(error_t), allocatable :: error
-    real(wp) :: values(basin_variables), start
-    integer :: index(size(work%grid%shape)), i, k
-    start = monotonic_seconds()
-    do i = 1, pilot_points
-      do k = 1, size(index)
-        index(k) = 1 + int(modulo(0.5_wp + i*sqrt(real(k + 1, wp)) + i*0.6180339887498949_wp, 1.0_wp) &
-                           *work%grid%shape(k))
-      end do
-      call work%compute(index, values, error)
-      call session%stop_if(error)
-    end do
-    call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_point, &
-                              (monotonic_seconds() - start)/pilot_points))
+    real(wp) :: seconds
+    call pilot_seconds(work, work%grid%shape, seconds, error)
+    call session%stop_if(error)
+    call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_point, seconds))
     call session%end_with(exit_done)
   end subroutine report_plan
 

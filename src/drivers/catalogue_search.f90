@@ -9,6 +9,7 @@ module catalogue_search
   use case_type, only: attractors_t
   use errors, only: error_t
   use grid, only: grid_t
+  use journal, only: journal_t
   use kinds, only: int64, wp
   use team, only: team_t
   use trajectory, only: span_t
@@ -22,8 +23,9 @@ contains
   !> Catalogues of every slice, labelled along the slices; none if no start is an axis (then every point is its own
   !> slice). A second round offers each slice the attractors of its neighbours, so that none is missed
   !> because the sample happened to miss its basin.
-  subroutine search_catalogues(team, grid, span, settings, catalogues, error)
+  subroutine search_catalogues(team, journal, grid, span, settings, catalogues, error)
     class(team_t), intent(in) :: team
+    type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     type(attractors_t), intent(in) :: settings
@@ -35,10 +37,12 @@ contains
     allocate (catalogues(merge(grid%slices, 0_int64, any(grid%start_axis > 0))))
     if (size(catalogues) == 0) return
     allocate (neighbours(0))
+    call journal%begin('slices', 2*grid%slices, 0_int64)
     do slice = team%rank(), grid%slices - 1, team%size()
       call discover_slice(grid, span, slice, settings%sample, settings%seed, settings%max_period, neighbours, &
                           catalogues(slice + 1), error)
       if (allocated(error)) exit
+      call journal%progress(slice + 1)
     end do
     call team%agree(error)
     if (allocated(error)) return
@@ -51,6 +55,7 @@ contains
         call discover_slice(grid, span, slice, settings%sample, settings%seed, settings%max_period, neighbours, &
                             catalogues(slice + 1), error)
         if (allocated(error)) exit
+        call journal%progress(grid%slices + slice + 1)
       end do
       call team%agree(error)
       if (allocated(error)) return

@@ -76,6 +76,8 @@ contains
     else if (len(command%path) == 0 .and. command%name /= 'laws') then
       call fail(error, exit_usage, command%name//': the file is missing (see separatrix '//command%name// &
                 ' --help)')
+    else if (len(command%path) > 0 .and. command%name == 'laws') then
+      call fail(error, exit_usage, "laws takes no file; found '"//command%path//"'")
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
@@ -84,8 +86,23 @@ contains
       call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
     else if (command%force .and. command%resume) then
       call fail(error, exit_usage, '--force starts anew and --resume goes on: choose one')
+    else
+      call check_outputs(command, error)
     end if
   end subroutine check_command
+
+  !> Nothing that is read may be replaced, and no output by another.
+  subroutine check_outputs(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    if (len(command%output) > 0 .and. (command%output == command%path .or. command%output == command%list)) then
+      call fail(error, exit_usage, "-o '"//command%output//"' would replace what is read")
+    else if (len(command%csv) > 0 .and. (command%csv == command%path .or. command%csv == command%list)) then
+      call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
+    else if (len(command%csv) > 0 .and. command%csv == command%output) then
+      call fail(error, exit_usage, "--csv '"//command%csv//"' is the file of -o")
+    end if
+  end subroutine check_outputs
 
   !> One option, with its value taken from the next argument or after '='.
   subroutine read_option(argument, position, command, error)
@@ -140,12 +157,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output')
-      command%output = value
-    case ('--list')
-      command%list = value
-    case ('--csv')
-      command%csv = value
+    case ('-o', '--output', '--list', '--csv')
+      call take_path(name, value, command, error)
     case ('--set')
       padded = value
       command%overrides = [command%overrides, padded]
@@ -159,6 +172,21 @@ contains
       call read_integer(name, value, 0, command%seed, error)
     end select
   end subroutine take_value
+
+  subroutine take_path(name, value, command, error)
+    character(len=*), intent(in) :: name, value
+    type(command_t), intent(inout) :: command
+    type(error_t), allocatable, intent(out) :: error
+    if (len(value) == 0) call fail(error, exit_usage, name//' needs the name of a file')
+    select case (name)
+    case ('--list')
+      command%list = value
+    case ('--csv')
+      command%csv = value
+    case default
+      command%output = value
+    end select
+  end subroutine take_path
 
   subroutine read_number(name, value, number, error)
     character(len=*), intent(in) :: name, value
@@ -248,6 +276,7 @@ contains
       '  --force            replaces an existing output'//nl// &
       '  --resume           goes on with a run that was stopped or killed'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
+      '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --json             log as JSON lines'//nl// &
       '  -q, --quiet        errors only'//nl// &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &

@@ -21,9 +21,14 @@ module journal
     real(wp) :: started = 0
     real(wp) :: next_progress = 0, interval = first_interval
     logical :: terminal = .false., line_open = .false.
+    !> The stretch of work under way.
+    character(len=:), allocatable :: things
+    integer(int64) :: total = 0, before = 0
+    real(wp) :: stretch_started = 0
   contains
     procedure :: open => open_journal
     procedure :: line
+    procedure :: begin
     procedure :: progress
     procedure :: error => report_error
   end type journal_t
@@ -62,25 +67,35 @@ contains
     flush (output_unit)
   end subroutine line
 
-  !> Progress when it is due: `done` of `total` points, of which `before` were there at the start.
-  subroutine progress(self, done, total, before)
+  !> Begins a stretch of work: `total` things named `things`, of which `before` were done earlier.
+  subroutine begin(self, things, total, before)
     class(journal_t), intent(inout) :: self
-    integer(int64), intent(in) :: done, total, before
+    character(len=*), intent(in) :: things
+    integer(int64), intent(in) :: total, before
+    self%things = things
+    self%total = total
+    self%before = before
+    self%stretch_started = monotonic_seconds()
+  end subroutine begin
+
+  !> Progress of the stretch when it is due.
+  subroutine progress(self, done)
+    class(journal_t), intent(inout) :: self
+    integer(int64), intent(in) :: done
     real(wp) :: now, rate
-    character(len=:), allocatable :: message, eta
+    character(len=:), allocatable :: message
     if (.not. self%active .or. self%quiet) return
     now = monotonic_seconds()
-    if (now < self%next_progress) return
+    if (now < self%next_progress .or. done <= self%before) return
     if (.not. self%terminal) self%interval = min(2*self%interval, longest_interval)
     self%next_progress = now + self%interval
-    rate = real(done - before, wp)/max(now - self%started, 1e-3_wp)
-    eta = 'unknown'
-    if (rate > 0) eta = duration_text(real(total - done, wp)/rate)
-    message = to_text(done)//' of '//to_text(total)//' points, '//to_text(nint(100*real(done, wp) &
-      /real(max(total, 1_int64), wp)))//' %, '//to_text(nint(rate))//' points/s, ETA '//eta
+    rate = real(done - self%before, wp)/max(now - self%stretch_started, 1e-3_wp)
+    message = to_text(done)//' of '//to_text(self%total)//' '//self%things//', '//to_text(nint(100*real(done, wp) &
+      /real(max(self%total, 1_int64), wp)))//' %, '//to_text(rate, 3)//' '//self%things//'/s, ETA '// &
+      duration_text(real(self%total - done, wp)/rate)
     if (self%json) then
-      call self%line('progress', message, '"done": '//to_text(done)//', "total": '//to_text(total)// &
-        ', "points_per_second": '//to_text(rate, 6)//', "resident_bytes": '//to_text(resident_bytes()))
+      call self%line('progress', message, '"done": '//to_text(done)//', "total": '//to_text(self%total)// &
+        ', "of": '//json_text(self%things)//', "per_second": '//to_text(rate, 6)//', "resident_bytes": '//to_text(resident_bytes()))
     else if (self%terminal) then
       write (error_unit, '(a)', advance='no') achar(13)//'  '//message//'    '
       flush (error_unit)

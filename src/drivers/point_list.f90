@@ -6,6 +6,7 @@ module point_list
   use contact_law, only: contact_t
   use errors, only: error_t, fail
   use kinds, only: wp
+  use output_check, only: is_folder
   use status, only: exit_bad_case, exit_no_input
   use text, only: replace_all, to_text
   implicit none
@@ -36,6 +37,10 @@ contains
     real(wp) :: row(3)
     integer :: unit, status, number, columns(3), width
     allocate (list%x0(0), list%v0(0), list%ratio(0))
+    if (is_folder(path)) then
+      call fail(error, exit_no_input, "list of points '"//path//"': it is a folder")
+      return
+    end if
     open (newunit=unit, file=path, status='old', action='read', iostat=status, iomsg=message)
     if (status /= 0) then
       call fail(error, exit_no_input, "list of points '"//path//"': "//trim(message))
@@ -135,13 +140,23 @@ contains
     end do
     if (row(1) > contact%upper .or. row(1) < contact%lower) then
       call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))// &
-                ' m, allowed is a position between the barriers')
+                ' m, allowed is '//between_barriers(contact))
     else if (columns(3) > 0 .and. .not. row(3) > 0) then
       call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed is a number above 0')
     else if (columns(3) > 0 .and. .not. default_ratio > 0) then
       call fail(error, exit_bad_case, where_found//'ratio: the case has no drive')
     end if
   end subroutine read_row
+
+  pure function between_barriers(contact) result(words)
+    type(contact_t), intent(in) :: contact
+    character(len=:), allocatable :: words
+    words = ''
+    if (contact%lower > -sqrt(huge(1.0_wp))) words = 'at least the lower barrier '//to_text(contact%lower)//' m'
+    if (contact%upper > sqrt(huge(1.0_wp))) return
+    if (len(words) > 0) words = words//', '
+    words = words//'at most the upper barrier '//to_text(contact%upper)//' m'
+  end function between_barriers
 
   pure integer function count_fields(line)
     character(len=*), intent(in) :: line

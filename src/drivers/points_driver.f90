@@ -8,7 +8,6 @@ module points_driver
   use command_line, only: command_t
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime
-  use files, only: check_folder, file_exists
   use grid, only: grid_t, machine_with, slice_motion
   use kinds, only: int64, wp
   use map_file, only: map_file_t
@@ -17,9 +16,9 @@ module points_driver
   use motion, only: motion_t
   use point_list, only: point_list_t, read_point_list
   use session, only: describe_file, open_session, session_t
-  use status, only: last_reason, exit_bad_case, exit_cannot_create, exit_done, exit_io, reason_names
+  use status, only: last_reason, exit_done, exit_io, reason_names
   use text, only: to_text
-  use tiled_run, only: finish_tiles, open_tiles, plan_text, point_work_t, run_tiles
+  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
   private
@@ -27,6 +26,8 @@ module points_driver
   public :: run_points
 
   integer, parameter :: points_per_tile = 256
+  !> Starts, final state, impacts, last impact speed, regime, reason.
+  integer, parameter :: bytes_per_point = 6*8 + 4 + 2
   !> x, v, impacts, last impact speed, regime, reason.
   integer, parameter :: point_variables = 6
 
@@ -53,6 +54,7 @@ contains
     type(schema_t) :: schema, extra
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
+    real(wp) :: seconds
     integer :: i
     logical :: complete
     call open_session(command, session)
@@ -67,13 +69,17 @@ contains
                                                      work%list, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
-    if (command%validate .or. command%dry_run) then
-      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], 8*7 + 4 + 2, &
-                                2e-4_wp*work%span%duration/50))
+    if (command%validate) then
+      call session%journal%line('valid', command%path//' and '//command%list//' are valid for points')
       call session%end_with(exit_done)
     end if
-    if (session%team%is_root() .and. len(command%csv) > 0) call check_csv(command, error)
-    call session%stop_if(error)
+    if (command%dry_run) then
+      call pilot_seconds(work, [size(work%list%x0)], seconds, error)
+      call session%stop_if(error)
+      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], bytes_per_point, seconds))
+      call session%end_with(exit_done)
+    end if
+    call session%begin(path, tiled=.true.)
     call describe_file(session, 'points', schema)
     call describe_points(work%list, schema)
     call open_tiles(session, path, schema, ['point'], [points_per_tile], file)
@@ -89,16 +95,6 @@ contains
     if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     call session%end_with(exit_done)
   end subroutine run_points
-
-  subroutine check_csv(command, error)
-    type(command_t), intent(in) :: command
-    type(error_t), allocatable, intent(out) :: error
-    if (file_exists(command%csv) .and. .not. (command%force .or. command%resume)) then
-      call fail(error, exit_cannot_create, "'"//command%csv//"' exists; --force replaces it")
-    else
-      call check_folder(command%csv, error)
-    end if
-  end subroutine check_csv
 
   subroutine describe_points(list, schema)
     type(point_list_t), intent(in) :: list

@@ -11,9 +11,12 @@ module session
   use command_line, only: command_t
   use errors, only: error_t
   use journal, only: journal_t
+  use launcher, only: launched_ranks
   use map_schema, only: schema_t
+  use output_check, only: check_create, check_output, check_resume, check_table
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
+  use serial_team, only: serial_team_t
   use signals, only: install_signals
   use system, only: exit_program
   use team, only: team_t
@@ -28,7 +31,10 @@ module session
     class(team_t), allocatable :: team
     type(journal_t) :: journal
     type(provenance_t) :: provenance
+    !> A process without others, for which MPI is started only when work begins.
+    logical :: alone = .true.
   contains
+    procedure :: begin
     procedure :: end_with
     procedure :: stop_if
     procedure :: abort_if
@@ -36,26 +42,59 @@ module session
 
 contains
 
-  !> Starts the team and the log and reads the case. Ends the program if the case is bad.
+  !> Starts the log and reads the case; under mpirun also starts the team. Ends the program if the case is bad.
   subroutine open_session(command, session)
     type(command_t), intent(in) :: command
     type(session_t), intent(out) :: session
     type(error_t), allocatable :: error
     session%command = command
-    call start_team(session%team)
+    session%alone = launched_ranks() == 1
+    if (session%alone) then
+      allocate (serial_team_t :: session%team)
+    else
+      call start_team(session%team)
+    end if
     call session%journal%open(session%team%is_root(), command%json, command%quiet)
     call install_signals(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error)
     call session%stop_if(error)
-    associate (record => session%provenance)
+  end subroutine open_session
+
+  !> Starts the team for the work that ends in the file `path`, and the record of it. Ends the program if an output
+  !> cannot be created. `tiled`: the file is written over a working file.
+  subroutine begin(self, path, tiled)
+    class(session_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: tiled
+    type(error_t), allocatable :: error
+    if (self%team%is_root()) call check_outputs(self%command, path, tiled, error)
+    call self%stop_if(error)
+    if (self%alone) call start_team(self%team)
+    associate (record => self%provenance)
       record%version = build_version
       record%commit = build_commit
       record%compiler = build_compiler
       record%flags = build_flags
       record%mpi = build_mpi
-      call start_provenance(session%team, record)
+      call start_provenance(self%team, record)
     end associate
-  end subroutine open_session
+  end subroutine begin
+
+  subroutine check_outputs(command, path, tiled, error)
+    type(command_t), intent(in) :: command
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: tiled
+    type(error_t), allocatable, intent(out) :: error
+    if (tiled .and. command%resume) then
+      call check_resume(path, error)
+    else if (tiled) then
+      call check_create(path, command%force, error)
+    else
+      call check_output(path, command%force, error)
+    end if
+    if (allocated(error) .or. len(command%csv) == 0) return
+    call check_table(command%csv, command%force .or. command%resume, error)
+  end subroutine check_outputs
 
   !> Attributes and texts that every file carries.
   subroutine describe_file(session, kind, schema)

@@ -6,6 +6,7 @@ module sweep_chain
   use attractors, only: features_t
   use errors, only: error_t
   use grid, only: grid_t
+  use journal, only: journal_t
   use kinds, only: int64, wp
   use motion_state, only: state_t
   use sweep, only: bracket_limit, hold_parameter, hold_t
@@ -40,9 +41,10 @@ module sweep_chain
 contains
 
   !> Runs the chains that `ran` asks for over `values` of the parameter `path`, from the grid's own start, and tells
-  !> every rank. `progress` lines are left to the caller: a chain takes seconds.
-  subroutine run_chains(team, grid, span, path, values, ran, samples, tolerance, chains, error)
+  !> every rank.
+  subroutine run_chains(team, journal, grid, span, path, values, ran, samples, tolerance, chains, error)
     class(team_t), intent(in) :: team
+    type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
@@ -58,7 +60,8 @@ contains
     allocate (chains%limits(0), mine(0))
     do direction = 1, 2
       if (.not. ran(direction) .or. modulo(direction - 1, team%size()) /= team%rank()) cycle
-      call run_chain(grid, span, path, values, direction == 1, samples, tolerance, packed, error)
+      call journal%begin('values', size(values, kind=int64), 0_int64)
+      call run_chain(journal, grid, span, path, values, direction == 1, samples, tolerance, packed, error)
       if (allocated(error)) exit
       mine = [mine, real(direction, wp), packed]
     end do
@@ -69,7 +72,8 @@ contains
   end subroutine run_chains
 
   !> One chain as plain numbers: holds, samples, number of limits, and start, lower, upper of each.
-  subroutine run_chain(grid, span, path, values, up, samples, tolerance, packed, error)
+  subroutine run_chain(journal, grid, span, path, values, up, samples, tolerance, packed, error)
+    type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
@@ -104,6 +108,7 @@ contains
       end if
       impacted = impacting
       before = k
+      call journal%progress(int(i, int64))
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == 0) state = held%state
     end do

@@ -4,6 +4,7 @@
 !> `separatrix sweep`: run up, run down, and many starts at every value of the parameter.
 module sweep_driver
   use axis, only: axis_t, linear_values
+  use basin_driver, only: bytes_per_point
   use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of
@@ -22,7 +23,7 @@ module sweep_driver
   use status, only: exit_done
   use sweep_chain, only: chains_t, limit_t, run_chains
   use text, only: to_text
-  use tiled_run, only: finish_tiles, open_tiles, plan_text, point_work_t, run_tiles
+  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
   implicit none
   private
@@ -54,21 +55,33 @@ contains
     type(schema_t) :: schema
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
+    real(wp) :: seconds
     call open_session(command, session)
     call require_sweep(session%the_case, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     call prepare_branches(session, work)
     associate (sweep => session%the_case%sweep)
-      if (command%validate .or. command%dry_run) then
-        call session%journal%line('plan', to_text(size(sweep%swept%values))//' values of '//trim(sweep%swept%name)// &
-          ', up and down; many starts: '//plan_text([size(sweep%swept%values), max(1, product(sweep%starts))], &
-          [1, max(1, product(sweep%starts))], 46, 2e-4_wp))
+      if (command%validate) then
+        call session%journal%line('valid', command%path//' is a valid case for sweep')
         call session%end_with(exit_done)
       end if
+      if (command%dry_run) then
+        ! Without catalogues: every point discovers its own attractor, which takes longer.
+        allocate (work%catalogues(0))
+        seconds = 0
+        if (product(sweep%starts) > 0) call pilot_seconds(work, [size(sweep%swept%values), product(sweep%starts)], &
+                                                          seconds, error)
+        call session%stop_if(error)
+        call session%journal%line('plan', to_text(size(sweep%swept%values))//' values of '//trim(sweep%swept%name)// &
+          ', up and down; many starts: '//plan_text([size(sweep%swept%values), max(1, product(sweep%starts))], &
+          [1, max(1, product(sweep%starts))], bytes_per_point, seconds))
+        call session%end_with(exit_done)
+      end if
+      call session%begin(path, tiled=product(sweep%starts) > 0)
       call session%journal%line('chains', 'running '//trim(sweep%swept%name)//' up and down over '// &
                                 to_text(size(sweep%swept%values))//' values')
-      call run_chains(session%team, grid_of(session%the_case, session%the_case%axes(:0)), work%span, &
+      call run_chains(session%team, session%journal, grid_of(session%the_case, session%the_case%axes(:0)), work%span, &
                       trim(sweep%swept%name), sweep%swept%values, [sweep%directions /= 'down', &
                       sweep%directions /= 'up'], sweep%samples, sweep%limit_tolerance, chains, error)
       call session%stop_if(error)
@@ -123,7 +136,7 @@ contains
     real(wp), allocatable :: x0(:), v0(:)
     integer :: starts, i
     logical :: complete
-    call search_catalogues(session%team, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
+    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
     call session%stop_if(error)
     starts = product(work%grid%shape(2:3))
     associate (axes => work%grid%axes)

@@ -20,7 +20,10 @@ module tiled_run
   implicit none
   private
 
-  public :: open_tiles, run_tiles, finish_tiles, plan_text
+  public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds
+
+  !> Points of the small sample from which a dry run estimates the time.
+  integer, parameter :: pilot_points = 64
 
   !> What is computed at the points of a grid.
   type, abstract, public :: point_work_t
@@ -86,11 +89,12 @@ contains
     before = note_earlier(session, file, work)
     if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(todo))// &
       ' of '//to_text(file%tile_count())//' tiles were done before')
-    call make_scheduler(session%team, scheduler_options_t(session%command%time_limit, &
-                        session%command%ranks_per_node), scheduler, error)
+    call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node), &
+                        scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(todo), error)
     call session%stop_if(error)
     computed = 0
+    call session%journal%begin('points', total, before)
     do
       call scheduler%next(position)
       if (position == 0) exit
@@ -102,6 +106,13 @@ contains
     call session%team%sum(computed)
     complete = computed(1) == size(todo)
   end subroutine run_tiles
+
+  !> What the start, the catalogue and the sweep have left of the time limit; 0 = no limit.
+  real(wp) function time_left(session)
+    type(session_t), intent(in) :: session
+    time_left = session%command%time_limit
+    if (time_left > 0) time_left = max(tiny(time_left), time_left - (monotonic_seconds() - session%journal%started))
+  end function time_left
 
   !> One tile; left unwritten if a stop is requested on the way.
   subroutine run_tile(session, file, work, tile, scheduler, total, before, todo, whole)
@@ -131,7 +142,7 @@ contains
       end if
       if (.not. session%journal%active) cycle
       done = before + nint(real(total - before, wp)*scheduler%done_count()/max(todo, 1), int64)
-      call session%journal%progress(done, total, before)
+      call session%journal%progress(done)
     end do
     call file%write_tile(tile, values, error)
     call session%abort_if(error)
@@ -197,6 +208,25 @@ contains
     call session%journal%line('written', 'wrote '//file%path//' in '// &
       duration_text(monotonic_seconds() - session%journal%started))
   end subroutine finish_tiles
+
+  !> Seconds per point on one core, from a small sample spread over the grid.
+  subroutine pilot_seconds(work, lengths, seconds, error)
+    class(point_work_t), intent(inout) :: work
+    integer, intent(in) :: lengths(:)
+    real(wp), intent(out) :: seconds
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: values(work%variables), start
+    integer :: index(size(lengths)), i, k
+    start = monotonic_seconds()
+    do i = 1, pilot_points
+      do k = 1, size(lengths)
+        index(k) = 1 + int(modulo(0.5_wp + i*sqrt(real(4*k + 1, wp)), 1.0_wp)*lengths(k))
+      end do
+      call work%compute(index, values, error)
+      if (allocated(error)) return
+    end do
+    seconds = (monotonic_seconds() - start)/pilot_points
+  end subroutine pilot_seconds
 
   !> Points, tiles and bytes of a grid, and the time that `seconds_per_point` on one core mean.
   function plan_text(lengths, tile_shape, bytes_per_point, seconds_per_point) result(lines)

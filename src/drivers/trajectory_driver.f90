@@ -11,7 +11,6 @@ module trajectory_driver
   use drive_law, only: foot_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
-  use files, only: check_folder, file_exists
   use grid, only: grid_t, slice_motion
   use journal, only: duration_text
   use kinds, only: int64, wp
@@ -20,7 +19,7 @@ module trajectory_driver
   use motion, only: motion_t
   use motion_state, only: event_names, log_t
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_cannot_create, exit_done, exit_io, reason_name
+  use status, only: exit_done, exit_io, reason_name
   use text, only: to_text
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -59,8 +58,7 @@ contains
         ' samples, well under a second, into '//path)
       call session%end_with(exit_done)
     end if
-    if (session%team%is_root()) call refuse_existing(command, path, error)
-    call session%stop_if(error)
+    call session%begin(path, tiled=.false.)
     log%sample_interval = moving%machine%period/session%the_case%trajectory%samples_per_period
     call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
     call describe_file(session, 'trajectory', schema)
@@ -76,18 +74,6 @@ contains
     call report(session, moving, outcome, log, path)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
-
-  subroutine refuse_existing(command, path, error)
-    type(command_t), intent(in) :: command
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(out) :: error
-    if (.not. command%force) then
-      if (file_exists(path)) call fail(error, exit_cannot_create, "'"//path//"' exists; --force replaces it")
-      if (file_exists(command%csv) .and. .not. allocated(error)) &
-        call fail(error, exit_cannot_create, "'"//command%csv//"' exists; --force replaces it")
-    end if
-    if (.not. allocated(error)) call check_folder(path, error)
-  end subroutine refuse_existing
 
   !> Attributes: the drive, the barriers, and the steady values over the window.
   subroutine describe_motion(moving, span, outcome, schema)

@@ -15,7 +15,7 @@ module verify_driver
   use errors, only: error_t, fail
   use grid, only: grid_t, point_slice, point_start, slice_laws, slice_motion
   use info_driver, only: count_codes
-  use journal, only: json_text
+  use journal, only: journal_t, json_text
   use kinds, only: int64, real32, wp
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
@@ -24,6 +24,7 @@ module verify_driver
   use random, only: uniform
   use reference, only: run_reference
   use serial_team, only: serial_team_t
+  use statistics, only: share_upper_limit
   use status, only: exit_io, reason_settled
   use sweep_driver, only: sweep_axes
   use text, only: to_text
@@ -92,6 +93,7 @@ contains
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
     type(serial_team_t) :: alone
+    type(journal_t) :: silent
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
@@ -100,7 +102,8 @@ contains
     integer(int64), allocatable :: lengths(:), place(:)
     integer :: i, k
     grid = grid_of(the_case, axes)
-    call search_catalogues(alone, grid, span_of(the_case), the_case%attractors, catalogues, error)
+    silent%quiet = .true.
+    call search_catalogues(alone, silent, grid, span_of(the_case), the_case%attractors, catalogues, error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (allocated(error)) return
     allocate (index(size(axes)), place(size(lengths)))
@@ -264,6 +267,7 @@ contains
       write (output_unit, '(a)') '{"path": '//json_text(command%path)//', "kind": '//json_text(kind)// &
         ', "datasets": '//to_text(datasets)//', "points": '//to_text(points)//', "rerun": '//to_text(audit%points)// &
         ', "differing": '//to_text(audit%differing)//', "label_flips": '//to_text(audit%flips)// &
+        ', "label_flip_share_upper_95": '//to_text(share_upper_limit(audit%flips, audit%points, 0.95_wp))// &
         ', "impact_counts_differ": '//to_text(audit%impact_count_differs)//', "x_deviation": '// &
         to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//'}'
       return
@@ -276,7 +280,9 @@ contains
       '  '//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file', &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
-      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s'
+      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s', &
+      '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &
+      ' % of the labels would change'
   end subroutine report
 
 end module verify_driver

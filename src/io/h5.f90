@@ -11,7 +11,7 @@ module h5
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
     h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
-    H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
+    H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
     h5fcreate_f, h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
     H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
@@ -98,26 +98,35 @@ contains
     if (status == 0) text = to_text(major)//'.'//to_text(minor)//'.'//to_text(release)
   end function h5_version
 
-  !> Creates a file in this process alone, replacing one of the same name; code 73.
-  subroutine h5_create(path, file, error)
+  !> Creates a file in this process alone, replacing one of the same name; code 73. `working`: a file that opens again
+  !> after its process was killed. A file begun in the format of HDF5 1.10 carries a mark while it is open for
+  !> writing and is refused with it; one begun in that of 1.8 does not. What is in it has the format of 1.10 in both
+  !> cases, whose index of chunks takes no memory to speak of.
+  subroutine h5_create(path, file, error, working)
     character(len=*), intent(in) :: path
     type(h5_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: working
     integer(hid_t) :: access, creation
-    integer :: status, ignored
+    integer :: status, ignored, oldest
     file%path = path
+    oldest = H5F_LIBVER_V110_F
+    if (present(working)) oldest = merge(H5F_LIBVER_V18_F, H5F_LIBVER_V110_F, working)
     call start_library(path, error)
     if (allocated(error)) return
     call h5pcreate_f(H5P_FILE_ACCESS_F, access, status)
     if (h5_failed(status, 'create the file', '', path, error)) return
     call h5pcreate_f(H5P_FILE_CREATE_F, creation, status)
-    ! Readers with HDF5 1.10 open the file, also after a crash.
-    if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
+    ! Readers with HDF5 1.10 open the file.
+    if (status >= 0) call h5pset_libver_bounds_f(access, oldest, H5F_LIBVER_V110_F, status)
     if (status >= 0) call h5pset_link_creation_order_f(creation, ior(H5P_CRT_ORDER_TRACKED_F, H5P_CRT_ORDER_INDEXED_F), status)
     if (status >= 0) call h5fcreate_f(path, H5F_ACC_TRUNC_F, file%id, status, creation, access)
     if (h5_failed(status, 'create the file', '', path, error)) return
     call h5pclose_f(creation, ignored)
     call h5pclose_f(access, ignored)
+    if (oldest == H5F_LIBVER_V110_F) return
+    call h5_close(file, error)
+    if (.not. allocated(error)) call h5_open(path, file, error, writable=.true.)
   end subroutine h5_create
 
   !> Opens a file; with a team of several ranks (collective) all of them together. Code 74.

@@ -6,13 +6,14 @@
 module map_file
   use checksum, only: crc32
   use errors, only: error_t, fail
-  use files, only: check_folder, file_exists, free_bytes, publish_file, remove_file, reserve_file
+  use files, only: free_bytes, publish_file, remove_file, reserve_file
   use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_flush, h5_open, &
     h5_open_dataset, h5_read, h5_write
   use kinds, only: int64, int8, real64
   use map_compare, only: check_layout
   use map_layout, only: create_objects, path_of, write_data
   use map_schema, only: schema_t, type_int64, type_int8
+  use output_check, only: check_create, check_resume, working_path
   use status, only: exit_cannot_create, exit_internal
   use team, only: team_t
   use text, only: to_text
@@ -49,13 +50,6 @@ module map_file
 
 contains
 
-  !> The name of the working file of the final file `path`.
-  pure function working_path(path) result(part)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: part
-    part = path//'.part'
-  end function working_path
-
   !> Creates and opens the working file. Collective. `grid`: names of the dimensions that are cut into
   !> tiles of `tile_shape`. Code 73 if the final or the working file exists and `force` is false, the
   !> folder is missing or not writable, or the space is too small.
@@ -71,8 +65,7 @@ contains
     call prepare(path, schema, grid, tile_shape, file, error)
     if (allocated(error)) return
     if (team%is_root()) then
-      call refuse_overwriting(path, force, error)
-      if (.not. allocated(error)) call check_folder(path, error)
+      call check_create(path, force, error)
       if (.not. allocated(error)) call check_space(file, error)
       if (.not. allocated(error)) call build(file, error)
     end if
@@ -95,7 +88,10 @@ contains
     integer :: mismatches
     call prepare(path, schema, grid, tile_shape, file, error)
     if (allocated(error)) return
-    if (team%is_root()) call check_layout(working_path(path), file%schema, file%tiling%shape, error)
+    if (team%is_root()) then
+      call check_resume(path, error)
+      if (.not. allocated(error)) call check_layout(working_path(path), file%schema, file%tiling%shape, error)
+    end if
     call team%agree(error)
     if (allocated(error)) return
     call file%open(team, error)
@@ -139,19 +135,6 @@ contains
     allocate (file%done(file%tiling%count()), source=.false.)
   end subroutine prepare
 
-  subroutine refuse_overwriting(path, force, error)
-    character(len=*), intent(in) :: path
-    logical, intent(in) :: force
-    type(error_t), allocatable, intent(out) :: error
-    if (force) return
-    if (file_exists(path)) then
-      call fail(error, exit_cannot_create, ''''//path//''' exists; --force replaces it')
-    else if (file_exists(working_path(path))) then
-      call fail(error, exit_cannot_create, ''''//working_path(path)// &
-                ''' of an interrupted run exists; --resume continues it, --force begins again')
-    end if
-  end subroutine refuse_overwriting
-
   subroutine check_space(file, error)
     type(map_file_t), intent(in) :: file
     type(error_t), allocatable, intent(out) :: error
@@ -177,7 +160,7 @@ contains
     character(len=:), allocatable :: name
     integer :: i
     name = working_path(file%path)//'.new'
-    call h5_create(name, new, error)
+    call h5_create(name, new, error, working=.true.)
     if (.not. allocated(error)) call create_objects(new, file%schema, error, file%tiling%shape)
     do i = 1, size(file%schema%variables)
       if (allocated(error)) exit

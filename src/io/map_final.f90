@@ -5,7 +5,7 @@
 !> its own name it exists only complete and verified.
 module map_final
   use errors, only: error_t, fail
-  use files, only: check_folder, file_exists, publish_file, remove_file
+  use files, only: publish_file, remove_file
   use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read, h5_write
   use h5_attributes, only: h5_put_numbers, h5_read_strings, h5_write_strings
   use kinds, only: int64, int8, real64
@@ -13,8 +13,9 @@ module map_final
   use map_layout, only: create_objects, path_of, write_data
   use map_schema, only: schema_t, type_int64, type_string
   use map_verify, only: seal, verify_file
+  use output_check, only: check_output
   use slabs, only: slab, slab_count
-  use status, only: exit_cannot_create, exit_io, exit_resumable
+  use status, only: exit_io, exit_resumable
   use team, only: team_t
   use text, only: to_text
   use value_types, only: bytes_of
@@ -82,11 +83,7 @@ contains
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     type(schema_t) :: complete, nothing
-    if (file_exists(path) .and. .not. force) then
-      call fail(error, exit_cannot_create, ''''//path//''' exists; --force replaces it')
-      return
-    end if
-    call check_folder(path, error)
+    call check_output(path, force, error)
     if (allocated(error)) return
     complete = schema
     call complete%append(nothing)

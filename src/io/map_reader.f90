@@ -12,6 +12,7 @@ module map_reader
   use map_layout, only: path_of
   use status, only: exit_io, exit_no_input
   use files, only: file_exists
+  use output_check, only: is_folder
   use value_types, only: bytes_of, from_bytes, type_names, type_string
   implicit none
   private
@@ -54,8 +55,10 @@ contains
     reader%path = path
     if (.not. file_exists(path)) then
       call fail(error, exit_no_input, 'there is no file '''//path//'''')
-      return
+    else if (is_folder(path)) then
+      call fail(error, exit_no_input, ''''//path//''' is a folder')
     end if
+    if (allocated(error)) return
     call h5_open(path, reader%file, error)
     if (allocated(error)) return
     format = ''

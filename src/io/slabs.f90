@@ -10,12 +10,13 @@ module slabs
 
   public :: final_chunk, slab_count, slab
 
-  !> Values of a chunk in the final file, and the side of a square one.
-  integer(int64), parameter :: chunk_values = 65536, chunk_side = 256
+  !> Values of a chunk in the final file, the side of a square one, and most values of a slab.
+  integer(int64), parameter :: chunk_values = 65536, chunk_side = 256, slab_values = 2_int64**20
 
 contains
 
-  !> The chunk of a dataset in the final file: 65536 values or somewhat fewer.
+  !> The chunk of a dataset in the final file: 65536 values or somewhat fewer, flat where rows are so long that a slab of
+  !> square ones would be too large.
   pure function final_chunk(lengths) result(chunk)
     integer(int64), intent(in) :: lengths(:)
     integer(int64) :: chunk(size(lengths))
@@ -24,7 +25,7 @@ contains
     values = 1
     do k = size(lengths), 1, -1
       chunk(k) = min(lengths(k), max(1_int64, chunk_values/values))
-      if (k == size(lengths) .and. k > 1) chunk(k) = min(chunk(k), chunk_side)
+      if (k == size(lengths) .and. k > 1) chunk(k) = min(chunk(k), max(chunk_side, lengths(k)*chunk_values/slab_values))
       values = values*chunk(k)
     end do
   end function final_chunk

@@ -3,9 +3,11 @@
 """Where things are, for all Python tests."""
 
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
+from program import make_results
 
 
 @pytest.fixture(scope="session")
@@ -36,3 +38,18 @@ def separatrix(build_dir: Path) -> Path:
     if not program.is_file():
         pytest.skip(f"{program} has not been built")
     return program
+
+
+@pytest.fixture(scope="session")
+def mpi_separatrix(separatrix: Path) -> Path:
+    """The program, where it can be run by mpirun."""
+    version = subprocess.run([separatrix, "--version"], capture_output=True, text=True, check=True).stdout
+    if "mpi none" in version:
+        pytest.skip(f"{separatrix} was built without MPI")
+    return separatrix
+
+
+@pytest.fixture(scope="session")
+def results(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Files of every kind, beside the case and the list that they are made from. Not to be changed."""
+    return make_results(separatrix, tmp_path_factory.mktemp("results"))

@@ -485,3 +485,28 @@ def test_help_and_version(option: str, capsys: pytest.CaptureFixture) -> None:
         cli.main([option])
     assert caught.value.code == 0
     assert "separatrix-figures" in capsys.readouterr().out
+
+
+def test_the_start_in_the_caption_is_that_of_the_case(tmp_path):
+    path = write_trajectory(tmp_path / "trajectory.h5")
+    with h5py.File(path, "r+") as file:
+        file["v"][0] = 1.4e-17
+        text = file["provenance/resolved_case"][()].decode() + "\n[start]\nx0 = 0.4\nv0 = 0.0\n"
+        del file["provenance/resolved_case"]
+        file["provenance/resolved_case"] = text
+    figure = drawn(path, trajectory.phase_portrait)
+    assert "$x_0$ = 0.4 m, $v_0$ = 0 m/s" in figure.separatrix_caption
+
+
+def test_values_of_close_limits_do_not_lie_on_each_other():
+    with style.context():
+        figure = style.new_figure(style.DOUBLE_COLUMN, 85.0)
+        ax = figure.add_subplot()
+        ax.set_xlim(0.7, 1.8)
+        for middle, gap in ((0.8622, 0.0125 / 1.1), (0.8747, -0.0125 / 1.1)):
+            sweep._name_limit(ax, Boundary(middle - 3e-4, middle + 3e-4), gap)
+        figure.canvas.draw()
+        left, right = (text.get_window_extent() for text in ax.texts)
+        # turned by 60 degrees: their distance across the writing is more than the height of a line
+        across = (right.x0 - left.x0) * np.sin(np.radians(60))
+        assert across > 6.0 / 72 * figure.dpi

@@ -1,0 +1,355 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every command alone and under mpirun: what it prints, what it writes, how it ends."""
+
+import csv
+import json
+import os
+import pty
+import re
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import KINDS, STARTS, Outcome, differences, listing, run, succeed, write_case
+
+COMMANDS = ["basin", "sweep", "trajectory", "points", "laws", "info", "verify"]
+OPTIONS = [
+    "--output",
+    "--set",
+    "--validate",
+    "--dry-run",
+    "--force",
+    "--resume",
+    "--time-limit",
+    "--json",
+    "--quiet",
+]
+COLUMNS = ["x0", "v0", "ratio", "x", "v", "impacts", "last_impact_speed", "reason"]
+KIND_OF = {"map": "basin", "stack": "basin", "plane": "basin"}
+
+
+def program_without_mpirun(separatrix: Path, *arguments: str, folder: Path) -> Outcome:
+    """Run the program where no mpirun and no MPI launcher can be found."""
+    environment = {"PATH": "/nonexistent", "OPAL_PREFIX": "/nonexistent"}
+    command = [separatrix, *arguments]
+    ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=30, env=environment)
+    return Outcome(ended.returncode, ended.stdout, ended.stderr)
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_help(separatrix, tmp_path, command, option):
+    arguments = [command] * bool(command) + [option]
+    outcome = program_without_mpirun(separatrix, *arguments, folder=tmp_path)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert outcome.out.startswith(f"separatrix {command}".rstrip())
+    assert max(map(len, outcome.out.splitlines())) <= 120
+    for word in COMMANDS if not command else []:
+        assert f"  {word} " in outcome.out
+    for word in OPTIONS if command in ("", *COMMANDS[:4]) else []:
+        assert word in outcome.out
+    assert listing(tmp_path) == {}
+
+
+def test_version(separatrix, tmp_path):
+    outcome = program_without_mpirun(separatrix, "--version", folder=tmp_path)
+    assert (outcome.code, outcome.err) == (0, "")
+    fields = dict(line.split(" ", 1) for line in outcome.out.splitlines())
+    assert list(fields) == ["separatrix", "commit", "compiler", "mpi", "hdf5", "flags"]
+    assert re.fullmatch(r"\d+\.\d+\.\d+", fields["separatrix"])
+    assert re.fullmatch(r"[0-9a-f]{12}(-dirty)?|unknown", fields["commit"])
+    assert "-ffp-contract=off" in fields["flags"]
+    assert "fast" not in fields["flags"]
+    assert re.match(r"1\.\d+\.\d+", fields["hdf5"])
+
+
+@pytest.mark.parametrize("option", ["--validate", "--dry-run"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_validate_and_dry_run_need_no_mpirun_and_write_nothing(separatrix, tmp_path, kind, option):
+    write_case(tmp_path)
+    (tmp_path / "starts.csv").write_text(STARTS)
+    before = listing(tmp_path)
+    outcome = program_without_mpirun(separatrix, *KINDS[kind], option, folder=tmp_path)
+    assert (outcome.code, outcome.err) == (0, "")
+    if option == "--validate":
+        assert "case.toml" in outcome.out
+        assert "valid" in outcome.out
+    elif kind != "trajectory":
+        for word in ("points", "tiles", "bytes", "core"):
+            assert word in outcome.out
+    assert listing(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "plan"),
+    [("map", "19 x 31 = 589 points"), ("stack", "3 x 7 x 11 = 231 points"), ("sweep", "7 x 6 = 42 points")],
+)
+def test_a_dry_run_counts_the_points(separatrix, tmp_path, kind, plan):
+    write_case(tmp_path)
+    assert plan in succeed(separatrix, *KINDS[kind], "--dry-run", folder=tmp_path).out
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_command_under_mpirun(mpi_separatrix, tmp_path, results, kind):
+    write_case(tmp_path)
+    (tmp_path / "starts.csv").write_bytes((results["map"].parent / "starts.csv").read_bytes())
+    more = ["--csv", "table.csv"] if kind in ("points", "trajectory") else []
+    outcome = succeed(mpi_separatrix, *KINDS[kind], *more, folder=tmp_path, ranks=2)
+    assert differences(results[kind], tmp_path / "case.h5") == []
+    assert outcome.out.count("wrote case.h5") == 1
+    assert sorted(listing(tmp_path)) == sorted(["case.h5", "case.toml", "starts.csv", *more[1:]])
+
+
+@pytest.mark.parametrize(
+    "arguments", [["laws"], ["info", "map.h5"], ["verify", "map.h5"], ["--version"], ["--help"]]
+)
+def test_what_is_not_shared_is_printed_once(mpi_separatrix, results, arguments):
+    folder = results["map"].parent
+    alone = succeed(mpi_separatrix, *arguments, folder=folder)
+    assert succeed(mpi_separatrix, *arguments, folder=folder, ranks=2) == alone
+
+
+def test_the_default_output_is_the_case_in_this_folder(separatrix, tmp_path):
+    (tmp_path / "cases").mkdir()
+    write_case(tmp_path / "cases", name="some.case.toml")
+    succeed(separatrix, "trajectory", "cases/some.case.toml", folder=tmp_path)
+    assert sorted(listing(tmp_path)) == ["cases/some.case.toml", "some.case.h5"]
+
+
+@pytest.mark.parametrize("option", [["-o", "out.h5"], ["--output", "out.h5"], ["--output=out.h5"]])
+def test_the_output_has_the_name_asked_for(separatrix, tmp_path, option):
+    write_case(tmp_path)
+    succeed(separatrix, "trajectory", "case.toml", *option, folder=tmp_path)
+    assert sorted(listing(tmp_path)) == ["case.toml", "out.h5"]
+
+
+def test_set_changes_the_case(separatrix, tmp_path):
+    write_case(tmp_path)
+    settings = [
+        'start.x0="500 mm"',
+        "drive.ratio=1.05",
+        'friction={law="viscous", damping=0.2}',
+        "axis[1].count=5",
+    ]
+    options = [word for setting in settings for word in ("--set", setting)]
+    succeed(separatrix, "trajectory", "case.toml", *options, folder=tmp_path)
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert file["x"][0] == 0.5
+        assert file.attrs["drive_ratio"] == 1.05
+        resolved = file["provenance/resolved_case"][()].decode()
+    for line in ('law = "viscous"', "damping = 0.2", "count = 5"):
+        assert line in resolved
+    assert "kinetic_coefficient" not in resolved
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_log_in_json(separatrix, results, tmp_path, kind):
+    outcome = succeed(
+        separatrix, *KINDS[kind], "--json", "-o", tmp_path / "o.h5", folder=results["map"].parent
+    )
+    events = [json.loads(line) for line in outcome.out.splitlines()]
+    assert all({"event", "seconds", "message"} <= event.keys() for event in events)
+    assert "written" in [event["event"] for event in events]
+    seconds = [event["seconds"] for event in events]
+    assert seconds == sorted(seconds)
+    if kind == "map":
+        shares = {event["regime"]: event for event in events if event["event"] == "share"}
+        assert sum(share["points"] for share in shares.values()) == 19 * 31
+        assert sum(share["percent"] for share in shares.values()) == pytest.approx(100, abs=1e-9)
+    if kind == "sweep":
+        limits = {event["name"]: event for event in events if event["event"] == "limit"}
+        assert 0 < limits["impacts_start_up"]["upper"] - limits["impacts_start_up"]["lower"] <= 1e-3
+
+
+@pytest.mark.parametrize("option", ["-q", "--quiet"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_quiet_says_nothing(separatrix, results, tmp_path, kind, option):
+    folder = results["map"].parent
+    outcome = succeed(separatrix, *KINDS[kind], option, "-o", tmp_path / "o.h5", folder=folder)
+    assert outcome.out == ""
+    assert differences(results[kind], tmp_path / "o.h5") == []
+
+
+def test_laws(separatrix, tmp_path):
+    laws = json.loads(succeed(separatrix, "laws", "--json", folder=tmp_path).out)
+    text = succeed(separatrix, "laws", folder=tmp_path).out
+    names = {(law["family"], law["law"]) for law in laws}
+    expected = {
+        *(("friction", name) for name in ("coulomb", "viscous", "coulomb_stribeck")),
+        *(("drive", name) for name in ("fourier", "crank_lever_rod", "harmonic")),
+        *(("contact", "newton"), ("restoring", "linear"), ("body", "point_mass")),
+    }
+    assert expected <= names
+    for law in laws:
+        assert law["law"] in text
+        assert law["source"] or law["law"] == "none"
+        for parameter in law["parameters"]:
+            assert parameter["unit"]
+            assert parameter["meaning"]
+            assert (
+                parameter["lower"] is None
+                or parameter["upper"] is None
+                or parameter["lower"] < parameter["upper"]
+            )
+            assert parameter["name"] in text
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_info(separatrix, results, kind):
+    folder = results["map"].parent
+    text = succeed(separatrix, "info", f"{kind}.h5", folder=folder).out
+    facts = json.loads(succeed(separatrix, "info", f"{kind}.h5", "--json", folder=folder).out)
+    assert facts["kind"] == KIND_OF.get(kind, kind)
+    assert f"kind: {facts['kind']}" in text
+    assert facts["complete"] == 1
+    with h5py.File(results[kind]) as file:
+        for variable in facts["variables"]:
+            assert list(file[variable["name"]].shape) == variable["shape"]
+        codes = "branch_reason" if kind == "sweep" else "reason"
+        if codes in file:
+            shares = facts[codes]
+            assert sum(share["points"] for share in shares.values()) == file[codes].size
+            assert sum(share["percent"] for share in shares.values()) == pytest.approx(100, abs=1e-9)
+    if kind == "map":
+        assert len(facts["catalogue"]) == 2
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_verify(separatrix, results, kind):
+    folder = results["map"].parent
+    text = succeed(separatrix, "verify", f"{kind}.h5", "--sample", 10, folder=folder).out
+    facts = json.loads(
+        succeed(separatrix, "verify", f"{kind}.h5", "--sample", 10, "--json", folder=folder).out
+    )
+    assert facts["kind"] == KIND_OF.get(kind, kind)
+    assert f"checksums of {facts['datasets']} datasets agree" in text
+    if kind != "trajectory":
+        assert facts["rerun"] == 10
+        assert facts["differing"] == 0
+        assert facts["label_flips"] == 0
+        # Some of the lists' starts come close to a barrier without touching it, which magnifies rounding.
+        assert facts["x_deviation"] < 1e-6
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_points_to_a_table_and_back(mpi_separatrix, tmp_path, ranks):
+    write_case(tmp_path)
+    (tmp_path / "starts.csv").write_text(STARTS)
+    command = ["points", "case.toml", "--list", "starts.csv", "--csv", "out.csv", "-o", "out.h5"]
+    succeed(mpi_separatrix, *command, folder=tmp_path, ranks=ranks)
+    with (tmp_path / "out.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == COLUMNS
+    assert len(rows) == 5
+    asked = [list(map(float, line.split(","))) for line in STARTS.splitlines()[1:]]
+    assert [[float(row[name]) for name in COLUMNS[:3]] for row in rows] == asked
+    with h5py.File(tmp_path / "out.h5") as file:
+        names = dict(zip(file["reason"].attrs["flag_values"], text_of(file["reason"]).split(), strict=True))
+        for name in COLUMNS[:-1]:
+            assert [float(row[name]) for row in rows] == file[name][()].tolist()
+        assert [row["reason"] for row in rows] == [names[code] for code in file["reason"][()]]
+    for i, row in enumerate(rows):
+        # A little longer, because samples stop short of the end.
+        options = [
+            f"start.x0={row['x0']}",
+            f"start.v0={row['v0']}",
+            f"drive.ratio={row['ratio']}",
+            "run.duration=50.001",
+        ]
+        options = [word for option in options for word in ("--set", option)]
+        succeed(mpi_separatrix, "trajectory", "case.toml", *options, "-o", f"{i}.h5", folder=tmp_path)
+        with h5py.File(tmp_path / f"{i}.h5") as file:
+            impacts = np.isin(file["event_kind"][()], [1, 2]) & (file["event_time"][()] <= 50)
+            last = np.argmin(abs(file["time"][()] - 50))
+            assert int(row["impacts"]) == impacts.sum()
+            assert float(row["last_impact_speed"]) == abs(file["event_v_before"][impacts][-1])
+            assert file["time"][last] == pytest.approx(50, abs=1e-12)
+            assert file["x"][last] == pytest.approx(float(row["x"]), abs=1e-11)
+            assert file["v"][last] == pytest.approx(float(row["v"]), abs=1e-10)
+            assert file.attrs["reason"] == row["reason"]
+
+
+def text_of(item: h5py.Dataset) -> str:
+    """The meanings of the codes of a variable."""
+    return str(item.attrs["flag_meanings"])
+
+
+def test_a_list_in_another_order_and_without_ratio(separatrix, tmp_path):
+    write_case(tmp_path)
+    (tmp_path / "a.csv").write_text("x0,v0,ratio\n0.4,1,1.2\n0.5,-1,1.2\n")
+    (tmp_path / "b.csv").write_bytes(
+        b"# no ratio: that of the case\r\n v0 , x0\r\n\r\n1,0.4\r\n-1.0E0, .5\r\n"
+    )
+    for name in "ab":
+        command = [
+            "points",
+            "case.toml",
+            "--list",
+            f"{name}.csv",
+            "--csv",
+            f"{name}_out.csv",
+            "-o",
+            f"{name}.h5",
+        ]
+        succeed(separatrix, *command, folder=tmp_path)
+    assert (tmp_path / "a_out.csv").read_text() == (tmp_path / "b_out.csv").read_text()
+
+
+def test_the_events_of_a_trajectory_as_a_table(separatrix, tmp_path):
+    write_case(tmp_path)
+    succeed(separatrix, "trajectory", "case.toml", "--csv", "events.csv", folder=tmp_path)
+    with (tmp_path / "events.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["kind", "time", "x", "v_before", "v_after"]
+    with h5py.File(tmp_path / "case.h5") as file:
+        for name in ("time", "x", "v_before", "v_after"):
+            assert [float(row[name]) for row in rows] == file[f"event_{name}"][()].tolist()
+
+
+ENDLESS = ["basin", "case.toml", "--set", "axis[1].count=3000", "--set", "axis[2].count=3000"]
+ENDLESS += ["--set", 'run.stop="duration"']
+
+
+def test_progress_in_a_log_is_sparse(separatrix, tmp_path):
+    write_case(tmp_path)
+    more = {"plain": [], "lines": ["--json"], "quiet": ["--quiet"]}
+    processes = {}
+    for name, options in more.items():
+        command = [separatrix, *ENDLESS, "--time-limit", "11.5", "-o", f"{name}.h5", *options]
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        processes[name] = subprocess.Popen(command, cwd=tmp_path, **streams)
+    said = {name: process.communicate(timeout=60) for name, process in processes.items()}
+    assert [process.returncode for process in processes.values()] == [75, 75, 75]
+    assert re.fullmatch(r"\d+ of 9000000 points, 0 %, [\d.]+ points/s, ETA .+\n", said["plain"][1])
+    assert said["lines"][1] == ""
+    events = [json.loads(line) for line in said["lines"][0].splitlines()]
+    (progress,) = (event for event in events if event["event"] == "progress")
+    assert progress["total"] == 9000000
+    assert 0 < progress["done"] < 9000000
+    assert 10 <= progress["seconds"] < 15
+    assert progress["resident_bytes"] > 1e6
+    assert events[-1]["event"] == "stopped"
+    assert said["quiet"] == ("", "")
+
+
+def test_progress_on_a_terminal_rewrites_its_line(separatrix, tmp_path):
+    write_case(tmp_path)
+    terminal, end = pty.openpty()
+    command = [separatrix, *ENDLESS, "--time-limit", "2.5", "-o", "map.h5"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=end)
+    os.close(end)
+    said = b""
+    try:
+        while chunk := os.read(terminal, 4096):
+            said += chunk
+    except OSError:
+        pass  # the program has ended
+    os.close(terminal)
+    assert process.wait(10) == 75
+    text = said.decode()
+    assert 2 <= text.count("\r  ") <= 6
+    assert text.count("\n") == 1
+    assert "ETA" in text
