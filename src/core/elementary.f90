@@ -15,7 +15,8 @@ module elementary
     half_pi_high = 1.57079632673412561417e+00_real64, half_pi_low = 6.07710050650619224932e-11_real64, &
     two_over_pi = 6.36619772367581382433e-01_real64, &
     ln2_high = 6.93147180369123816490e-01_real64, ln2_low = 1.90821492927058770002e-10_real64, &
-    one_over_ln2 = 1.44269504088896338700e+00_real64
+    one_over_ln2 = 1.44269504088896338700e+00_real64, &
+    to_integer = 6755399441055744.0_real64 ! 1.5 * 2**52: adding it rounds to the nearest integer
 
   real(real64), parameter :: &
     s1 = -1.66666666666666324348e-01_real64, s2 = 8.33333333332248946124e-03_real64, &
@@ -43,7 +44,7 @@ contains
     real(real64), intent(out) :: sine, cosine
     real(real64) :: quarters, high, low, tail, r, z, half, w, sin_r, cos_r, sin_sign, cos_sign
     integer(int64) :: quadrant
-    quarters = anint(angle*two_over_pi)
+    quarters = (angle*two_over_pi + to_integer) - to_integer
     high = angle - quarters*half_pi_high
     low = quarters*half_pi_low
     r = high - low
@@ -64,12 +65,21 @@ contains
   pure elemental function exponential(x) result(y)
     real(real64), intent(in) :: x
     real(real64) :: y, twos, bounded
+    integer(int64) :: half
     bounded = max(-746.0_real64, min(710.0_real64, x))
-    twos = anint(bounded*one_over_ln2)
+    twos = (bounded*one_over_ln2 + to_integer) - to_integer
     y = 1.0_real64 + reduced_minus_one((bounded - twos*ln2_high) - twos*ln2_low)
-    y = scale(y, int(twos))
+    ! In two halves, so that neither factor leaves the range of normal numbers.
+    half = int(twos, int64)/2
+    y = (y*power_of_two(half))*power_of_two(int(twos, int64) - half)
     if (x /= x) y = x
   end function exponential
+
+  !> 2**n for |n| <= 1022, made of its exponent bits.
+  pure elemental real(real64) function power_of_two(n)
+    integer(int64), intent(in) :: n
+    power_of_two = transfer(ishft(n + 1023_int64, 52), 1.0_real64)
+  end function power_of_two
 
   !> e**x - 1 without cancellation near zero.
   pure elemental function exponential_minus_one(x) result(y)
