@@ -77,8 +77,8 @@ contains
     else
       range = 'a finite number'
     end if
-    if (range /= 'a finite number' .and. .not. abs(value) <= huge(1.0_wp)) range = 'a finite number, '//range
     problem = 'found '//to_text(value)//unit//', allowed '//range//unit
+    if (range /= 'a finite number' .and. .not. abs(value) <= huge(1.0_wp)) problem = problem//', a finite number'
   end function allowed_range
 
   !> The entry's number in the SI unit of `bounds`, or what is wrong with it.

@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import KINDS, STARTS, Outcome, differences, listing, run, succeed, write_case
+from program import KINDS, STARTS, Outcome, differences, listing, succeed, write_case
 
 COMMANDS = ["basin", "sweep", "trajectory", "points", "laws", "info", "verify"]
 OPTIONS = [

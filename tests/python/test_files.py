@@ -320,8 +320,8 @@ sys.exit(code)
 
 
 def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_path):
-    """25 times the points may take 1.5 MB more on each rank, and on rank 0, which writes the final file, buffers of up to
-    2**20 values, which the small map does not fill."""
+    """25 times the points may take 1.5 MB more; rank 0, which writes the final file, also fills buffers of
+    up to 2**20 values that the small map does not fill."""
     write_case(tmp_path)
     peaks = {}
     for count in (200, 1000):
