@@ -7,7 +7,7 @@ module trajectory
   use attractors, only: attractor_t, features_t, find_box, find_capture, regime_of
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: log_t, reset_tally, state_t, tally_t
+  use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
   use status, only: reason_settled, reason_time_over
   implicit none
   private
@@ -82,6 +82,9 @@ contains
     call run_until(moving, catalogue, span, course, span%duration, outcome, log)
     outcome%window = regime_of(course%tally, span%window/moving%machine%period)
     call note_state(course, outcome)
+    if (present(log)) then
+      if (log%sample_interval > 0) call record_sample(log, course%state)
+    end if
     if (course%reason == 0 .and. course%captured == 0 .and. size(catalogue) > 0) then
       call wait_for_capture(moving, catalogue, span, course, outcome)
     end if

@@ -130,8 +130,9 @@ contains
       if (label == 0 .or. size(self%catalogues) == 0) return
       slice = point_slice(self%grid, index) + 1
       do k = 1, size(self%catalogues(slice)%attractors)
-        if (self%catalogues(slice)%attractors(k)%id == label) &
+        if (self%catalogues(slice)%attractors(k)%id == label) then
           self%captured(self%offset(slice) + k) = self%captured(self%offset(slice) + k) + 1
+        end if
       end do
     end associate
   end subroutine note_basin_point
@@ -169,8 +170,8 @@ contains
     do i = 1, size(work%catalogues)
       last = max(last, maxval([0, work%catalogues(i)%attractors%id]))
     end do
-    call session%journal%line('catalogue', to_text(last)//' attractors in '//to_text(size(work%catalogues))// &
-      trim(merge(' slices', ' slice ', size(work%catalogues) > 1))//' discovered', '"attractors": '//to_text(last))
+    call session%journal%line('catalogue', counted(last, 'attractor')//' in '//counted(size(work%catalogues), 'slice')// &
+      ' discovered', '"attractors": '//to_text(last))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
       associate (a => work%catalogues(1)%attractors(k))
@@ -180,6 +181,15 @@ contains
       end associate
     end do
   end subroutine report_catalogue
+
+  !> '1 slice', '2 slices'.
+  pure function counted(number, thing) result(words)
+    integer, intent(in) :: number
+    character(len=*), intent(in) :: thing
+    character(len=:), allocatable :: words
+    words = to_text(number)//' '//thing
+    if (number /= 1) words = words//'s'
+  end function counted
 
   subroutine report_shares(session, work)
     type(session_t), intent(inout) :: session

@@ -7,16 +7,20 @@ module catalogue_search
   use attractors, only: attractor_t, pack_attractor, packed_size, unpack_attractor
   use basin, only: catalogue_t, discover_slice, label_slices
   use case_type, only: attractors_t
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use signals, only: signal_count
+  use status, only: exit_resumable
   use team, only: team_t
   use trajectory, only: span_t
   implicit none
   private
 
   public :: search_catalogues
+
+  character(len=*), parameter :: stopped = 'stopped while searching for attractors; nothing was written yet, start again'
 
 contains
 
@@ -42,6 +46,10 @@ contains
       call discover_slice(grid, span, slice, settings%sample, settings%seed, settings%max_period, neighbours, &
                           catalogues(slice + 1), error)
       if (allocated(error)) exit
+      if (signal_count() > 0) then
+        call fail(error, exit_resumable, stopped)
+        exit
+      end if
       call journal%progress(slice + 1)
     end do
     call team%agree(error)
@@ -55,6 +63,10 @@ contains
         call discover_slice(grid, span, slice, settings%sample, settings%seed, settings%max_period, neighbours, &
                             catalogues(slice + 1), error)
         if (allocated(error)) exit
+        if (signal_count() > 0) then
+          call fail(error, exit_resumable, stopped)
+          exit
+        end if
         call journal%progress(grid%slices + slice + 1)
       end do
       call team%agree(error)

@@ -17,6 +17,9 @@ module command_line
   character(len=*), parameter, public :: commands(7) = [character(len=10) :: 'basin', 'sweep', &
     'trajectory', 'points', 'laws', 'info', 'verify']
 
+  !> The commands that keep what is done when they are stopped.
+  character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
+
   type, public :: command_t
     character(len=:), allocatable :: name
     !> The case, or the file of `info` and `verify`.
@@ -84,6 +87,10 @@ contains
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. command%name /= 'points' .and. command%name /= 'trajectory') then
       call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
+    else if (command%resume .and. .not. any(command%name == resumable)) then
+      call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
+    else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
+      call fail(error, exit_usage, '--time-limit belongs to the commands '//join(resumable, ', '))
     else if (command%force .and. command%resume) then
       call fail(error, exit_usage, '--force starts anew and --resume goes on: choose one')
     else
@@ -147,8 +154,9 @@ contains
     case default
       call fail(error, exit_usage, "unknown option '"//argument//"' (see separatrix --help)")
     end select
-    if (equals > 0 .and. .not. allocated(value) .and. .not. allocated(error)) &
+    if (equals > 0 .and. .not. allocated(value) .and. .not. allocated(error)) then
       call fail(error, exit_usage, name//' takes no value')
+    end if
   end subroutine read_option
 
   subroutine take_value(name, value, command, error)
@@ -196,8 +204,9 @@ contains
     number = 0
     status = verify(value, '0123456789.eE+-')
     if (status == 0) read (value, *, iostat=status) number
-    if (status /= 0 .or. .not. number > 0 .or. number > huge(number)) &
+    if (status /= 0 .or. .not. number > 0 .or. number > huge(number)) then
       call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of seconds above 0")
+    end if
   end subroutine read_number
 
   subroutine read_integer(name, value, least, number, error)
@@ -209,9 +218,10 @@ contains
     number = least - 1
     status = verify(value, '0123456789')
     if (status == 0) read (value, *, iostat=status) number
-    if (status /= 0 .or. number < least) &
+    if (status /= 0 .or. number < least) then
       call fail(error, exit_usage, name//": found '"//value//"', allowed is a whole number"// &
                 trim(merge(' from 1', ' from 0', least > 0)))
+    end if
   end subroutine read_integer
 
   function argument_at(position) result(argument)

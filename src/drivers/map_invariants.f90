@@ -142,8 +142,9 @@ contains
         if (time(i) < time(i - 1)) call fail(error, exit_io, "'"//reader%path//"': event "//to_text(i - 1)// &
                                              ' comes before the one before it')
       end if
-      if (nint(kinds_of_event(i)) <= 2 .and. (before(i)*after(i) > 0 .or. abs(after(i)) > abs(before(i)))) &
+      if (nint(kinds_of_event(i)) <= 2 .and. (before(i)*after(i) > 0 .or. abs(after(i)) > abs(before(i)))) then
         call fail(error, exit_io, "'"//reader%path//"': impact "//to_text(i - 1)//' does not reverse the velocity')
+      end if
       if (allocated(error)) return
     end do
   end subroutine check_events
@@ -161,8 +162,9 @@ contains
     if (allocated(error)) return
     points = size(reason)
     do i = 1, size(reason)
-      if (nint(reason(i)) <= reason_not_run .or. nint(reason(i)) > last_reason) &
+      if (nint(reason(i)) <= reason_not_run .or. nint(reason(i)) > last_reason) then
         call fail(error, exit_io, "'"//reader%path//"', point "//to_text(i - 1)//': reason code '//to_text(nint(reason(i))))
+      end if
       if (.not. allocated(error) .and. ((impacts(i) > 0) .neqv. (speed(i) > 0))) call fail(error, exit_io, &
         "'"//reader%path//"', point "//to_text(i - 1)//': '//to_text(nint(impacts(i)))//' impacts, last at '// &
         to_text(speed(i))//' m/s')

@@ -4,11 +4,13 @@
 !> The two chains of a sweep, run up and run down, each by one rank, and the limits between which impacts occur.
 module sweep_chain
   use attractors, only: features_t
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
   use motion_state, only: state_t
+  use signals, only: signal_count
+  use status, only: exit_resumable
   use sweep, only: bracket_limit, hold_parameter, hold_t
   use team, only: team_t
   use trajectory, only: span_t
@@ -109,6 +111,10 @@ contains
       impacted = impacting
       before = k
       call journal%progress(int(i, int64))
+      if (signal_count() > 0) then
+        call fail(error, exit_resumable, 'stopped while running '//trim(path)//' up and down; nothing was written yet, start again')
+        return
+      end if
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == 0) state = held%state
     end do

@@ -85,10 +85,12 @@ contains
     unreachable = sqrt(huge(1.0_wp))
     call schema%add_attribute('', 'drive_period', moving%machine%period)
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
-    if (moving%machine%contact%upper < unreachable) &
+    if (moving%machine%contact%upper < unreachable) then
       call schema%add_attribute('', 'barrier_upper', moving%machine%contact%upper)
-    if (moving%machine%contact%lower > -unreachable) &
+    end if
+    if (moving%machine%contact%lower > -unreachable) then
       call schema%add_attribute('', 'barrier_lower', moving%machine%contact%lower)
+    end if
     call schema%add_attribute('', 'window', span%window)
     associate (f => outcome%window)
       call schema%add_attribute('', 'amplitude', f%amplitude)
