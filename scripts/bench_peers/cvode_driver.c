@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: The Separatrix developers
  * SPDX-License-Identifier: GPL-3.0-or-later
  *
- * SUNDIALS CVODE with its own rootfinding: Adams with fixed-point iteration, the choice for problems that are not
- * stiff, started anew after every event. */
+ * SUNDIALS CVODE with its own rootfinding: Adams with fixed-point iteration, the choice for problems that are
+ * not stiff, started anew after every event. */
 #include "published_case.h"
 
 #include <cvode/cvode.h>
@@ -40,7 +40,8 @@ static int events(realtype time, N_Vector y, realtype *values, void *context) {
   return 0;
 }
 
-/* Interpolates back from a turning point beyond the barrier to the impact that the sign tests stepped over. */
+/* Interpolates back from a turning point beyond the barrier to the impact that the sign tests stepped over.
+ */
 static double impact_before(solver_t *solver, double turning) {
   const double barrier = solver->flow.machine->barrier;
   double *state = N_VGetArrayPointer(solver->y), current, last, low, high = turning;

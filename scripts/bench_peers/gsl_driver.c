@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: The Separatrix developers
  * SPDX-License-Identifier: GPL-3.0-or-later
  *
- * GSL odeiv2, Prince-Dormand 8(9). GSL locates no events: the sign of v and the barrier are tested after every
- * accepted step, and the event is found by steps of other lengths from the same beginning (safeguarded Newton). */
+ * GSL odeiv2, Prince-Dormand 8(9). GSL locates no events: the sign of v and the barrier are tested after
+ * every accepted step, and the event is found by steps of other lengths from the same beginning (safeguarded
+ * Newton). */
 #include "published_case.h"
 
 #include <gsl/gsl_errno.h>
@@ -44,7 +45,8 @@ static void step_to(solver_t *solver, double time, const double before[2], doubl
 }
 
 /* Length of the step, at most h, at which the event happens; y becomes the state there. */
-static double locate(solver_t *solver, event_t event, double time, const double before[2], double h, double y[2]) {
+static double locate(solver_t *solver, event_t event, double time, const double before[2], double h,
+                     double y[2]) {
   double low = 0, high = h, trial = h, slope[2];
   const double sign = y[event.component] > event.value ? 1 : -1;
   int i;
@@ -66,8 +68,8 @@ static double locate(solver_t *solver, event_t event, double time, const double 
 }
 
 /* One phase: on return v = 0 at a turning point, v after the impact at the barrier, or the time is over. */
-static int run_phase(solver_t *solver, const machine_t *machine, int direction, double *time, double *h, double y[2],
-                     outcome_t *outcome) {
+static int run_phase(solver_t *solver, const machine_t *machine, int direction, double *time, double *h,
+                     double y[2], outcome_t *outcome) {
   const event_t turning = {1, 0}, barrier = {0, machine->barrier};
   while (*time < machine->duration) {
     const double start = *time, before[2] = {y[0], y[1]};

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: The Separatrix developers
  * SPDX-License-Identifier: GPL-3.0-or-later
  *
- * The published machine and what the drivers of the peers share. One trajectory is a sequence of phases with a
- * fixed sign of the velocity; a phase ends at a turning point or at the barrier. */
+ * The published machine and what the drivers of the peers share. One trajectory is a sequence of phases with
+ * a fixed sign of the velocity; a phase ends at a turning point or at the barrier. */
 #ifndef PUBLISHED_CASE_H
 #define PUBLISHED_CASE_H
 
@@ -10,18 +10,19 @@ enum { HARMONICS = 3 };
 
 /* Filled by published_case.py. Accelerations are forces per mass. */
 typedef struct {
-  double stiffness;   /* c/m [1/s^2] */
-  double rest;        /* spring length at which the foot at x_A = 0 exerts no force, plus the mean of x_A [m] */
-  double friction;    /* mu g [m/s^2] */
-  double restitution; /* v+ = -k v- */
-  double barrier;     /* [m] */
-  double frequency;   /* of the drive [rad/s] */
-  double angle;       /* [rad] */
+  double stiffness; /* c/m [1/s^2] */
+  double rest;      /* spring length at which the foot at x_A = 0 exerts no force, plus the mean of x_A [m] */
+  double friction;  /* mu g [m/s^2] */
+  double restitution;                        /* v+ = -k v- */
+  double barrier;                            /* [m] */
+  double frequency;                          /* of the drive [rad/s] */
+  double angle;                              /* [rad] */
   double cosine[HARMONICS], sine[HARMONICS]; /* [m] */
   double duration, window;                   /* [s] */
 } machine_t;
 
-/* Where a trajectory ended and what it met. `repaired`: impacts that the library's event location stepped over. */
+/* Where a trajectory ended and what it met. `repaired`: impacts that the library's event location stepped
+ * over. */
 typedef struct {
   double x, v, impacts, window_impacts, sticks, repaired;
 } outcome_t;

@@ -68,7 +68,9 @@ def read_case() -> dict:
     """The case file with plain numbers."""
     case = tomllib.loads(CASE.read_text())
     return {
-        name: {key: si(value) if key not in ("law", "cosine", "sine") else value for key, value in table.items()}
+        name: {
+            key: si(value) if key not in ("law", "cosine", "sine") else value for key, value in table.items()
+        }
         for name, table in case.items()
         if isinstance(table, dict)
     }

@@ -56,38 +56,40 @@ class Friction:
 class Heyoka:
     """Taylor integration with terminal events, in batches of `batch` lanes, or one by one if that is 0.
 
-    Parameters per lane: h, q in x' = h v, v' = h (spring) + q. Sliding has h = 1 and q = the friction. Where the
-    body sticks, h = 0, q = 1 and v counts up from minus the time to release: the event v = 0 ends that too.
+    Parameters per lane: h, q in x' = h v, v' = h (spring) + q. Sliding has h = 1 and q = the friction. Where
+    the body sticks, h = 0, q = 1 and v counts up from minus the time to release; the event v = 0 ends it.
+    Without `events` it is another problem, the flow alone, which bounds the speed that events leave.
     """
 
-    def __init__(self, machine: Machine, tolerance: float, batch: int) -> None:
+    def __init__(self, machine: Machine, tolerance: float, batch: int, events: bool = True) -> None:
         self.machine, self.batch, self.lanes = machine, batch, max(batch, 1)
         self.friction = Friction(machine)
         equations, wall, v = self.problem()
         hit, turn = self.callbacks()
         upward = heyoka.event_direction.positive
         if batch:
-            events = [
+            wanted = [
                 heyoka.t_event_batch(wall, callback=hit, direction=upward),
                 heyoka.t_event_batch(v, callback=turn),
             ]
             start, parameters = np.zeros((len(equations), batch)), np.zeros((2, batch))
             make = heyoka.taylor_adaptive_batch
         else:
-            events = [
+            wanted = [
                 heyoka.t_event(wall, callback=lambda solver, sign: hit(solver, sign, 0), direction=upward),
                 heyoka.t_event(v, callback=lambda solver, sign: turn(solver, sign, 0)),
             ]
             start, parameters = [0.0] * len(equations), [0.0, 0.0]
             make = heyoka.taylor_adaptive
-        self.solver = make(equations, start, pars=parameters, tol=tolerance, t_events=events)
+        self.events = wanted if events else []
+        self.solver = make(equations, start, pars=parameters, tol=tolerance, t_events=self.events)
         # views of the solver's memory: quicker to index than its arrays, and callbacks are most of the time
         self.state = memoryview(self.solver.state.reshape(-1, self.lanes))
         self.pars = memoryview(self.solver.pars.reshape(-1, self.lanes))
         self.impacts, self.sticks = [0] * self.lanes, 0
 
     def problem(self) -> tuple[list, heyoka.expression, heyoka.expression]:
-        """Equations and what vanishes at events; the harmonics are oscillators, cheaper than sin and cos of time."""
+        """Equations and what vanishes at events; the harmonics are oscillators, which callbacks can read."""
         machine = self.machine
         x, v = heyoka.make_vars("x", "v")
         names = [f"{kind}{k}" for kind in "ds" for k in range(1, HARMONICS + 1)]
@@ -142,7 +144,8 @@ class Heyoka:
                 solver.set_time(np.zeros(self.batch))
             else:
                 solver.time = 0.0
-            solver.reset_cooldowns()
+            if self.events:
+                solver.reset_cooldowns()
             state[:2], state[2:] = starts[chunk].T, drive[:, None]
             pars[0], pars[1] = 1.0, -np.sign(state[1]) * machine.friction
             self.impacts[:] = [0] * self.lanes

@@ -27,7 +27,7 @@ class Reference:
         self.set_laws(json.loads(table), read_case())
 
     def set_laws(self, table: list[dict], case: dict) -> None:
-        """The laws of the case as rows of the program's law table, and their parameters one after the other."""
+        """The laws of the case as rows of the program's table, and their parameters one after the other."""
         rows, lengths, values = [], [], []
         for family in FAMILIES:
             chosen = case[family].get("law", "point_mass")

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Our program, timed without its start-up: the difference of a long and a short run."""
+
+import resource
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from published_case import SOURCE, Outcomes
+from reference_run import IMPACT_REGIMES
+
+
+@dataclass
+class Timing:
+    """What a number of trajectories took."""
+
+    points: int
+    cpu: float
+    wall: float
+
+    def __sub__(self, other: "Timing") -> "Timing":
+        return Timing(self.points - other.points, self.cpu - other.cpu, self.wall - other.wall)
+
+
+class Program:
+    """Runs separatrix as a user does, on one core."""
+
+    def __init__(self, program: Path, folder: Path) -> None:
+        self.program, self.folder = program, folder
+        text = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+        self.version = dict(line.split(" ", 1) for line in text.splitlines())
+
+    def timed(self, points: int, *words: object) -> Timing:
+        """Run it and wait; CPU time is user and system time of the process."""
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+        subprocess.run([self.program, *map(str, words), "--force", "--quiet"], check=True)
+        wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+        return Timing(points, sum(after[:2]) - sum(before[:2]), wall)
+
+    def points(self, law: str, starts: np.ndarray, name: str) -> tuple[Timing, Path]:
+        """Run starts for the whole duration."""
+        listed, path = self.folder / f"{name}.csv", self.folder / f"{name}.h5"
+        lines = [f"{x0!r},{v0!r}\n" for x0, v0 in starts.tolist()]
+        listed.write_text("x0,v0\n" + "".join(lines))
+        case = SOURCE / "examples" / f"basin_{law}.toml"
+        return self.timed(len(starts), "points", case, "--list", listed, "-o", path), path
+
+    def basin(self, count: int, name: str) -> tuple[Timing, Path]:
+        """A map of count x count starts, each stopped as soon as it is captured."""
+        path = self.folder / f"{name}.h5"
+        size = [word for axis in (1, 2) for word in ("--set", f"axis[{axis}].count={count}")]
+        case = SOURCE / "examples" / "basin_coulomb.toml"
+        return self.timed(count**2, "basin", case, "-o", path, *size), path
+
+
+class FullRuns:
+    """`separatrix points`: every start for the whole duration."""
+
+    def __init__(self, program: Program, law: str, starts: np.ndarray, short: int) -> None:
+        self.program, self.law, self.starts, self.short = program, law, starts, short
+        self.path = Path()
+
+    def round(self) -> Timing:
+        """A long list minus the short list at its beginning."""
+        name = f"points_{self.law}"
+        short, _ = self.program.points(self.law, self.starts[: self.short], f"{name}_short")
+        long, self.path = self.program.points(self.law, self.starts, name)
+        return long - short
+
+    def outcomes(self) -> Outcomes:
+        """What the last long run found."""
+        return read_points(self.path)
+
+
+class StoppedRuns:
+    """`separatrix basin`: every start until it is captured."""
+
+    def __init__(self, program: Program, short: int, long: int) -> None:
+        self.program, self.short, self.long = program, short, long
+        self.path = Path()
+
+    def round(self) -> Timing:
+        """A fine map minus a coarse one; both search for the attractors first."""
+        short, _ = self.program.basin(self.short, "basin_short")
+        long, self.path = self.program.basin(self.long, "basin")
+        return long - short
+
+    def labels(self, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Starts and labels of points of the last map, given by their number."""
+        with h5py.File(self.path) as file:
+            regime = file["regime"][()]
+            i, j = np.unravel_index(chosen, regime.shape)
+            starts = np.column_stack([file["x0"][()][i], file["v0"][()][j]])
+        return starts, np.isin(regime[i, j], IMPACT_REGIMES)
+
+
+def read_points(path: Path) -> Outcomes:
+    """The file of a list of starts."""
+    with h5py.File(path) as file:
+        x, v, impacts, regime = (file[name][()] for name in ("x", "v", "impacts", "regime"))
+    return Outcomes(x, v, impacts, np.isin(regime, IMPACT_REGIMES))

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The comparison with other programs: its command line, and that everybody solves the same problem."""
+
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+from program import succeed
+
+STARTS = ((0.4, 0.0), (0.8, 0.0), (0.25, 5.5))
+
+
+def test_help_needs_nothing_installed(source_dir):
+    result = subprocess.run([source_dir / "scripts" / "bench", "--help"], capture_output=True, text=True)
+    assert result.returncode == 0
+    assert "--quick" in result.stdout
+
+
+def test_an_unknown_option_is_named(source_dir):
+    result = subprocess.run([source_dir / "scripts" / "bench", "--fast"], capture_output=True, text=True)
+    assert result.returncode == 64
+    assert "--fast" in result.stderr
+
+
+@pytest.mark.parametrize("peer", ["cvode", "gsl"])
+def test_the_driver_of_a_peer_agrees_with_ours(
+    source_dir, build_dir, separatrix, tmp_path, monkeypatch, peer
+):
+    library = build_dir / "bench_peers" / f"libbench_{peer}.so"
+    if not library.is_file():
+        pytest.skip(f"{library} has not been built; scripts/bench does")
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    from compiled import Compiled
+    from published_case import CASE, TOLERANCE, published_machine
+
+    peers = Compiled(library, published_machine(), TOLERANCE).run(np.array(STARTS))
+    (tmp_path / "list.csv").write_text("x0,v0\n" + "".join(f"{x},{v}\n" for x, v in STARTS))
+    succeed(separatrix, "points", CASE, "--list", "list.csv", "-o", "ours.h5", "--quiet", folder=tmp_path)
+    with h5py.File(tmp_path / "ours.h5") as ours:
+        assert peers.impacts.tolist() == ours["impacts"][()].tolist()
+        np.testing.assert_allclose(peers.x, ours["x"][()], atol=1e-6)
+        np.testing.assert_allclose(peers.v, ours["v"][()], atol=1e-6)
