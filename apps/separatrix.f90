@@ -11,7 +11,7 @@ program separatrix
   use laws_driver, only: run_laws
   use points_driver, only: run_points
   use sweep_driver, only: run_sweep
-  use system, only: exit_program
+  use system, only: exit_program, sleep_microseconds
   use trajectory_driver, only: run_trajectory_command
   use verify_driver, only: run_verify
   use version_text, only: print_version
@@ -50,7 +50,12 @@ program separatrix
     end if
   end if
   if (allocated(error)) then
-    if (first) write (error_unit, '(a)') 'separatrix: '//error%message
+    if (first) then
+      write (error_unit, '(a)') 'separatrix: '//error%message
+    else
+      ! mpirun ends the others with the first that fails: let it be the one that speaks.
+      call sleep_microseconds(500000)
+    end if
     call exit_program(error%code)
   end if
 end program separatrix

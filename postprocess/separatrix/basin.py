@@ -17,11 +17,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from separatrix import style
-from separatrix.case import describe_case, version_text
+from separatrix.case import describe_case, start_pieces, version_text
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
 from separatrix.layout import compose
+from separatrix.open import table
 from separatrix.reduce import Plane, majority_plane, scalar_plane
 
 MOST_PANELS = 12
@@ -37,8 +38,11 @@ class _Panel:
 
 
 def figures(path: str | Path, result: xr.Dataset, field: str | None, title: str) -> dict[str, Figure]:
-    """Return the maps of a basin file by name: regime and attractor, or the one field that is asked for."""
-    names = [field] if field else ["regime", "attractor"]
+    """Return the maps of a basin file by name: regime and attractor, or the one field that is asked for.
+
+    Without any label there is no map of the attractors, unless it is asked for.
+    """
+    names = [field] if field else ["regime", *(["attractor"] if _labelled(result) else [])]
     for name in names:
         if name not in result or result[name].dims != result["regime"].dims:
             known = ", ".join(
@@ -57,7 +61,7 @@ def basin_map(path: str | Path, result: xr.Dataset, field: str, title: str) -> F
     panels = _read_panels(path, result, field, (down, across), others, chosen)
 
     figure, grid = _grid(len(panels), 62.0 if down else 22.0)
-    caption = describe_case(result)
+    caption = describe_case(result) + start_pieces(result)
     if field in CLASS_FIELDS:
         handles = _draw_classes(grid, result, field, (down, across), panels)
     else:
@@ -88,6 +92,12 @@ def cell_edges(centres: np.ndarray) -> np.ndarray:
         return centres[0] + np.array([-0.5, 0.5])
     middle = (centres[1:] + centres[:-1]) / 2
     return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+
+
+def _labelled(result: xr.Dataset) -> bool:
+    """Whether the catalogue has an attractor that captured a point."""
+    catalogue = table(result, "catalogue")
+    return "count" in catalogue and bool(catalogue["count"].values.any())
 
 
 def _read_panels(

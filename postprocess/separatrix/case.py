@@ -4,6 +4,7 @@
 
 import tomllib
 
+import numpy as np
 import xarray as xr
 
 # symbol and unit of the parameters that matter for a caption, in this order
@@ -19,6 +20,7 @@ _CONTACT = {
     "upper": (r"$x_\mathrm{upper}$", "m"),
     "lower": (r"$x_\mathrm{lower}$", "m"),
 }
+_START = {"x0": ("$x_0$", "m"), "v0": ("$v_0$", "m/s")}
 _LAW_NAMES = {
     "none": "no",
     "coulomb": "Coulomb",
@@ -41,10 +43,10 @@ def resolved_case(result: xr.Dataset) -> dict:
 def describe_case(result: xr.Dataset) -> list[str]:
     """Return short pieces of a caption: friction, contact and drive ratio.
 
-    A parameter that is an axis of the map or of the sweep is left out.
+    A parameter that is an axis of the map or of the sweep, or differs between the points, is left out.
     """
     case = resolved_case(result)
-    axes = set(result.dims)
+    axes = _axes(result, case)
     pieces = []
     friction = case.get("friction")
     if isinstance(friction, dict):
@@ -56,9 +58,20 @@ def describe_case(result: xr.Dataset) -> list[str]:
         values = _values(contact, _CONTACT, "contact", axes)
         pieces.append(", ".join(values) if values else "no barrier")
     ratio = _drive_ratio(result, case)
-    if ratio is not None and not axes & {"drive_ratio", "ratio"}:
+    if ratio is not None and "drive_ratio" not in axes:
         pieces.append(rf"$\Omega_p/\omega$ = {ratio:g}")
     return pieces
+
+
+def start_pieces(result: xr.Dataset) -> list[str]:
+    """Return the start values that are no axis; a crank angle of 0 is not mentioned."""
+    start = resolved_case(result).get("start")
+    if not isinstance(start, dict):
+        return []
+    pieces = _values(start, _START, "", set(result.dims))
+    if start.get("crank_angle") and "crank_angle" not in result.dims:
+        pieces += _values(start, {"crank_angle": (r"$\varphi_0$", "rad")}, "", set())
+    return [", ".join(pieces)] if pieces else []
 
 
 def version_text(result: xr.Dataset) -> str:
@@ -68,9 +81,27 @@ def version_text(result: xr.Dataset) -> str:
     return f"{source} ({commit[:10]})" if commit else source
 
 
+def _axes(result: xr.Dataset, case: dict) -> set[str]:
+    """Names of what varies in a file."""
+    axes = {str(name) for name in result.dims}
+    if "ratio" in result and np.ptp(result["ratio"].values) > 0:
+        axes.add("drive_ratio")
+    friction = case.get("friction")
+    # an axis over the kinetic coefficient moves a static one that equals it
+    if (
+        "friction_kinetic_coefficient" in axes
+        and isinstance(friction, dict)
+        and friction.get("static_coefficient") == friction.get("kinetic_coefficient")
+    ):
+        axes.add("friction_static_coefficient")
+    return axes
+
+
 def _drive_ratio(result: xr.Dataset, case: dict) -> float | None:
     drive = case.get("drive")
     value = result.attrs.get("drive_ratio", drive.get("ratio") if isinstance(drive, dict) else None)
+    if "ratio" in result:
+        value = float(result["ratio"].values[0])
     return float(value) if isinstance(value, int | float) else None
 
 
@@ -78,7 +109,8 @@ def _values(section: dict, symbols: dict, family: str, axes: set) -> list[str]:
     texts = []
     for key, (symbol, unit) in symbols.items():
         value = section.get(key)
-        if not isinstance(value, int | float) or f"{family}_{key}" in axes or not abs(value) < _HUGE:
+        name = f"{family}_{key}" if family else key
+        if not isinstance(value, int | float) or name in axes or not abs(value) < _HUGE:
             continue
         texts.append(f"{symbol} = {value:g} {unit}".rstrip())
     return texts

@@ -17,6 +17,7 @@ from separatrix.open import table
 from separatrix.regions import Boundary, Region, boundaries, regions
 
 _UP, _DOWN = 0, 1
+_NOT_RUN = 0
 
 
 def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
@@ -139,7 +140,7 @@ def _run_handles(result: xr.Dataset) -> list[Line2D]:
 
 def _directions(result: xr.Dataset) -> list[tuple[int, int]]:
     """Return position and code of the directions that were run; a sweep may have been one-way."""
-    done = np.isfinite(result["x_max"]).any(swept_axis(result)).values
+    done = (np.isfinite(result["x_max"]) & (result["reason"] != _NOT_RUN)).any(swept_axis(result)).values
     return [(place, int(code)) for place, code in enumerate(result["direction"].values) if done[place]]
 
 

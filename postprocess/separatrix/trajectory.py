@@ -35,12 +35,13 @@ def time_history(result: xr.Dataset, title: str) -> Figure:
     whole, zoom = figure.subplots(2, 1)
     time, position = result["time"].values, result["x"].values
     whole.plot(*_envelope(time, position), color=style.MOTION, linewidth=0.7)
-    whole.set_xlim(time[0], time[-1])
-    start = max(time[0], time[-1] - ZOOM_PERIODS * float(result.attrs["drive_period"]))
+    end = _end(result)
+    whole.set_xlim(time[0], end)
+    start = max(time[0], end - ZOOM_PERIODS * float(result.attrs["drive_period"]))
     last = time >= start
     zoom.plot(time[last], position[last], color=style.MOTION)
     zoom.plot(time[last], result["drive"].values[last], color="#555555", linewidth=0.7, linestyle=(0, (4, 2)))
-    zoom.set_xlim(start, time[-1])
+    zoom.set_xlim(start, end)
     marked = False
     for letter, ax in zip("ab", (whole, zoom), strict=True):
         _draw_barriers(ax.axhline, result)
@@ -62,6 +63,13 @@ def time_history(result: xr.Dataset, title: str) -> Figure:
     caption = [f"b) the last {ZOOM_PERIODS} drive periods", *_caption(result)]
     compose(figure, title, caption, handles, columns=4)
     return figure
+
+
+def _end(result: xr.Dataset) -> float:
+    """Return the last time, or the duration of the case if that is at most a sample away: it has a tick."""
+    time = result["time"].values
+    duration = resolved_case(result).get("run", {}).get("duration", time[-1])
+    return float(duration if time.size > 1 and abs(duration - time[-1]) <= time[1] - time[0] else time[-1])
 
 
 def phase_portrait(result: xr.Dataset, title: str) -> Figure:

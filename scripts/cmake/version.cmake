@@ -17,7 +17,7 @@ add_custom_target(separatrix_build_info_source
   COMMAND "${CMAKE_COMMAND}"
           "-DTEMPLATE=${CMAKE_CURRENT_LIST_DIR}/build_info.f90.in" "-DOUTPUT=${build_info}"
           "-DSOURCE_DIR=${PROJECT_SOURCE_DIR}" "-DVERSION=${PROJECT_VERSION}"
-          "-DCOMPILER=${CMAKE_Fortran_COMPILER_ID} ${CMAKE_Fortran_COMPILER_VERSION}"
+          "-DCOMPILER=Fortran ${CMAKE_Fortran_COMPILER_ID} ${CMAKE_Fortran_COMPILER_VERSION}, C ${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}, C++ ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}"
           "-DFLAGS=${build_flags}" "-DMPI=${build_mpi}" "-DHDF5=${build_hdf5}"
           -P "${CMAKE_CURRENT_LIST_DIR}/write_build_info.cmake"
   BYPRODUCTS "${build_info}"

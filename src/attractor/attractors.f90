@@ -104,16 +104,18 @@ contains
     end do
   end function find_capture
 
-  !> Index of the motion that is not periodic whose box of section points holds a state; 0 if none.
-  pure integer function find_box(catalogue, state) result(found)
+  !> Index of the motion that is not periodic whose regime is `regime` and whose box of section points holds a state; 0
+  !> if none.
+  pure integer function find_box(catalogue, state, regime) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
     type(state_t), intent(in) :: state
+    integer, intent(in) :: regime
     real(wp) :: point(2), margin(2)
     integer :: k
     found = 0
     point = [state%x, state%v]
     do k = 1, size(catalogue)
-      if (catalogue(k)%period /= 0 .or. catalogue(k)%rests) cycle
+      if (catalogue(k)%period /= 0 .or. catalogue(k)%rests .or. catalogue(k)%features%regime /= regime) cycle
       margin = box_margin*(catalogue(k)%points(:, 2) - catalogue(k)%points(:, 1))
       if (all(point >= catalogue(k)%points(:, 1) - margin .and. point <= catalogue(k)%points(:, 2) + margin)) then
         found = k

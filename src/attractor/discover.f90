@@ -4,7 +4,7 @@
 !> Builds the catalogue of attractors of one machine from a sample of starts. Serial and in a fixed order; frozen
 !> before any trajectory of a map is labelled.
 module discover
-  use attractors, only: attractor_t, find_box, find_capture, longest_period, regime_of
+  use attractors, only: attractor_t, features_t, find_box, find_capture, longest_period, regime_of
   use cycle, only: refine_cycle
   use kinds, only: int64, wp
   use motion, only: advance_period, motion_t, start_state
@@ -33,21 +33,21 @@ contains
     type(state_t) :: state
     type(attractor_t) :: found
     real(wp) :: patience
-    integer :: i
+    integer :: i, regime
     logical :: known, ok
     if (.not. allocated(catalogue)) allocate (catalogue(0))
     do i = 1, size(starts, 2)
       state = start_state(moving, starts(1, i), starts(2, i), starts(3, i))
       patience = span%duration
       do
-        call settle(moving, catalogue, patience, state, known, ok)
+        call settle(moving, catalogue, patience, state, regime, known, ok)
         if (known .or. .not. ok) exit
         call recognise(moving, state, min(max_period, longest_period), found, ok)
         if (ok) then
           if (.not. holds(catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
-        if (find_box(catalogue, state) > 0) exit
+        if (find_box(catalogue, state, regime) > 0) exit
         if (2*patience > span%extension*span%duration) then
           call add_aperiodic(moving, state, catalogue)
           exit
@@ -66,26 +66,34 @@ contains
     holds = find_capture(catalogue, state, .not. found%rests) > 0
   end function holds
 
-  !> Runs for `patience` [s] unless captured before.
-  pure subroutine settle(moving, catalogue, patience, state, known, ok)
+  !> Runs for `patience` [s] unless captured before; `regime` is that of the run.
+  pure subroutine settle(moving, catalogue, patience, state, regime, known, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: patience
     type(state_t), intent(inout) :: state
+    integer, intent(out) :: regime
     logical, intent(out) :: known, ok
     type(tally_t) :: tally
+    type(features_t) :: features
+    integer(int64) :: slips
     integer :: i, reason
+    logical :: whole
     known = .false.
     ok = .true.
+    regime = 0
     call reset_tally(tally, state)
     do i = 1, max(1, ceiling(patience/moving%machine%period))
-      tally%slips = 0
+      slips = tally%slips
+      whole = .not. state%time > 0
       call advance_period(moving, state, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      known = find_capture(catalogue, state, tally%slips > 0) > 0
+      known = find_capture(catalogue, state, .not. whole .or. tally%slips > slips) > 0
       if (known) return
     end do
+    features = regime_of(tally, 1.0_wp)
+    regime = features%regime
   end subroutine settle
 
   !> The attractor at which a settled state is, if it is at rest or periodic.

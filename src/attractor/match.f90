@@ -8,57 +8,78 @@ module match
   implicit none
   private
 
-  public :: carry_labels
+  public :: carry_labels, number_new, remember
 
   !> Distance in units of the motion's size beyond which two attractors are not the same branch.
   real(wp), parameter :: farthest = 1.0_wp
-  !> Preference for the same regime.
-  real(wp), parameter :: regime_penalty = 0.5_wp
 
 contains
 
-  !> Labels `catalogue` after the branches `known` (each as last seen), nearest pairs first; what has no partner
-  !> starts a new branch. `known` is brought up to date.
+  !> Gives the attractors of `catalogue` that have no label yet (id 0) those of the nearest branches in `known`, nearest
+  !> pairs first; no label twice.
   pure subroutine carry_labels(known, catalogue)
-    type(attractor_t), allocatable, intent(inout) :: known(:)
+    type(attractor_t), intent(in) :: known(:)
     type(attractor_t), intent(inout) :: catalogue(:)
     real(wp) :: distance(size(known), size(catalogue))
     integer :: i, k, nearest(2)
+    if (size(known) == 0 .or. size(catalogue) == 0) return
     do k = 1, size(catalogue)
-      catalogue(k)%id = 0
       do i = 1, size(known)
-        distance(i, k) = branch_distance(known(i), catalogue(k))
+        distance(i, k) = huge(1.0_wp)
+        if (catalogue(k)%id == 0 .and. .not. any(catalogue%id == known(i)%id)) then
+          distance(i, k) = branch_distance(known(i), catalogue(k))
+        end if
       end do
     end do
-    do while (size(known) > 0 .and. size(catalogue) > 0)
+    do
       nearest = minloc(distance)
       if (distance(nearest(1), nearest(2)) > farthest) exit
       catalogue(nearest(2))%id = known(nearest(1))%id
-      known(nearest(1)) = catalogue(nearest(2))
       distance(nearest(1), :) = huge(1.0_wp)
       distance(:, nearest(2)) = huge(1.0_wp)
     end do
-    do k = 1, size(catalogue)
-      if (catalogue(k)%id > 0) cycle
-      catalogue(k)%id = size(known) + 1
-      known = [known, catalogue(k)]
-    end do
   end subroutine carry_labels
 
-  !> Nearest distance between points of two cycles of the same period; huge if they cannot be one branch.
+  !> What has no label yet starts new branches: `highest` + 1, + 2, ...
+  pure subroutine number_new(catalogue, highest)
+    type(attractor_t), intent(inout) :: catalogue(:)
+    integer, intent(inout) :: highest
+    integer :: k
+    do k = 1, size(catalogue)
+      if (catalogue(k)%id > 0) cycle
+      highest = highest + 1
+      catalogue(k)%id = highest
+    end do
+  end subroutine number_new
+
+  !> Brings `known`, branches as last seen, up to date with a labelled catalogue.
+  pure subroutine remember(known, catalogue)
+    type(attractor_t), allocatable, intent(inout) :: known(:)
+    type(attractor_t), intent(in) :: catalogue(:)
+    integer :: i, k
+    do k = 1, size(catalogue)
+      i = findloc(known%id, catalogue(k)%id, dim=1)
+      if (i > 0) then
+        known(i) = catalogue(k)
+      else
+        known = [known, catalogue(k)]
+      end if
+    end do
+  end subroutine remember
+
+  !> Nearest distance between points of two cycles of the same regime and period; huge if they cannot be one branch.
   pure real(wp) function branch_distance(a, b) result(distance)
     type(attractor_t), intent(in) :: a, b
     integer :: i
     distance = huge(1.0_wp)
-    if (a%period /= b%period .or. (a%rests .neqv. b%rests)) return
+    if (a%period /= b%period .or. a%features%regime /= b%features%regime) return
     if (a%rests .or. a%period == 0) then
-      if (a%features%regime == b%features%regime) distance = 0
+      distance = 0
       return
     end if
     do i = 1, b%period
       distance = min(distance, norm2((a%points(:, 1) - b%points(:, i))/max(a%scale, b%scale)))
     end do
-    if (a%features%regime /= b%features%regime) distance = distance + regime_penalty
   end function branch_distance
 
 end module match

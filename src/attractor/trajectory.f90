@@ -202,7 +202,7 @@ contains
       outcome%features%grazing_margin = min(margin, outcome%features%grazing_margin)
     else
       outcome%reason = reason_time_over
-      box = find_box(catalogue, course%state)
+      box = find_box(catalogue, course%state, outcome%window%regime)
       if (box > 0) outcome%attractor = catalogue(box)%id
       outcome%features = outcome%window
       outcome%features%word = 0

@@ -21,6 +21,9 @@ module case_check
   !> Combinations of axis values that are checked one by one; of more, the corners.
   integer, parameter :: most_combinations = 4096
 
+  !> Most points of a tile.
+  integer, parameter :: most_tile_points = 2**24
+
 contains
 
   !> Notes every violated condition of a case whose single values are good.
@@ -40,6 +43,7 @@ contains
     call check_combinations(source, the_case, the_case%axes)
     if (the_case%sweep%present) call check_combinations(source, the_case, [the_case%sweep%swept])
     call check_axis_order(source, the_case%axes)
+    call check_tiles(source, the_case)
     call check_starts(source, the_case)
   end subroutine check_case
 
@@ -182,10 +186,35 @@ contains
     end do
   end subroutine check_axis_order
 
-  !> No start lies beyond a barrier.
+  !> Tiles are counted by a default integer, and each is held in memory. Axes without a tile length
+  !> are cut later, into pieces of moderate size.
+  subroutine check_tiles(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(in) :: the_case
+    real(wp) :: tiles, points, length
+    integer :: i
+    tiles = 1
+    points = 1
+    do i = 1, size(the_case%axes)
+      if (the_case%tile(i) == 0) cycle
+      length = size(the_case%axes(i)%values)
+      tiles = tiles*ceiling(length/the_case%tile(i))
+      points = points*min(length, real(the_case%tile(i), wp))
+    end do
+    if (tiles > huge(1)) then
+      call report(source, 'grid.tile', 'found '//to_text(tiles)//' tiles, allowed at most '//to_text(huge(1)))
+    end if
+    if (points > most_tile_points) then
+      call report(source, 'grid.tile', 'found tiles of '//to_text(points)//' points, allowed at most '// &
+                  to_text(most_tile_points))
+    end if
+  end subroutine check_tiles
+
+  !> No start lies beyond a barrier of the case, its axes or its sweep.
   subroutine check_starts(source, the_case)
     type(case_source_t), intent(inout) :: source
     type(case_t), intent(in) :: the_case
+    character(len=:), allocatable :: problem
     integer :: i, j
     logical :: is_axis
     is_axis = .false.
@@ -193,34 +222,48 @@ contains
       if (the_case%axes(i)%name /= 'x0') cycle
       is_axis = .true.
       do j = 1, size(the_case%axes(i)%values)
-        if (len(beyond(the_case, the_case%axes(i)%values(j))) == 0) cycle
-        call report(source, 'axis['//to_text(i)//']', beyond(the_case, the_case%axes(i)%values(j)))
+        problem = beyond(the_case, the_case%axes, the_case%axes(i)%values(j))
+        if (len(problem) == 0) cycle
+        call report(source, 'axis['//to_text(i)//']', problem)
         exit
       end do
     end do
-    if (.not. is_axis .and. len(beyond(the_case, the_case%start%x0)) > 0) then
-      call report(source, 'start.x0', beyond(the_case, the_case%start%x0))
+    if (.not. is_axis) then
+      problem = beyond(the_case, the_case%axes, the_case%start%x0)
+      if (len(problem) > 0) call report(source, 'start.x0', problem)
     end if
-    if (.not. the_case%sweep%present .or. all(the_case%sweep%starts == 0)) return
-    do i = 1, 2
-      if (len(beyond(the_case, the_case%sweep%x0(i))) > 0) then
-        call report(source, 'sweep.x0', beyond(the_case, the_case%sweep%x0(i)))
-      end if
-    end do
+    if (the_case%sweep%present) call check_sweep_starts(source, the_case, is_axis .or. len(problem) > 0)
   end subroutine check_starts
 
-  !> How a position violates the tightest barriers of the case and its axes; '' if it does not.
-  pure function beyond(the_case, x) result(problem)
+  !> The same for the starts of the sweep; `skip_start`: do not look at start.x0.
+  subroutine check_sweep_starts(source, the_case, skip_start)
+    type(case_source_t), intent(inout) :: source
     type(case_t), intent(in) :: the_case
+    logical, intent(in) :: skip_start
+    character(len=:), allocatable :: problem
+    integer :: i
+    problem = beyond(the_case, [the_case%sweep%swept], the_case%start%x0)
+    if (len(problem) > 0 .and. .not. skip_start) call report(source, 'start.x0', problem)
+    if (all(the_case%sweep%starts == 0)) return
+    do i = 1, 2
+      problem = beyond(the_case, [the_case%axes, the_case%sweep%swept], the_case%sweep%x0(i))
+      if (len(problem) > 0) call report(source, 'sweep.x0', problem)
+    end do
+  end subroutine check_sweep_starts
+
+  !> How a position violates the tightest barriers of the case with these axes; '' if it does not.
+  pure function beyond(the_case, axes, x) result(problem)
+    type(case_t), intent(in) :: the_case
+    type(axis_t), intent(in) :: axes(:)
     real(wp), intent(in) :: x
     character(len=:), allocatable :: problem
     real(wp) :: upper, lower
     integer :: i
     upper = parameter_value(the_case%laws, 'contact.upper', huge(1.0_wp))
     lower = parameter_value(the_case%laws, 'contact.lower', -huge(1.0_wp))
-    do i = 1, size(the_case%axes)
-      if (the_case%axes(i)%name == 'contact.upper') upper = minval(the_case%axes(i)%values)
-      if (the_case%axes(i)%name == 'contact.lower') lower = maxval(the_case%axes(i)%values)
+    do i = 1, size(axes)
+      if (axes(i)%name == 'contact.upper') upper = minval(axes(i)%values)
+      if (axes(i)%name == 'contact.lower') lower = maxval(axes(i)%values)
     end do
     problem = ''
     if (x > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier contact.upper = '// &
@@ -239,14 +282,14 @@ contains
     end if
   end subroutine require_axes
 
-  !> A sweep needs its table and a start that the barriers allow. Code 65.
+  !> A sweep needs its table and a start that the barriers allow, swept ones too. Code 65.
   subroutine require_sweep(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
     if (.not. the_case%sweep%present) then
       call fail(error, exit_bad_case, the_case%path//': a sweep needs a table [sweep]')
     else
-      call require_start(the_case, error)
+      call allow_start(the_case, [the_case%sweep%swept], error)
     end if
   end subroutine require_sweep
 
@@ -255,9 +298,16 @@ contains
   subroutine require_start(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: problem
-    problem = beyond(the_case, the_case%start%x0)
-    if (len(problem) > 0) call fail(error, exit_bad_case, the_case%path//': key ''start.x0'': '//problem)
+    call allow_start(the_case, the_case%axes, error)
   end subroutine require_start
+
+  subroutine allow_start(the_case, axes, error)
+    type(case_t), intent(in) :: the_case
+    type(axis_t), intent(in) :: axes(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: problem
+    problem = beyond(the_case, axes, the_case%start%x0)
+    if (len(problem) > 0) call fail(error, exit_bad_case, the_case%path//': key ''start.x0'': '//problem)
+  end subroutine allow_start
 
 end module case_check

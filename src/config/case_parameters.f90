@@ -3,16 +3,15 @@
 
 !> Parameters by name: 'x0', 'v0', 'crank_angle' of the start, and 'family.parameter' of a law.
 module case_parameters
-  use case_type, only: case_t
-  use case_values, only: allowed_range, any_number, bounds_t
+  use case_values, only: allowed_range, any_number, between, bounds_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of
+  use law_table, only: change_parameter, largest_angle, law_choice_t, parameter_row_t, parameters_of
   use status, only: exit_bad_case
   implicit none
   private
 
-  public :: canonical_name, is_start, find_parameter, parameter_bounds, parameter_unit, &
+  public :: canonical_name, is_start, find_parameter, parameter_bounds, &
     parameter_names, parameter_value, set_parameter, row_bounds
 
 contains
@@ -72,7 +71,7 @@ contains
     case ('v0')
       bounds = any_number('m/s')
     case ('crank_angle')
-      bounds = any_number('rad')
+      bounds = between(-largest_angle, largest_angle, 'rad')
     case default
       call find_parameter(laws, path, law, row)
       found = law > 0
@@ -81,18 +80,6 @@ contains
       bounds = row_bounds(rows(row))
     end select
   end subroutine parameter_bounds
-
-  !> SI unit of the parameter `path`, '1' for none; '' if the case has no such parameter.
-  pure function parameter_unit(the_case, path) result(unit)
-    type(case_t), intent(in) :: the_case
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: unit
-    type(bounds_t) :: bounds
-    logical :: found
-    call parameter_bounds(the_case%laws, path, bounds, found)
-    unit = ''
-    if (found) unit = trim(bounds%unit)
-  end function parameter_unit
 
   !> Names of the scalar parameters of the chosen laws, for messages.
   pure function parameter_names(laws) result(names)

@@ -4,6 +4,7 @@
 !> From a case file (docs/case-file.md) to a case. Every problem of a file is reported at once, a
 !> line each: `FILE:LINE: key 'friction.damping': found ..., allowed ...`.
 module case_reader
+  use attractors, only: longest_period
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
   use case_echo, only: echo_case
@@ -13,6 +14,7 @@ module case_reader
   use errors, only: error_t
   use kinds, only: wp
   use law_reader, only: read_laws
+  use law_table, only: largest_angle
   use toml_bindings, only: read_text_file
   implicit none
   private
@@ -68,7 +70,7 @@ contains
     associate (start => the_case%start)
       call take_real(source, 'start.x0', any_number('m'), start%x0)
       call take_real(source, 'start.v0', any_number('m/s'), start%v0)
-      call take_real(source, 'start.crank_angle', any_number('rad'), start%crank_angle)
+      call take_real(source, 'start.crank_angle', between(-largest_angle, largest_angle, 'rad'), start%crank_angle)
     end associate
   end subroutine read_start
 
@@ -107,7 +109,7 @@ contains
     associate (attractors => the_case%attractors)
       call take_integer(source, 'attractors.sample', 1, attractors%sample)
       call take_integer(source, 'attractors.seed', 0, attractors%seed)
-      call take_integer(source, 'attractors.max_period', 1, attractors%max_period)
+      call take_integer(source, 'attractors.max_period', 1, attractors%max_period, highest=longest_period)
     end associate
   end subroutine read_attractors
 

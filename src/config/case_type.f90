@@ -9,8 +9,8 @@ module case_type
   implicit none
   private
 
-  !> Positions in `case_t%laws`, the order of `families`.
-  integer, parameter, public :: body_law = 1, restoring_law = 2, friction_law = 3, &
+  !> Positions in `case_t%laws`, the order of `families`; the body is the first.
+  integer, parameter, public :: restoring_law = 2, friction_law = 3, &
     contact_law = 4, drive_law = 5
 
   !> State and crank angle at the beginning.

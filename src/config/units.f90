@@ -5,7 +5,7 @@
 module units
   use constants, only: pi
   use kinds, only: wp
-  use text, only: join, replace_all
+  use text, only: join, number_length, replace_all
   implicit none
   private
 
@@ -101,36 +101,6 @@ contains
       text = 'a number in '//trim(unit)
     end if
   end function allowed_units
-
-  !> Length of the decimal number at the beginning of a text, 0 if there is none.
-  pure integer function number_length(string)
-    character(len=*), intent(in) :: string
-    character(len=:), allocatable :: padded
-    integer :: at, whole, fraction, mark
-    padded = string//'   '
-    at = 1
-    if (scan(padded(1:1), '+-') == 1) at = 2
-    whole = digits_in(padded(at:))
-    at = at + whole
-    fraction = 0
-    if (padded(at:at) == '.') then
-      fraction = digits_in(padded(at + 1:))
-      at = at + 1 + fraction
-    end if
-    number_length = 0
-    if (whole + fraction == 0) return
-    number_length = at - 1
-    if (scan(padded(at:at), 'eE') == 0) return
-    mark = at + 1
-    if (scan(padded(mark:mark), '+-') == 1) mark = mark + 1
-    if (digits_in(padded(mark:)) > 0) number_length = mark - 1 + digits_in(padded(mark:))
-  end function number_length
-
-  !> Number of digits at the beginning of a text that ends with a blank.
-  pure integer function digits_in(string)
-    character(len=*), intent(in) :: string
-    digits_in = verify(string, '0123456789') - 1
-  end function digits_in
 
   !> One blank between the factors of a unit: 'N*s/m' and 'N  s/m' become 'N s/m'.
   pure function normal_form(string) result(spelling)

@@ -7,7 +7,7 @@ module text
   implicit none
   private
 
-  public :: to_text, join, lower_case, replace_all, starts_with
+  public :: to_text, join, number_length, replace_all, starts_with
 
   !> Shortest common form of a number: integers plain, reals with up to 17 significant digits so
   !> that reading them back gives the same bits.
@@ -105,18 +105,6 @@ contains
     end do
   end function join
 
-  !> ASCII letters in lower case.
-  pure function lower_case(string) result(text)
-    character(len=*), intent(in) :: string
-    character(len=len(string)) :: text
-    integer :: i, code
-    do i = 1, len(string)
-      code = iachar(string(i:i))
-      if (code >= iachar('A') .and. code <= iachar('Z')) code = code + 32
-      text(i:i) = achar(code)
-    end do
-  end function lower_case
-
   !> Every `old` in `string` replaced by `new`.
   pure function replace_all(string, old, new) result(text)
     character(len=*), intent(in) :: string, old, new
@@ -139,5 +127,36 @@ contains
     starts_with = len(string) >= len(prefix)
     if (starts_with) starts_with = string(1:len(prefix)) == prefix
   end function starts_with
+
+  !> Length of the decimal number at the beginning of a text ('-1.5e3', '.5', '2.'), 0 if there is none. What is no
+  !> number to the eye is none here, although a list-directed read takes it: '1-5', '1d5', '2*3', 'inf'.
+  pure integer function number_length(string)
+    character(len=*), intent(in) :: string
+    character(len=:), allocatable :: padded
+    integer :: at, whole, fraction, mark
+    padded = string//'   '
+    at = 1
+    if (scan(padded(1:1), '+-') == 1) at = 2
+    whole = digits_in(padded(at:))
+    at = at + whole
+    fraction = 0
+    if (padded(at:at) == '.') then
+      fraction = digits_in(padded(at + 1:))
+      at = at + 1 + fraction
+    end if
+    number_length = 0
+    if (whole + fraction == 0) return
+    number_length = at - 1
+    if (scan(padded(at:at), 'eE') == 0) return
+    mark = at + 1
+    if (scan(padded(mark:mark), '+-') == 1) mark = mark + 1
+    if (digits_in(padded(mark:)) > 0) number_length = mark - 1 + digits_in(padded(mark:))
+  end function number_length
+
+  !> Number of digits at the beginning of a text that ends with a blank.
+  pure integer function digits_in(string)
+    character(len=*), intent(in) :: string
+    digits_in = verify(string, '0123456789') - 1
+  end function digits_in
 
 end module text

@@ -11,11 +11,16 @@ module bindings
   public :: c_signals_install, c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
     c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_file_exists, &
-    c_folder_status, c_free_bytes, c_file_bytes, c_reserve_file, c_publish_file, c_remove_file, &
+    c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, &
     c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
-    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit
+    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special
 
   interface
+    integer(c_int) function c_is_special(path) bind(c, name='separatrix_is_special')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_is_special
+
     real(c_double) function c_share_upper_limit(found, sample, confidence) &
         bind(c, name='separatrix_share_upper_limit')
       import :: c_double, c_int64_t
@@ -111,11 +116,6 @@ module bindings
       import :: c_char, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
     end function c_free_bytes
-
-    integer(c_int64_t) function c_file_bytes(path) bind(c, name='separatrix_file_bytes')
-      import :: c_char, c_int64_t
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_file_bytes
 
     integer(c_int) function c_reserve_file(path) bind(c, name='separatrix_reserve_file')
       import :: c_char, c_int

@@ -36,6 +36,12 @@ static int sync_path(const char *path, int flags) {
 
 int separatrix_file_exists(const char *path) { return access(path, F_OK) == 0; }
 
+/* Whether `path` is something other than a regular file: a folder, a device, a pipe. */
+int separatrix_is_special(const char *path) {
+  struct stat facts;
+  return stat(path, &facts) == 0 && !S_ISREG(facts.st_mode);
+}
+
 /* Whether a file can be created in the folder of `path`. */
 int separatrix_folder_status(const char *path) {
   char *folder = folder_of(path);
@@ -63,11 +69,6 @@ int64_t separatrix_free_bytes(const char *path) {
   }
   free(folder);
   return result;
-}
-
-int64_t separatrix_file_bytes(const char *path) {
-  struct stat facts;
-  return stat(path, &facts) == 0 ? (int64_t)facts.st_size : -1;
 }
 
 /* Reserves the blocks of a file so that a full disk or a quota shows before the work starts. File

@@ -4,7 +4,7 @@
 !> File operations that Fortran lacks. Errors name the file and the system's reason.
 module files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_error_text, c_file_bytes, c_file_exists, c_folder_status, c_free_bytes, &
+  use bindings, only: c_error_text, c_file_exists, c_is_special, c_folder_status, c_free_bytes, &
     c_publish_file, c_remove_file, c_reserve_file
   use errors, only: error_t, fail
   use kinds, only: int64
@@ -13,7 +13,7 @@ module files
   implicit none
   private
 
-  public :: file_exists, check_folder, free_bytes, file_bytes, reserve_file, publish_file, remove_file
+  public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file
 
 contains
 
@@ -22,6 +22,12 @@ contains
     character(len=*), intent(in) :: path
     file_exists = c_file_exists(path//c_null_char) == 1
   end function file_exists
+
+  !> Whether it exists and is no regular file: a folder, a device, a pipe.
+  logical function is_special(path)
+    character(len=*), intent(in) :: path
+    is_special = c_is_special(path//c_null_char) == 1
+  end function is_special
 
   !> Code 73 unless a file can be created in the folder of `path`.
   subroutine check_folder(path, error)
@@ -35,12 +41,6 @@ contains
     character(len=*), intent(in) :: path
     free_bytes = c_free_bytes(path//c_null_char)
   end function free_bytes
-
-  !> The size of a file in bytes; -1 if it cannot be read.
-  integer(int64) function file_bytes(path)
-    character(len=*), intent(in) :: path
-    file_bytes = c_file_bytes(path//c_null_char)
-  end function file_bytes
 
   !> Reserves the disk blocks of a file; code 73 on a full disk or quota.
   subroutine reserve_file(path, error)

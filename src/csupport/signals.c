@@ -13,8 +13,14 @@ static void count_signal(int number) {
     received++;
 }
 
-/* SIGUSR1, SIGUSR2 and SIGTERM are counted. SIGXFSZ is ignored so that a write beyond the file size
-   limit comes back as an error. Returns 0, or -1 if a handler cannot be set. */
+/* The first Ctrl-C stops cleanly, the second at once. */
+static void count_interrupt(int number) {
+  signal(number, SIG_DFL);
+  count_signal(number);
+}
+
+/* SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted. SIGXFSZ is ignored so that a write beyond the
+   file size limit comes back as an error. Returns 0, or -1 if a handler cannot be set. */
 int separatrix_signals_install(void) {
   static const int counted[] = {SIGUSR1, SIGUSR2, SIGTERM};
   struct sigaction action = {0};
@@ -25,6 +31,9 @@ int separatrix_signals_install(void) {
     if (sigaction(counted[i], &action, NULL) != 0)
       return -1;
   }
+  action.sa_handler = count_interrupt;
+  if (sigaction(SIGINT, &action, NULL) != 0)
+    return -1;
   action.sa_handler = SIG_IGN;
   return sigaction(SIGXFSZ, &action, NULL);
 }

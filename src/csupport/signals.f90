@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Stop signals: SIGUSR1, SIGUSR2 and SIGTERM are counted, SIGXFSZ is ignored.
+!> Stop signals: SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted, SIGXFSZ is ignored.
 module signals
   use bindings, only: c_signals_clear, c_signals_install, c_signals_raise, c_signals_received
   use errors, only: error_t, fail

@@ -82,7 +82,8 @@ contains
       call prepare_counts(work)
       call report_plan(session, work, tile)
     end if
-    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
+    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
+                           command%time_limit, work%catalogues, error)
     call session%stop_if(error)
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)

@@ -5,14 +5,15 @@
 !> are known to all. The result does not depend on the number of ranks.
 module catalogue_search
   use attractors, only: attractor_t, pack_attractor, packed_size, unpack_attractor
-  use basin, only: catalogue_t, discover_slice, label_slices
+  use basin, only: catalogue_t, label_slices, open_slice, search_starts
   use case_type, only: attractors_t
-  use errors, only: error_t, fail
-  use grid, only: grid_t
+  use discover, only: discover_attractors, sort_attractors
+  use errors, only: error_t
+  use grid, only: grid_t, slice_neighbours
   use journal, only: journal_t
   use kinds, only: int64, wp
-  use signals, only: signal_count
-  use status, only: exit_resumable
+  use motion, only: motion_t
+  use stop_check, only: check_stop
   use team, only: team_t
   use trajectory, only: span_t
   implicit none
@@ -20,83 +21,116 @@ module catalogue_search
 
   public :: search_catalogues
 
-  character(len=*), parameter :: stopped = 'stopped while searching for attractors; nothing was written yet, start again'
 
 contains
 
   !> Catalogues of every slice, labelled along the slices; none if no start is an axis (then every point is its own
   !> slice). A second round offers each slice the attractors of its neighbours, so that none is missed
-  !> because the sample happened to miss its basin.
-  subroutine search_catalogues(team, journal, grid, span, settings, catalogues, error)
+  !> because the sample happened to miss its basin. Code 75 on a stop signal or after `time_limit` [s].
+  subroutine search_catalogues(team, journal, grid, span, settings, time_limit, catalogues, error)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     type(attractors_t), intent(in) :: settings
+    real(wp), intent(in) :: time_limit
     type(catalogue_t), allocatable, intent(out) :: catalogues(:)
     type(error_t), allocatable, intent(out) :: error
-    type(attractor_t), allocatable :: neighbours(:)
     type(catalogue_t), allocatable :: first_round(:)
+    real(wp), allocatable :: starts(:, :)
     integer(int64) :: slice
+    integer :: round, rounds
     allocate (catalogues(merge(grid%slices, 0_int64, any(grid%start_axis > 0))))
     if (size(catalogues) == 0) return
-    allocate (neighbours(0))
-    call journal%begin('slices', 2*grid%slices, 0_int64)
-    do slice = team%rank(), grid%slices - 1, team%size()
-      call discover_slice(grid, span, slice, settings%sample, settings%seed, settings%max_period, neighbours, &
-                          catalogues(slice + 1), error)
-      if (allocated(error)) exit
-      if (signal_count() > 0) then
-        call fail(error, exit_resumable, stopped)
-        exit
-      end if
-      call journal%progress(slice + 1)
-    end do
-    call team%agree(error)
-    if (allocated(error)) return
-    call exchange(team, catalogues)
-    if (grid%slices > 1) then
-      first_round = catalogues
+    rounds = merge(2, 1, grid%slices > 1)
+    call journal%begin('slices', rounds*grid%slices, 0_int64)
+    do round = 1, rounds
+      if (round == 2) first_round = catalogues
       do slice = team%rank(), grid%slices - 1, team%size()
-        neighbours = first_round(max(slice, 1_int64))%attractors
-        neighbours = [neighbours, first_round(min(slice + 2, grid%slices))%attractors]
-        call discover_slice(grid, span, slice, settings%sample, settings%seed, settings%max_period, neighbours, &
-                            catalogues(slice + 1), error)
-        if (allocated(error)) exit
-        if (signal_count() > 0) then
-          call fail(error, exit_resumable, stopped)
-          exit
+        if (round == 1) then
+          starts = search_starts(grid, settings%sample, settings%seed)
+        else
+          starts = search_starts(grid, settings%sample, settings%seed, &
+                                 attractors_of(first_round, slice_neighbours(grid, slice, .true.)))
         end if
-        call journal%progress(grid%slices + slice + 1)
+        call search_slice(journal, grid, span, slice, starts, settings%max_period, time_limit, &
+                          catalogues(slice + 1), error)
+        if (allocated(error)) exit
+        call journal%progress((round - 1)*grid%slices + slice + 1)
       end do
       call team%agree(error)
       if (allocated(error)) return
       call exchange(team, catalogues)
-    end if
-    call label_slices(catalogues)
+    end do
+    call label_slices(grid, catalogues)
   end subroutine search_catalogues
 
-  !> Every rank gets the catalogues of the slices that the others searched.
+  !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is heard between them.
+  subroutine search_slice(journal, grid, span, slice, starts, max_period, time_limit, catalogue, error)
+    type(journal_t), intent(in) :: journal
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    integer(int64), intent(in) :: slice
+    real(wp), intent(in) :: starts(:, :), time_limit
+    integer, intent(in) :: max_period
+    type(catalogue_t), intent(inout) :: catalogue
+    type(error_t), allocatable, intent(out) :: error
+    type(motion_t) :: moving
+    integer :: i
+    call open_slice(grid, span, slice, moving, error)
+    if (allocated(error)) return
+    do i = 1, size(starts, 2)
+      call discover_attractors(moving, span, starts(:, i:i), max_period, catalogue%attractors)
+      call check_stop(journal, time_limit, 'searching for attractors', error)
+      if (allocated(error)) return
+    end do
+    call sort_attractors(catalogue%attractors)
+  end subroutine search_slice
+
+  !> The attractors of several slices.
+  pure function attractors_of(catalogues, slices) result(attractors)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer(int64), intent(in) :: slices(:)
+    type(attractor_t), allocatable :: attractors(:)
+    integer :: i
+    allocate (attractors(0))
+    do i = 1, size(slices)
+      attractors = [attractors, catalogues(slices(i) + 1)%attractors]
+    end do
+  end function attractors_of
+
+  !> Every rank gets the catalogues of the slices that the others searched: slice, number of attractors, and these.
   subroutine exchange(team, catalogues)
     class(team_t), intent(in) :: team
     type(catalogue_t), intent(inout) :: catalogues(:)
     real(wp), allocatable :: mine(:), all_values(:)
-    integer :: slice, i, position
-    allocate (mine(0))
+    integer :: slice, i, position, count
+    count = 0
     do slice = team%rank() + 1, size(catalogues), team%size()
+      count = count + 2 + packed_size*size(catalogues(slice)%attractors)
+    end do
+    allocate (mine(count))
+    position = 0
+    do slice = team%rank() + 1, size(catalogues), team%size()
+      mine(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
+      position = position + 2
       do i = 1, size(catalogues(slice)%attractors)
-        mine = [mine, real(slice, wp), pack_attractor(catalogues(slice)%attractors(i))]
+        mine(position + 1:position + packed_size) = pack_attractor(catalogues(slice)%attractors(i))
+        position = position + packed_size
       end do
     end do
     call team%allgather(mine, all_values)
-    do slice = 1, size(catalogues)
+    position = 0
+    do while (position < size(all_values))
+      slice = nint(all_values(position + 1))
+      count = nint(all_values(position + 2))
+      position = position + 2
       if (allocated(catalogues(slice)%attractors)) deallocate (catalogues(slice)%attractors)
-      allocate (catalogues(slice)%attractors(0))
-    end do
-    do position = 1, size(all_values), packed_size + 1
-      slice = nint(all_values(position))
-      catalogues(slice)%attractors = [catalogues(slice)%attractors, &
-                                      unpack_attractor(all_values(position + 1:position + packed_size))]
+      allocate (catalogues(slice)%attractors(count))
+      do i = 1, count
+        catalogues(slice)%attractors(i) = unpack_attractor(all_values(position + 1:position + packed_size))
+        position = position + packed_size
+      end do
     end do
   end subroutine exchange
 

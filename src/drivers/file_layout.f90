@@ -17,7 +17,12 @@ module file_layout
 
   public :: axis_dimension, add_axes, add_map_variables, add_catalogue, add_regime, add_reason, add_events
 
-  character(len=*), parameter, public :: coded_unit = '1'
+  character(len=*), parameter :: coded_unit = '1'
+
+  !> The variables of a map's points, in the order of `outcome_values`.
+  character(len=*), parameter, public :: map_variables(13) = [character(len=18) :: 'regime', 'attractor', 'reason', &
+    'period', 'event_word', 'impacts_per_period', 'mean_impact_speed', 'amplitude', 'x_max', 'x_min', 'v_max', &
+    'settle_time', 'grazing_margin']
 
 contains
 
@@ -87,26 +92,26 @@ contains
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: prefix, dimensions(:)
     call add_regime(schema, prefix//'regime', dimensions, .true.)
-    call add('attractor', type_int16, '1', 'label of the attractor in the catalogue, 0 = none')
+    call add(2, type_int32, '1', 'label of the attractor in the catalogue, 0 = none')
     call add_reason(schema, prefix//'reason', dimensions, .true.)
-    call add('period', type_int16, '1', 'period in drive periods, 0 = not periodic')
-    call add('event_word', type_int64, '1', 'events of one period of the motion, three bits each')
-    call add('impacts_per_period', type_float32, '1', 'impacts per drive period')
-    call add('mean_impact_speed', type_float32, 'm/s', 'mean speed just before impact')
-    call add('amplitude', type_float32, 'm', 'half the range of the position')
-    call add('x_max', type_float32, 'm', 'largest position')
-    call add('x_min', type_float32, 'm', 'smallest position')
-    call add('v_max', type_float32, 'm/s', 'largest velocity towards the upper barrier')
-    call add('settle_time', type_float32, 's', 'time from the start to capture by the attractor')
-    call add('grazing_margin', type_float32, 'm', &
-             'smallest distance to a barrier at a turning point that missed it')
+    call add(4, type_int16, '1', 'period in drive periods, 0 = not periodic')
+    call add(5, type_int64, '1', 'events of one period of the motion, three bits each')
+    call add(6, type_float32, '1', 'impacts per drive period')
+    call add(7, type_float32, 'm/s', 'mean speed just before impact')
+    call add(8, type_float32, 'm', 'half the range of the position')
+    call add(9, type_float32, 'm', 'largest position')
+    call add(10, type_float32, 'm', 'smallest position')
+    call add(11, type_float32, 'm/s', 'largest velocity towards the upper barrier')
+    call add(12, type_float32, 's', 'time from the start to capture by the attractor')
+    call add(13, type_float32, 'm', 'smallest distance to a barrier at a turning point that missed it')
 
   contains
 
-    subroutine add(name, type, units, long_name)
-      character(len=*), intent(in) :: name, units, long_name
-      integer, intent(in) :: type
-      call schema%add_variable(prefix//name, type, dimensions, units=units, long_name=long_name, tiled=.true.)
+    subroutine add(number, type, units, long_name)
+      integer, intent(in) :: number, type
+      character(len=*), intent(in) :: units, long_name
+      call schema%add_variable(prefix//trim(map_variables(number)), type, dimensions, units=units, &
+                               long_name=long_name, tiled=.true.)
     end subroutine add
 
   end subroutine add_map_variables
@@ -118,16 +123,21 @@ contains
     integer(int64), intent(in) :: counts(:)
     type(attractor_t), allocatable :: all_of_them(:)
     integer, allocatable :: slice(:)
-    integer :: i
-    allocate (all_of_them(0), slice(0))
+    integer :: i, k, position
+    position = sum([(size(catalogues(i)%attractors), i=1, size(catalogues))])
+    allocate (all_of_them(position), slice(position))
+    position = 0
     do i = 1, size(catalogues)
-      all_of_them = [all_of_them, catalogues(i)%attractors]
-      slice = [slice, spread(i - 1, 1, size(catalogues(i)%attractors))]
+      do k = 1, size(catalogues(i)%attractors)
+        position = position + 1
+        all_of_them(position) = catalogues(i)%attractors(k)
+        slice(position) = i - 1
+      end do
     end do
     if (size(all_of_them) == 0) return
     call schema%add_dimension('entry', size(all_of_them, kind=int64))
     call add('slice', type_int32, '1', 'slice of the parameter axes, C order from 0', real(slice, wp))
-    call add('attractor', type_int16, '1', 'label', real(all_of_them%id, wp))
+    call add('attractor', type_int32, '1', 'label', real(all_of_them%id, wp))
     call add('regime', type_int8, '1', 'regime, coded as in the map', real(all_of_them%features%regime, wp))
     call add('period', type_int16, '1', 'period in drive periods', real(all_of_them%period, wp))
     call add('event_word', type_int64, '1', 'events of one period', real(all_of_them%features%word, wp))

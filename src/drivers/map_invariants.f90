@@ -48,9 +48,16 @@ contains
       'impacts_per_period', 'amplitude', 'x_max', 'x_min']
     integer(int64), allocatable :: lengths(:), lower(:), extent(:)
     real(wp), allocatable :: column(:), block(:, :)
+    real(wp), allocatable :: labels(:), regimes(:)
     integer(int64) :: k
     integer :: i
     call reader%lengths('/'//prefix//'regime', lengths, error)
+    if (reader%has('/catalogue/attractor')) then
+      if (.not. allocated(error)) call reader%read_values('/catalogue/attractor', labels, error)
+      if (.not. allocated(error)) call reader%read_values('/catalogue/regime', regimes, error)
+    else
+      allocate (labels(0), regimes(0))
+    end if
     if (allocated(error)) return
     allocate (lower(size(lengths)), extent(size(lengths)))
     do k = 1, slab_count(lengths)
@@ -64,11 +71,26 @@ contains
       end do
       do i = 1, size(block, 1)
         call check_point(reader%path, points + i - 1, block(i, :), error)
+        if (.not. allocated(error)) call check_label(reader%path, points + i - 1, nint(block(i, 1)), nint(block(i, 3)), &
+                                                     labels, regimes, error)
         if (allocated(error)) return
       end do
       points = points + size(block, 1)
     end do
   end subroutine check_map
+
+  !> A labelled point has the regime of its branch in the catalogue.
+  subroutine check_label(path, number, regime, label, labels, regimes, error)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: number
+    integer, intent(in) :: regime, label
+    real(wp), intent(in) :: labels(:), regimes(:)
+    type(error_t), allocatable, intent(out) :: error
+    if (label == 0 .or. size(labels) == 0) return
+    if (any(nint(labels) == label .and. nint(regimes) == regime)) return
+    call fail(error, exit_io, "'"//path//"', point "//to_text(number)//': regime '//trim(regime_names(regime))// &
+              ' with the label of attractor '//to_text(label)//', which has no such regime in the catalogue')
+  end subroutine check_label
 
   !> One point: regime, reason, attractor, impacts per period, amplitude, x_max, x_min.
   subroutine check_point(path, number, values, error)
@@ -165,7 +187,7 @@ contains
       if (nint(reason(i)) <= reason_not_run .or. nint(reason(i)) > last_reason) then
         call fail(error, exit_io, "'"//reader%path//"', point "//to_text(i - 1)//': reason code '//to_text(nint(reason(i))))
       end if
-      if (.not. allocated(error) .and. ((impacts(i) > 0) .neqv. (speed(i) > 0))) call fail(error, exit_io, &
+      if (.not. allocated(error) .and. (speed(i) < 0 .or. (speed(i) > 0 .and. impacts(i) < 1))) call fail(error, exit_io, &
         "'"//reader%path//"', point "//to_text(i - 1)//': '//to_text(nint(impacts(i)))//' impacts, last at '// &
         to_text(speed(i))//' m/s')
       if (allocated(error)) return

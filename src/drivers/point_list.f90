@@ -5,16 +5,18 @@
 module point_list
   use contact_law, only: contact_t
   use errors, only: error_t, fail
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use output_check, only: is_folder
   use status, only: exit_bad_case, exit_no_input
-  use text, only: replace_all, to_text
+  use text, only: number_length, replace_all, starts_with, to_text
+  use toml_bindings, only: read_text_file
   implicit none
   private
 
   public :: read_point_list
 
-  integer, parameter :: longest_line = 1024
+  !> Some programs begin UTF-8 text with it.
+  character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
   type, public :: point_list_t
     !> Starts [m, m/s] and drive ratio of each.
@@ -25,44 +27,46 @@ module point_list
 contains
 
   !> Reads `path`; without a column `ratio` every point has `default_ratio`. Errors name the line, what was found
-  !> and what is allowed: code 66 for a missing file, 65 for its content.
+  !> and what is allowed: code 66 for a file that cannot be read, 65 for its content.
   subroutine read_point_list(path, default_ratio, contact, list, error)
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: default_ratio
     type(contact_t), intent(in) :: contact
     type(point_list_t), intent(out) :: list
     type(error_t), allocatable, intent(out) :: error
-    character(len=longest_line) :: line
-    character(len=256) :: message
+    character(len=:), allocatable :: text, line
     real(wp) :: row(3)
-    integer :: unit, status, number, columns(3), width
+    integer :: number, columns(3), width
+    integer(int64) :: from, length
     allocate (list%x0(0), list%v0(0), list%ratio(0))
     if (is_folder(path)) then
       call fail(error, exit_no_input, "list of points '"//path//"': it is a folder")
       return
     end if
-    open (newunit=unit, file=path, status='old', action='read', iostat=status, iomsg=message)
-    if (status /= 0) then
-      call fail(error, exit_no_input, "list of points '"//path//"': "//trim(message))
+    call read_text_file(path, text, error)
+    if (allocated(error)) then
+      error%message = 'list of points '//error%message
       return
     end if
     number = 0
     columns = -1
-    do
-      read (unit, '(a)', iostat=status) line
-      if (status /= 0) exit
+    from = 1
+    if (starts_with(text, byte_order_mark)) from = 1 + len(byte_order_mark)
+    do while (from <= len(text, int64))
+      length = index(text(from:), new_line('a'), kind=int64) - 1
+      if (length < 0) length = len(text, int64) - from + 1
+      line = trim(replace_all(text(from:from + length - 1), achar(13), ''))
+      from = from + length + 1
       number = number + 1
-      line = replace_all(trim(line), achar(13), '')
-      if (len_trim(line) == 0 .or. line(1:1) == '#') cycle
+      if (len(line) == 0 .or. starts_with(line, '#')) cycle
       if (columns(1) < 0) then
-        call read_header(path, number, trim(line), columns, width, error)
+        call read_header(path, number, line, columns, width, error)
       else
-        call read_row(path, number, trim(line), columns, width, default_ratio, contact, row, error)
+        call read_row(path, number, line, columns, width, default_ratio, contact, row, error)
         if (.not. allocated(error)) call append(list, row)
       end if
       if (allocated(error)) exit
     end do
-    close (unit)
     if (allocated(error)) return
     if (columns(1) < 0 .or. list%points == 0) call fail(error, exit_bad_case, path// &
       ': found no points, needed is a header x0,v0 (optionally ratio) and a line per point')
@@ -130,9 +134,8 @@ contains
     do k = 1, 3
       if (columns(k) == 0) cycle
       word = field(line, columns(k))
-      status = verify(word, '0123456789.eEdD+-')
-      if (len(word) == 0) status = 1
-      if (status == 0) read (word, *, iostat=status) row(k)
+      status = 1
+      if (len(word) > 0 .and. number_length(word) == len(word)) read (word, *, iostat=status) row(k)
       if (status /= 0 .or. .not. abs(row(k)) <= huge(1.0_wp)) then
         call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed is a finite number")
         return

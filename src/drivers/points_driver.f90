@@ -4,12 +4,13 @@
 !> `separatrix points`: a list of starts, each run for the whole duration.
 module points_driver
   use attractors, only: attractor_t
+  use checksum, only: crc32
   use case_setup, only: grid_of, output_path, span_of
   use command_line, only: command_t
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
-  use kinds, only: int64, wp
+  use kinds, only: int64, int8, wp
   use map_file, only: map_file_t
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t, type_float64, type_int32
@@ -80,7 +81,7 @@ contains
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.true.)
-    call describe_file(session, 'points', schema)
+    call describe_file(session, 'points', schema, list_identity(work%list))
     call describe_points(work%list, schema)
     call open_tiles(session, path, schema, ['point'], [points_per_tile], file)
     call run_tiles(session, file, work, complete)
@@ -95,6 +96,18 @@ contains
     if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     call session%end_with(exit_done)
   end subroutine run_points
+
+  !> Checksum of the starts.
+  function list_identity(list) result(identity)
+    type(point_list_t), intent(in) :: list
+    character(len=:), allocatable :: identity
+    integer(int8) :: one(1)
+    integer(int64) :: sum_so_far
+    sum_so_far = crc32(transfer(list%x0, one), 0_int64)
+    sum_so_far = crc32(transfer(list%v0, one), sum_so_far)
+    sum_so_far = crc32(transfer(list%ratio, one), sum_so_far)
+    identity = to_text(sum_so_far)
+  end function list_identity
 
   subroutine describe_points(list, schema)
     type(point_list_t), intent(in) :: list

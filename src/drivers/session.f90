@@ -13,7 +13,7 @@ module session
   use journal, only: journal_t
   use launcher, only: launched_ranks
   use map_schema, only: schema_t
-  use output_check, only: check_create, check_output, check_resume, check_table
+  use output_check, only: check_create, check_result, check_resume, check_table
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
   use serial_team, only: serial_team_t
@@ -55,7 +55,8 @@ contains
       call start_team(session%team)
     end if
     call session%journal%open(session%team%is_root(), command%json, command%quiet)
-    call install_signals(error)
+    ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
+    if (command%name /= 'trajectory') call install_signals(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error)
     call session%stop_if(error)
   end subroutine open_session
@@ -90,22 +91,26 @@ contains
     else if (tiled) then
       call check_create(path, command%force, error)
     else
-      call check_output(path, command%force, error)
+      call check_result(path, command%force, error)
     end if
     if (allocated(error) .or. len(command%csv) == 0) return
-    call check_table(command%csv, command%force .or. command%resume, error)
+    call check_table(command%csv, command%force, error)
   end subroutine check_outputs
 
-  !> Attributes and texts that every file carries.
-  subroutine describe_file(session, kind, schema)
+  !> Attributes and texts that every file carries. `inputs` stands for what besides the case decides the results.
+  subroutine describe_file(session, kind, schema, inputs)
     type(session_t), intent(in) :: session
     character(len=*), intent(in) :: kind
+    character(len=*), intent(in), optional :: inputs
     type(schema_t), intent(inout) :: schema
+    character(len=:), allocatable :: identity
     call session%provenance%describe(schema)
     call schema%add_attribute('', 'kind', kind)
     call schema%add_attribute('', 'title', session%the_case%title)
     call schema%add_attribute('', 'references', 'docs/theory.md of Separatrix lists equations and sources')
-    call schema%add_attribute('provenance', 'case_identity', kind//' '//case_identity(session%the_case))
+    identity = kind//' '//case_identity(session%the_case)
+    if (present(inputs)) identity = identity//' '//inputs
+    call schema%add_attribute('provenance', 'case_identity', identity)
     call schema%add_text('provenance', 'case_text', session%the_case%raw_text)
     call schema%add_text('provenance', 'resolved_case', session%the_case%resolved_text)
   end subroutine describe_file

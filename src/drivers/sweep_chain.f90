@@ -4,24 +4,26 @@
 !> The two chains of a sweep, run up and run down, each by one rank, and the limits between which impacts occur.
 module sweep_chain
   use attractors, only: features_t
-  use errors, only: error_t, fail
+  use errors, only: error_t
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
   use motion_state, only: state_t
-  use signals, only: signal_count
-  use status, only: exit_resumable
+  use status, only: reason_time_over
+  use stop_check, only: check_stop
   use sweep, only: bracket_limit, hold_parameter, hold_t
   use team, only: team_t
   use trajectory, only: span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
   public :: run_chains
 
   !> Numbers kept of a hold before its samples: regime, reason, period, word, impacts per period, mean
-  !> impact speed, amplitude, x_max, x_min, v_max.
-  integer, parameter, public :: hold_numbers = 10
+  !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
+  !> not a number there.
+  integer, parameter :: hold_numbers = 10, hold_codes = 4
   !> Most changes between impacting and not impacting that are kept of one chain.
   integer, parameter :: most_limits = 64
 
@@ -44,9 +46,10 @@ contains
 
   !> Runs the chains that `ran` asks for over `values` of the parameter `path`, from the grid's own start, and tells
   !> every rank.
-  subroutine run_chains(team, journal, grid, span, path, values, ran, samples, tolerance, chains, error)
+  subroutine run_chains(team, journal, time_limit, grid, span, path, values, ran, samples, tolerance, chains, error)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
+    real(wp), intent(in) :: time_limit
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
@@ -58,12 +61,14 @@ contains
     real(wp), allocatable :: mine(:), all_values(:), packed(:)
     integer :: direction
     chains%ran = ran
-    allocate (chains%holds(hold_numbers, size(values), 2), chains%samples(2, samples, size(values), 2), source=0.0_wp)
+    allocate (chains%holds(hold_numbers, size(values), 2), chains%samples(2, samples, size(values), 2), &
+              source=ieee_value(1.0_wp, ieee_quiet_nan))
+    chains%holds(:hold_codes, :, :) = 0
     allocate (chains%limits(0), mine(0))
     do direction = 1, 2
       if (.not. ran(direction) .or. modulo(direction - 1, team%size()) /= team%rank()) cycle
       call journal%begin('values', size(values, kind=int64), 0_int64)
-      call run_chain(journal, grid, span, path, values, direction == 1, samples, tolerance, packed, error)
+      call run_chain(journal, time_limit, grid, span, path, values, direction == 1, samples, tolerance, packed, error)
       if (allocated(error)) exit
       mine = [mine, real(direction, wp), packed]
     end do
@@ -74,8 +79,9 @@ contains
   end subroutine run_chains
 
   !> One chain as plain numbers: holds, samples, number of limits, and start, lower, upper of each.
-  subroutine run_chain(journal, grid, span, path, values, up, samples, tolerance, packed, error)
+  subroutine run_chain(journal, time_limit, grid, span, path, values, up, samples, tolerance, packed, error)
     type(journal_t), intent(inout) :: journal
+    real(wp), intent(in) :: time_limit
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
@@ -97,24 +103,26 @@ contains
     impacted = .false.
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
-      call hold_parameter(grid, span, path, values(k), state, samples, held, error)
+      call hold_parameter(grid, span, path, values(k), state, merge(grid%start(3), 0.0_wp, i == 1), samples, held, error)
       if (allocated(error)) return
       holds(:, k) = numbers_of(held)
       points(:, :, k) = held%samples
-      impacting = held%features%impacts_per_period > 0
-      if (before > 0 .and. (impacting .neqv. impacted) .and. held%reason == 0 .and. found < most_limits) then
-        call bracket_limit(grid, span, path, values(before), values(k), state, impacted, tolerance, bracket, error)
-        if (allocated(error)) return
-        found = found + 1
-        limits(:, found) = [merge(1.0_wp, 0.0_wp, impacting), bracket]
+      ! A hold that had to be given up leaves the body where the last good one ended.
+      if (held%reason == reason_time_over) then
+        impacting = held%features%impacts_per_period > 0
+        if (before > 0 .and. (impacting .neqv. impacted) .and. found < most_limits) then
+          call bracket_limit(grid, span, path, values(before), values(k), state, impacted, tolerance, bracket, error)
+          if (allocated(error)) return
+          found = found + 1
+          limits(:, found) = [merge(1.0_wp, 0.0_wp, impacting), bracket]
+        end if
+        impacted = impacting
+        before = k
+        state = held%state
       end if
-      impacted = impacting
-      before = k
       call journal%progress(int(i, int64))
-      if (signal_count() > 0) then
-        call fail(error, exit_resumable, 'stopped while running '//trim(path)//' up and down; nothing was written yet, start again')
-        return
-      end if
+      call check_stop(journal, time_limit, 'running '//trim(path)//' up and down', error)
+      if (allocated(error)) return
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == 0) state = held%state
     end do

@@ -81,7 +81,8 @@ contains
       call session%begin(path, tiled=product(sweep%starts) > 0)
       call session%journal%line('chains', 'running '//trim(sweep%swept%name)//' up and down over '// &
                                 to_text(size(sweep%swept%values))//' values')
-      call run_chains(session%team, session%journal, grid_of(session%the_case, session%the_case%axes(:0)), work%span, &
+      call run_chains(session%team, session%journal, command%time_limit, &
+                      grid_of(session%the_case, session%the_case%axes(:0)), work%span, &
                       trim(sweep%swept%name), sweep%swept%values, [sweep%directions /= 'down', &
                       sweep%directions /= 'up'], sweep%samples, sweep%limit_tolerance, chains, error)
       call session%stop_if(error)
@@ -136,7 +137,8 @@ contains
     real(wp), allocatable :: x0(:), v0(:)
     integer :: starts, i
     logical :: complete
-    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, work%catalogues, error)
+    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
+                           session%command%time_limit, work%catalogues, error)
     call session%stop_if(error)
     starts = product(work%grid%shape(2:3))
     associate (axes => work%grid%axes)
@@ -208,8 +210,11 @@ contains
     call schema%add_variable('strobe_v', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
       units='m/s', long_name='velocity at crank angle 0', data=reshape(chains%samples(2, :, :, :), &
       [size(chains%samples)/2]))
-    if (size(chains%limits) > 0) call add_limits(schema, chains%limits)
+    if (size(chains%limits) > 0) call add_limits(schema, session%the_case%sweep%swept%unit, chains%limits)
     barriers = barriers_of(session)
+    ! A barrier that is swept has no one position.
+    if (session%the_case%sweep%swept%name == 'contact.upper') barriers(1) = huge(1.0_wp)
+    if (session%the_case%sweep%swept%name == 'contact.lower') barriers(2) = -huge(1.0_wp)
     if (barriers(1) < sqrt(huge(1.0_wp))) call schema%add_attribute('', 'barrier_upper', barriers(1))
     if (barriers(2) > -sqrt(huge(1.0_wp))) call schema%add_attribute('', 'barrier_lower', barriers(2))
 
@@ -237,8 +242,9 @@ contains
     barriers = [law%upper, law%lower]
   end function barriers_of
 
-  subroutine add_limits(schema, limits)
+  subroutine add_limits(schema, unit, limits)
     type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in) :: unit
     type(limit_t), intent(in) :: limits(:)
     character(len=24) :: names(size(limits))
     integer :: i
@@ -248,9 +254,9 @@ contains
     call schema%add_dimension('limit', size(limits, kind=int64))
     call schema%add_variable('name', type_string, ['limit'], long_name='where impacts start or stop', strings=names, &
                              group='limits')
-    call schema%add_variable('lower', type_float64, ['limit'], units='1', long_name='lower end of the bracket', &
+    call schema%add_variable('lower', type_float64, ['limit'], units=unit, long_name='lower end of the bracket', &
                              data=limits%bracket(1), group='limits')
-    call schema%add_variable('upper', type_float64, ['limit'], units='1', long_name='upper end of the bracket', &
+    call schema%add_variable('upper', type_float64, ['limit'], units=unit, long_name='upper end of the bracket', &
                              data=limits%bracket(2), group='limits')
   end subroutine add_limits
 

@@ -238,6 +238,10 @@ contains
     integer(int64) :: points
     integer :: i
     call new_tiling(int(lengths, int64), int(tile_shape, int64), tiling, error)
+    if (allocated(error)) then
+      lines = error%message
+      return
+    end if
     points = product(int(lengths, int64))
     lines = to_text(lengths(1))
     do i = 2, size(lengths)

@@ -17,9 +17,9 @@ module trajectory_driver
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
-  use motion_state, only: event_names, log_t
+  use motion_state, only: event_names, log_t, open_log
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_done, exit_io, reason_name
+  use status, only: exit_done, exit_io, reason_name, reason_time_over
   use text, only: to_text
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -59,11 +59,11 @@ contains
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.false.)
-    log%sample_interval = moving%machine%period/session%the_case%trajectory%samples_per_period
+    call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
     call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
     call describe_file(session, 'trajectory', schema)
     call describe_motion(moving, span, outcome, schema)
-    call add_history(moving, log, schema)
+    call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
@@ -105,14 +105,15 @@ contains
     end associate
   end subroutine describe_motion
 
-  subroutine add_history(moving, log, schema)
+  subroutine add_history(moving, crank_angle, log, schema)
     type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: foot(log%samples)
     integer :: i
     do i = 1, log%samples
-      call foot_motion(moving%machine%drive, moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
+      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
     end do
     call schema%add_dimension('time', int(log%samples, int64))
     call schema%add_variable('time', type_float64, ['time'], units='s', long_name='time since the start', &
@@ -154,6 +155,12 @@ contains
     type(log_t), intent(in) :: log
     character(len=*), intent(in) :: path
     associate (f => outcome%window, journal => session%journal)
+      if (outcome%reason /= reason_time_over) then
+        call journal%line('end', 'given up before the end: '//reason_name(outcome%reason)//'; '//to_text(log%events)// &
+          ' events until then')
+        call journal%line('written', 'wrote '//path)
+        return
+      end if
       call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
         ' m, v_max '//to_text(f%v_max, 6)//' m/s, '//to_text(f%impacts_per_period, 5)// &
         ' impacts per period at '//to_text(f%mean_impact_speed, 6)//' m/s (last '// &

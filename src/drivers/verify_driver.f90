@@ -13,6 +13,7 @@ module verify_driver
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
   use errors, only: error_t, fail
+  use file_layout, only: map_variables
   use grid, only: grid_t, point_slice, point_start, slice_laws, slice_motion
   use info_driver, only: count_codes
   use journal, only: journal_t, json_text
@@ -51,12 +52,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(reader_t) :: reader
     type(audit_t) :: audit
+    type(journal_t) :: journal
     character(len=:), allocatable :: kind, resolved
     type(case_t) :: the_case
     type(error_t), allocatable :: ignored
     character(len=128) :: no_overrides(0)
     integer :: datasets
     integer(int64) :: points
+    call journal%open(.not. command%json, .false., command%quiet)
     call open_final(command%path, reader, error)
     if (allocated(error)) return
     call verify_file(command%path, error, datasets)
@@ -68,9 +71,9 @@ contains
     if (.not. allocated(error)) then
       select case (kind)
       case ('basin')
-        call audit_map(reader, the_case, the_case%axes, '', command%sample, command%seed, audit, error)
+        call audit_map(reader, journal, the_case, the_case%axes, '', command%sample, command%seed, audit, error)
       case ('sweep')
-        if (reader%has('/branch_regime')) call audit_map(reader, the_case, sweep_axes(the_case), 'branch_', &
+        if (reader%has('/branch_regime')) call audit_map(reader, journal, the_case, sweep_axes(the_case), 'branch_', &
                                                          command%sample, command%seed, audit, error)
       case ('points')
         call audit_points(reader, the_case, command%sample, command%seed, audit, error)
@@ -83,9 +86,10 @@ contains
       ' of '//to_text(audit%points)//' points rerun differ from the file, first '//audit%first_difference)
   end subroutine run_verify
 
-  !> Reruns random points of a map over `axes`.
-  subroutine audit_map(reader, the_case, axes, prefix, sample, seed, audit, error)
+  !> Reruns random points of a map over `axes`, after its catalogue has been searched again.
+  subroutine audit_map(reader, journal, the_case, axes, prefix, sample, seed, audit, error)
     type(reader_t), intent(in) :: reader
+    type(journal_t), intent(inout) :: journal
     type(case_t), intent(in) :: the_case
     type(axis_t), intent(in) :: axes(:)
     character(len=*), intent(in) :: prefix
@@ -93,7 +97,6 @@ contains
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
     type(serial_team_t) :: alone
-    type(journal_t) :: silent
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
@@ -102,11 +105,12 @@ contains
     integer(int64), allocatable :: lengths(:), place(:)
     integer :: i, k
     grid = grid_of(the_case, axes)
-    silent%quiet = .true.
-    call search_catalogues(alone, silent, grid, span_of(the_case), the_case%attractors, catalogues, error)
+    call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
+                           error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (allocated(error)) return
     allocate (index(size(axes)), place(size(lengths)))
+    call journal%begin('points run again', int(sample, int64), 0_int64)
     do i = 1, sample
       call uniform(int(seed, int64), int(i, int64), random_numbers)
       do k = 1, size(axes)
@@ -124,10 +128,11 @@ contains
       call compare_with_reference(the_case, grid, catalogues, index, values, cache%moving, &
                                   audit, error)
       if (allocated(error)) return
+      call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
 
-  !> Regime, attractor, reason, period, amplitude and settle time must be what the file holds.
+  !> Every variable must be what the file holds.
   subroutine compare_with_file(reader, prefix, place, values, audit, error)
     type(reader_t), intent(in) :: reader
     character(len=*), intent(in) :: prefix
@@ -135,22 +140,19 @@ contains
     real(wp), intent(in) :: values(:)
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
-    character(len=*), parameter :: names(13) = [character(len=18) :: 'regime', 'attractor', 'reason', 'period', &
-      'event_word', 'impacts_per_period', 'mean_impact_speed', 'amplitude', 'x_max', 'x_min', 'v_max', &
-      'settle_time', 'grazing_margin']
     real(wp), allocatable :: stored(:)
     integer :: k
     logical :: same
     audit%points = audit%points + 1
-    do k = 1, size(names)
-      call reader%read_block('/'//prefix//trim(names(k)), place, spread(1_int64, 1, size(place)), stored, error)
+    do k = 1, size(map_variables)
+      call reader%read_block('/'//prefix//trim(map_variables(k)), place, spread(1_int64, 1, size(place)), stored, error)
       if (allocated(error)) return
       if (k <= 5) same = nint(stored(1), int64) == nint(values(k), int64)
       if (k > 5) same = real(stored(1), real32) == real(values(k), real32) &
                         .or. (stored(1) /= stored(1) .and. values(k) /= values(k))
       if (same) cycle
       audit%differing = audit%differing + 1
-      if (audit%differing == 1) audit%first_difference = trim(names(k))//' at '//place_text(place)//': the file has '// &
+      if (audit%differing == 1) audit%first_difference = trim(map_variables(k))//' at '//place_text(place)//': the file has '// &
         to_text(stored(1))//', rerun gives '//to_text(values(k))
       return
     end do

@@ -106,7 +106,7 @@ contains
         call rest_on(moving, state, time_end, tally, log)
       end select
       if (.not. (abs(state%x) <= moving%options%domain)) reason = reason_left_domain
-      if (state%x /= state%x .or. state%v /= state%v) reason = reason_not_finite
+      if (state%x /= state%x .or. state%v /= state%v .or. state%time /= state%time) reason = reason_not_finite
       stalls = merge(0, stalls + 1, state%time > before)
       if (stalls >= most_stalls) call break_tie(moving, state, time_end)
     end do

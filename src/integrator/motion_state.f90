@@ -8,7 +8,7 @@ module motion_state
   implicit none
   private
 
-  public :: reset_tally, note_position, append_word, record_event, record_sample
+  public :: reset_tally, note_position, append_word, open_log, record_event, record_sample
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -120,6 +120,14 @@ contains
       tally%word = ior(tally%word, ishft(int(symbol, int64), shift))
     end if
   end subroutine append_word
+
+  !> An empty log, whose arrays can be read as they are, with samples `interval` [s] apart within a drive period; 0 = none.
+  pure subroutine open_log(log, interval)
+    type(log_t), intent(out) :: log
+    real(wp), intent(in) :: interval
+    log%sample_interval = interval
+    allocate (log%event_kind(256), log%event_data(4, 256), log%sample_mode(4096), log%sample_data(3, 4096))
+  end subroutine open_log
 
   !> Writes an event down: state just before it and the velocity just after.
   pure subroutine record_event(log, kind, state, v_after)

@@ -42,7 +42,6 @@ module map_file
     procedure :: tile_done
     procedure :: write_tile
     procedure :: read_tile
-    procedure :: write_values
     procedure :: recheck
     procedure :: open => open_part
     procedure :: close => close_part
@@ -277,24 +276,6 @@ contains
       call from_bytes(self%datasets(i)%type, bytes, values(:, i))
     end do
   end subroutine read_tile
-
-  !> Writes an untiled numeric variable whole, in C order. One rank calls it.
-  subroutine write_values(self, name, values, error)
-    class(map_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    real(real64), intent(in) :: values(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(h5_dataset_t) :: dataset
-    call h5_open_dataset(self%part, '/'//name, dataset, error)
-    if (allocated(error)) return
-    if (size(values, kind=int64) /= product(dataset%lengths)) then
-      call fail(error, exit_internal, 'variable '//name//' gets values of the wrong size')
-      return
-    end if
-    call h5_write(dataset, bytes_in(dataset%type, values), error)
-    if (.not. allocated(error)) call h5_close_dataset(dataset, error)
-    if (.not. allocated(error) .and. self%alone) call h5_flush(self%part, error)
-  end subroutine write_values
 
   function bytes_in(type, values) result(bytes)
     integer, intent(in) :: type

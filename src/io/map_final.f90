@@ -13,7 +13,7 @@ module map_final
   use map_layout, only: create_objects, path_of, write_data
   use map_schema, only: schema_t, type_int64, type_string
   use map_verify, only: seal, verify_file
-  use output_check, only: check_output
+  use output_check, only: check_result
   use slabs, only: slab, slab_count
   use status, only: exit_io, exit_resumable
   use team, only: team_t
@@ -83,7 +83,7 @@ contains
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     type(schema_t) :: complete, nothing
-    call check_output(path, force, error)
+    call check_result(path, force, error)
     if (allocated(error)) return
     complete = schema
     call complete%append(nothing)

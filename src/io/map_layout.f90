@@ -19,7 +19,7 @@ module map_layout
   public :: create_objects, write_data, path_of
 
   !> Name with which netCDF marks a dimension without coordinates.
-  character(len=*), parameter, public :: bare_dimension = 'This is a netCDF dimension but not a netCDF variable.'
+  character(len=*), parameter :: bare_dimension = 'This is a netCDF dimension but not a netCDF variable.'
 
   !> Datasets up to this number of values stay contiguous in the final file.
   integer(int64), parameter :: small = 4096

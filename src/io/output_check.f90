@@ -4,12 +4,12 @@
 !> Whether an output can be created, asked before any work is done for it.
 module output_check
   use errors, only: error_t, fail
-  use files, only: check_folder, file_exists
+  use files, only: check_folder, file_exists, is_special
   use status, only: exit_cannot_create, exit_no_input
   implicit none
   private
 
-  public :: check_output, check_table, check_create, check_resume, working_path, is_folder
+  public :: check_result, check_table, check_create, check_resume, working_path, is_folder
 
 contains
 
@@ -27,7 +27,22 @@ contains
     end if
   end subroutine check_output
 
-  !> The same for a file that is written in place.
+  !> The same for a result file, which replaces what has its name: that must be a regular file.
+  subroutine check_result(path, replace, error)
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: replace
+    type(error_t), allocatable, intent(out) :: error
+    logical :: special
+    special = is_special(path)
+    if (special) special = .not. is_folder(path)
+    if (special) then
+      call fail(error, exit_cannot_create, "cannot create '"//path//"': it is not a regular file")
+    else
+      call check_output(path, replace, error)
+    end if
+  end subroutine check_result
+
+  !> The same for a table, which is written in place.
   subroutine check_table(path, replace, error)
     character(len=*), intent(in) :: path
     logical, intent(in) :: replace
@@ -50,7 +65,7 @@ contains
     character(len=*), intent(in) :: path
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
-    call check_output(path, force, error)
+    call check_result(path, force, error)
     if (allocated(error) .or. force) return
     if (file_exists(working_path(path))) call fail(error, exit_cannot_create, ''''//working_path(path)// &
       ''' of an interrupted run exists; --resume continues it, --force begins again')

@@ -16,7 +16,7 @@ module drive_law
   public :: drive_of, foot_motion, lever_foot, lever_assembles
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
-  integer, parameter, public :: max_harmonics = 1024
+  integer, parameter :: max_harmonics = 1024
 
   type, public :: drive_t
     !> Drive angular frequency over the natural one; 0 without a drive.
@@ -30,7 +30,7 @@ module drive_law
 
   !> Crank OD, slotted lever CE turning about C, rod EA to the guide of A. Lengths in m, angles in rad.
   type, public :: lever_t
-    real(wp) :: crank, pivot_distance, lever, rod, pivot_angle, guide_height, side, shift
+    real(wp) :: crank, pivot_distance, lever, rod, pivot_angle, guide_height, side
   end type lever_t
 
 contains
@@ -73,30 +73,27 @@ contains
     end do
   end subroutine advance_angle
 
-  !> Foot position x_A [m] and its first two derivatives with respect to the crank angle `phi` [rad].
-  pure subroutine foot_motion(law, phi, position, first, second)
+  !> Foot position x_A [m] and its derivative with respect to the crank angle `phi` [rad].
+  pure subroutine foot_motion(law, phi, position, first)
     type(drive_t), intent(in) :: law
     real(wp), intent(in) :: phi
     real(wp), intent(out) :: position
-    real(wp), intent(out), optional :: first, second
-    real(wp) :: s1, c1, s, c, next, d1, d2
+    real(wp), intent(out), optional :: first
+    real(wp) :: s1, c1, s, c, next, d1
     integer :: n
     position = law%mean
     d1 = 0
-    d2 = 0
     call sine_cosine(phi, s1, c1)
     s = s1
     c = c1
     do n = 1, size(law%cosine)
       position = position + law%cosine(n)*c + law%sine(n)*s
       d1 = d1 + n*(law%sine(n)*c - law%cosine(n)*s)
-      d2 = d2 - n*n*(law%cosine(n)*c + law%sine(n)*s)
       next = c*c1 - s*s1
       s = s*c1 + c*s1
       c = next
     end do
     if (present(first)) first = d1
-    if (present(second)) second = d2
   end subroutine foot_motion
 
   pure function lever_of(choice) result(lever)
@@ -105,18 +102,18 @@ contains
     lever = lever_t(value_of(choice, 'crank'), value_of(choice, 'pivot_distance'), &
                     value_of(choice, 'lever'), value_of(choice, 'rod'), &
                     value_of(choice, 'pivot_angle'), value_of(choice, 'guide_height'), &
-                    value_of(choice, 'side'), 0.0_wp)
+                    value_of(choice, 'side'))
   end function lever_of
 
   !> Foot position [m] of the mechanism at crank angle `phi`, C at the origin:
-  !> D = O + r (cos phi, sin phi), E = l2 D/|D|, x_A = s + E_x + sigma sqrt(l3^2 - (E_y - h)^2).
+  !> D = O + r (cos phi, sin phi), E = l2 D/|D|, x_A = E_x + sigma sqrt(l3^2 - (E_y - h)^2).
   !> Not a number where the mechanism cannot be assembled.
   pure elemental real(wp) function lever_foot(lever, phi)
     type(lever_t), intent(in) :: lever
     real(wp), intent(in) :: phi
     real(wp) :: e(2)
     e = lever_end(lever, phi)
-    lever_foot = lever%shift + e(1) + lever%side*sqrt(lever%rod**2 - (e(2) - lever%guide_height)**2)
+    lever_foot = e(1) + lever%side*sqrt(lever%rod**2 - (e(2) - lever%guide_height)**2)
   end function lever_foot
 
   !> Whether the rod reaches the guide at crank angle `phi`.

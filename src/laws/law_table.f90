@@ -16,6 +16,9 @@ module law_table
   character(len=*), parameter, public :: families(5) = [character(len=9) :: &
     'body', 'restoring', 'friction', 'contact', 'drive']
 
+  !> Largest |angle| [rad]: beyond it the rounding of the angle shows in its sine.
+  real(wp), parameter, public :: largest_angle = 1e4_wp
+
   real(wp), parameter :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
 
   type, public :: law_row_t
@@ -115,7 +118,7 @@ module law_table
                     'mean position of the foot of the spring'), &
     parameter_row_t('drive', 'harmonic', 'amplitude', 'm', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
                     'amplitude of the foot'), &
-    parameter_row_t('drive', 'harmonic', 'angle', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+    parameter_row_t('drive', 'harmonic', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
                     'offset added to the crank angle'), &
     parameter_row_t('drive', 'fourier', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
@@ -125,7 +128,7 @@ module law_table
                     'a_1, a_2, ...'), &
     parameter_row_t('drive', 'fourier', 'sine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
                     'b_1, b_2, ..., as many as cosine has'), &
-    parameter_row_t('drive', 'fourier', 'angle', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+    parameter_row_t('drive', 'fourier', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
                     'offset added to the crank angle'), &
     parameter_row_t('drive', 'crank_lever_rod', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
@@ -137,7 +140,7 @@ module law_table
                     'l2 = CE'), &
     parameter_row_t('drive', 'crank_lever_rod', 'rod', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'l3 = EA'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'pivot_angle', 'rad', none_below, none_above, .false., .false., 0.0_wp, &
+    parameter_row_t('drive', 'crank_lever_rod', 'pivot_angle', 'rad', -largest_angle, largest_angle, .false., .false., 0.0_wp, &
                     .false., 'B, direction of O seen from C against the guide'), &
     parameter_row_t('drive', 'crank_lever_rod', 'guide_height', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
                     'h, distance of the guide of A from C'), &
@@ -145,7 +148,7 @@ module law_table
                     'sigma, +1 or -1: A is ahead of E or behind it'), &
     parameter_row_t('drive', 'crank_lever_rod', 'shift', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
                     's, position of C on the axis of x'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+    parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
                     'offset added to the crank angle')]
 
 contains

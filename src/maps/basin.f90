@@ -4,18 +4,20 @@
 !> Points of a basin map: start to values, with the machine of the current slice at hand.
 module basin
   use attractors, only: attractor_t
-  use discover, only: discover_attractors, sort_attractors
-  use errors, only: error_t
-  use grid, only: grid_t, point_slice, point_start, slice_motion, slice_starts
+  use discover, only: discover_attractors
+  use errors, only: error_t, fail
+  use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
   use kinds, only: int64, wp
-  use match, only: carry_labels
+  use match, only: carry_labels, number_new, remember
   use motion, only: motion_t
+  use status, only: exit_bad_case
+  use text, only: to_text
   use trajectory, only: outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: discover_slice, label_slices, basin_point, outcome_values
+  public :: open_slice, search_starts, label_slices, basin_point, outcome_values
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13
@@ -33,39 +35,62 @@ module basin
 
 contains
 
-  !> Attractors of a slice from its own sample of starts and, as further starts, the section points of
-  !> `neighbours` (attractors of other slices).
-  subroutine discover_slice(grid, span, slice, sample, seed, max_period, neighbours, catalogue, error)
+  !> The machine of a slice. Code 65 if a trajectory would not last one drive period: what it shows would be
+  !> a piece of its beginning.
+  subroutine open_slice(grid, span, slice, moving, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer(int64), intent(in) :: slice
-    integer, intent(in) :: sample, seed, max_period
-    type(attractor_t), intent(in) :: neighbours(:)
-    type(catalogue_t), intent(inout) :: catalogue
+    type(motion_t), intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
-    type(motion_t) :: moving
-    real(wp), allocatable :: starts(:, :)
-    integer :: i
     call slice_motion(grid, slice, moving, error)
     if (allocated(error)) return
-    starts = slice_starts(grid, sample, seed)
-    if (allocated(catalogue%attractors)) starts = starts(:, :0)
+    if (span%duration < moving%machine%period) call fail(error, exit_bad_case, "key 'run.duration': found "// &
+      to_text(span%duration)//' s, allowed at least one drive period, '//to_text(moving%machine%period, 6)//' s')
+  end subroutine open_slice
+
+  !> Starts from which the attractors of a slice are searched: its own sample, or, where `neighbours` (attractors of other
+  !> slices) are given, their section points.
+  pure function search_starts(grid, sample, seed, neighbours) result(starts)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: sample, seed
+    type(attractor_t), intent(in), optional :: neighbours(:)
+    real(wp), allocatable :: starts(:, :)
+    integer :: i
+    if (.not. present(neighbours)) then
+      starts = slice_starts(grid, sample, seed)
+      return
+    end if
+    allocate (starts(3, 0))
     do i = 1, size(neighbours)
       if (neighbours(i)%rests) cycle
       starts = reshape([starts, neighbours(i)%points(:, 1), 0.0_wp], [3, size(starts, 2) + 1])
     end do
-    call discover_attractors(moving, span, starts, max_period, catalogue%attractors)
-    call sort_attractors(catalogue%attractors)
-  end subroutine discover_slice
+  end function search_starts
 
-  !> Labels along the slices in order, so that a branch keeps its number.
-  pure subroutine label_slices(catalogues)
+  !> Labels of all slices, so that a branch keeps its number along every parameter axis: after the branches of the row so
+  !> far (the last axis runs along a row), then after the neighbours on the other axes; what is left starts a new branch.
+  pure subroutine label_slices(grid, catalogues)
+    type(grid_t), intent(in) :: grid
     type(catalogue_t), intent(inout) :: catalogues(:)
-    type(attractor_t), allocatable :: known(:)
-    integer :: i
-    allocate (known(0))
-    do i = 1, size(catalogues)
-      call carry_labels(known, catalogues(i)%attractors)
+    type(attractor_t), allocatable :: row(:)
+    integer(int64), allocatable :: neighbours(:)
+    integer(int64) :: slice
+    integer :: i, highest
+    allocate (row(0))
+    highest = 0
+    do slice = 0, size(catalogues, kind=int64) - 1
+      associate (attractors => catalogues(slice + 1)%attractors)
+        attractors%id = 0
+        neighbours = slice_neighbours(grid, slice, .false.)
+        if (.not. any(neighbours == slice - 1)) row = row(:0)
+        call carry_labels(row, attractors)
+        do i = 1, size(neighbours)
+          call carry_labels(catalogues(neighbours(i) + 1)%attractors, attractors)
+        end do
+        call number_new(attractors, highest)
+        call remember(row, attractors)
+      end associate
     end do
   end subroutine label_slices
 
@@ -86,7 +111,7 @@ contains
     real(wp) :: start(3)
     slice = point_slice(grid, index)
     if (slice /= cache%slice) then
-      call slice_motion(grid, slice, cache%moving, error)
+      call open_slice(grid, span, slice, cache%moving, error)
       if (allocated(error)) return
       cache%slice = slice
     end if

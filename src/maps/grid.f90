@@ -14,7 +14,7 @@ module grid
   implicit none
   private
 
-  public :: make_grid, point_start, point_slice, slice_motion, slice_laws, slice_starts, machine_with
+  public :: make_grid, point_start, point_slice, slice_motion, slice_laws, slice_starts, slice_neighbours, machine_with
 
   type, public :: grid_t
     type(axis_t), allocatable :: axes(:)
@@ -137,6 +137,25 @@ contains
     if (allocated(error)) return
     call prepare_motion(machine, options, moving, error)
   end subroutine machine_of
+
+  !> Slices next to `slice` along each parameter axis, last axis first: those before it, and with `both` those behind it.
+  pure function slice_neighbours(grid, slice, both) result(neighbours)
+    type(grid_t), intent(in) :: grid
+    integer(int64), intent(in) :: slice
+    logical, intent(in) :: both
+    integer(int64), allocatable :: neighbours(:)
+    integer(int64) :: stride, position
+    integer :: i, length
+    allocate (neighbours(0))
+    stride = 1
+    do i = size(grid%parameter_axes), 1, -1
+      length = grid%shape(grid%parameter_axes(i))
+      position = modulo(slice/stride, int(length, int64))
+      if (position > 0) neighbours = [neighbours, slice - stride]
+      if (both .and. position < length - 1) neighbours = [neighbours, slice + stride]
+      stride = stride*length
+    end do
+  end function slice_neighbours
 
   !> Starts that sample a slice: `count` points of the additive recurrence of Roberts (2018) over the ranges of
   !> the start axes, shifted by `seed`; one start if no start is an axis. Rows x0, v0, crank angle.

@@ -11,7 +11,9 @@ module sweep
   use kinds, only: int64, wp
   use motion, only: advance_period, motion_t, start_state
   use motion_state, only: reset_tally, state_t, tally_t
+  use status, only: reason_time_over
   use trajectory, only: span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
@@ -25,19 +27,20 @@ module sweep
     integer :: reason = 0
     integer :: period = 0
     type(features_t) :: features
-    !> Last section points, rows x [m] and v [m/s].
+    !> Last section points, rows x [m] and v [m/s]; not numbers after a hold that was given up, like the features.
     real(wp), allocatable :: samples(:, :)
     type(state_t) :: state
   end type hold_t
 
 contains
 
-  !> Holds parameter `path` at `value` for at least the duration, starting from `state`; features are over the window.
-  subroutine hold_parameter(grid, span, path, value, state, samples, held, error)
+  !> Holds parameter `path` at `value` for at least the duration, starting from `state` with the crank at `crank_angle`;
+  !> features are over the window. The reason is `time_over` unless the hold had to be given up.
+  subroutine hold_parameter(grid, span, path, value, state, crank_angle, samples, held, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value, crank_angle
     type(state_t), intent(in) :: state
     integer, intent(in) :: samples
     type(hold_t), intent(out) :: held
@@ -49,8 +52,8 @@ contains
     if (allocated(error)) return
     in_window = max(1, ceiling(span%window/moving%machine%period))
     periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)
-    allocate (held%samples(2, samples))
-    held%state = start_state(moving, state%x, state%v, 0.0_wp)
+    allocate (held%samples(2, samples), source=ieee_value(1.0_wp, ieee_quiet_nan))
+    held%state = start_state(moving, state%x, state%v, crank_angle)
     call reset_tally(tally, held%state)
     do i = 1, periods
       if (i == periods - in_window + 1) then
@@ -58,14 +61,32 @@ contains
         call reset_tally(tally, held%state)
       end if
       call advance_period(moving, held%state, tally, held%reason)
-      if (held%reason /= 0) return
+      if (held%reason /= 0) then
+        held%samples = ieee_value(1.0_wp, ieee_quiet_nan)
+        held%features = no_features()
+        return
+      end if
       if (i > periods - samples) held%samples(:, i - periods + samples) = [held%state%x, held%state%v]
     end do
+    held%reason = reason_time_over
     held%features = regime_of(tally, real(in_window, wp))
     held%period = period_of(held%samples, held%features%amplitude*[1.0_wp, moving%machine%drive_frequency])
     held%features%word = 0
     if (held%period > 0) held%features%word = word_of(moving, held%state, held%period)
   end subroutine hold_parameter
+
+  !> Features of a hold without an end: not numbers.
+  pure function no_features() result(features)
+    type(features_t) :: features
+    real(wp) :: none
+    none = ieee_value(1.0_wp, ieee_quiet_nan)
+    features%impacts_per_period = none
+    features%mean_impact_speed = none
+    features%amplitude = none
+    features%x_max = none
+    features%x_min = none
+    features%v_max = none
+  end function no_features
 
   !> Event word of the `period` drive periods that follow a state.
   pure integer(int64) function word_of(moving, state, period) result(word)
@@ -104,7 +125,8 @@ contains
   end function period_of
 
   !> Halves the interval in which impacts start or stop while the parameter moves from `value` (state given)
-  !> to `beyond`, until it is at most `tolerance` wide. Every hold starts from the last state before the change.
+  !> to `beyond`, until it is at most `tolerance` wide or a hold has to be given up. Every hold starts from the last state
+  !> before the change.
   subroutine bracket_limit(grid, span, path, value, beyond, state, impacting, tolerance, bracket, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
@@ -122,8 +144,10 @@ contains
     last = state
     do while (abs(far - near) > tolerance)
       middle = 0.5_wp*(near + far)
-      call hold_parameter(grid, span, path, middle, last, 0, held, error)
+      if (.not. (abs(middle - near) > 0 .and. abs(middle - far) > 0)) exit
+      call hold_parameter(grid, span, path, middle, last, 0.0_wp, 0, held, error)
       if (allocated(error)) return
+      if (held%reason /= reason_time_over) exit
       if ((held%features%impacts_per_period > 0) .eqv. impacting) then
         near = middle
         last = held%state

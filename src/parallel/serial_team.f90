@@ -18,7 +18,6 @@ module serial_team
     procedure :: abort => abort_with
     procedure :: broadcast_text
     procedure :: broadcast_integers
-    procedure :: broadcast_reals
     procedure :: sum => sum_integers
     procedure :: gather
     procedure :: allgather => gather
@@ -84,15 +83,6 @@ contains
     associate (unused => self, also => values, too => root)
     end associate
   end subroutine broadcast_integers
-
-  !> The values stay as they are.
-  subroutine broadcast_reals(self, values, root)
-    class(serial_team_t), intent(in) :: self
-    real(real64), intent(inout), contiguous :: values(:)
-    integer, intent(in), optional :: root
-    associate (unused => self, also => values, too => root)
-    end associate
-  end subroutine broadcast_reals
 
   !> The values are their own sums.
   subroutine sum_integers(self, values)

@@ -21,13 +21,12 @@ module team
     procedure(abort_with), deferred :: abort
     procedure(broadcast_text_to), deferred :: broadcast_text
     procedure(broadcast_integers_to), deferred :: broadcast_integers
-    procedure(broadcast_reals_to), deferred :: broadcast_reals
     procedure(sum_integers), deferred :: sum
     procedure(gather_reals), deferred :: gather
     procedure(gather_reals), deferred :: allgather
     procedure(act_finally), deferred :: close
     procedure :: broadcast_integer
-    generic :: broadcast => broadcast_text, broadcast_integers, broadcast_reals, broadcast_integer
+    generic :: broadcast => broadcast_text, broadcast_integers, broadcast_integer
     procedure :: is_root
     procedure :: any => any_of
     procedure :: agree
@@ -75,14 +74,6 @@ module team
       integer(int64), intent(inout), contiguous :: values(:)
       integer, intent(in), optional :: root
     end subroutine broadcast_integers_to
-
-    !> As `broadcast_integers`.
-    subroutine broadcast_reals_to(self, values, root)
-      import :: real64, team_t
-      class(team_t), intent(in) :: self
-      real(real64), intent(inout), contiguous :: values(:)
-      integer, intent(in), optional :: root
-    end subroutine broadcast_reals_to
 
     !> Every rank gets the sums over the ranks, element by element.
     subroutine sum_integers(self, values)

@@ -2,11 +2,11 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Tiles: blocks of a grid of 1 to 6 dimensions. Pure integer arithmetic. Points and tiles are
-!> numbered in C order (the last dimension runs fastest), tiles from 1, points and corners from 0.
+!> numbered in C order (the last dimension runs fastest), tiles from 1, points from 0.
 module tiles
   use errors, only: error_t, fail
-  use kinds, only: int64
-  use status, only: exit_internal
+  use kinds, only: int64, real64
+  use status, only: exit_bad_case, exit_internal
   use text, only: to_text
   implicit none
   private
@@ -14,7 +14,7 @@ module tiles
   public :: new_tiling
 
   !> Most dimensions of a grid.
-  integer, parameter, public :: max_dimensions = 6
+  integer, parameter :: max_dimensions = 6
 
   type, public :: tiling_t
     !> Lengths of the grid and of a tile.
@@ -23,15 +23,12 @@ module tiles
     procedure :: count => count_tiles
     procedure :: block_of
     procedure :: points
-    procedure :: corner
-    procedure :: point_indices
-    procedure :: subscripts
   end type tiling_t
 
 contains
 
   !> The tiling of a grid; the tile shape is cut to the grid. Code 70 if the ranks differ or a
-  !> length is not positive.
+  !> length is not positive; code 65 if the tiles, or the points of one, are more than an integer counts.
   subroutine new_tiling(lengths, shape, tiling, error)
     integer(int64), intent(in) :: lengths(:), shape(:)
     type(tiling_t), intent(out) :: tiling
@@ -46,8 +43,26 @@ contains
       call fail(error, exit_internal, 'lengths of grids and tiles are positive')
     else
       tiling%shape = min(lengths, shape)
+      call check_counts(tiling, error)
     end if
   end subroutine new_tiling
+
+  !> Numbers that the integers of a tiling cannot hold.
+  subroutine check_counts(tiling, error)
+    type(tiling_t), intent(in) :: tiling
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: tiles
+    tiles = product(real(tiles_along(tiling), real64))
+    if (tiles > huge(1)) then
+      call fail(error, exit_bad_case, 'key ''grid.tile'': found '//to_text(tiles)//' tiles, allowed at most '//to_text(huge(1)))
+    else if (product(real(tiling%shape, real64)) > huge(1)) then
+      call fail(error, exit_bad_case, 'key ''grid.tile'': found tiles of '//to_text(product(real(tiling%shape, real64)))// &
+                ' points, allowed at most '//to_text(huge(1)))
+    else if (product(real(tiling%lengths, real64)) > 2.0_real64**62) then
+      call fail(error, exit_bad_case, 'the grid has '//to_text(product(real(tiling%lengths, real64)))// &
+                ' points, allowed at most 2^62')
+    end if
+  end subroutine check_counts
 
   !> The number of tiles.
   pure integer function count_tiles(self)
@@ -64,15 +79,6 @@ contains
     extent = min(self%shape, self%lengths - lower)
   end subroutine block_of
 
-  !> The lower corner of a tile.
-  pure function corner(self, tile) result(lower)
-    class(tiling_t), intent(in) :: self
-    integer, intent(in) :: tile
-    integer(int64) :: lower(size(self%lengths))
-    integer(int64) :: extent(size(self%lengths))
-    call self%block_of(tile, lower, extent)
-  end function corner
-
   !> The number of points of a tile.
   pure integer function points(self, tile)
     class(tiling_t), intent(in) :: self
@@ -81,27 +87,6 @@ contains
     call self%block_of(tile, lower, extent)
     points = int(product(extent))
   end function points
-
-  !> The C-order indices in the grid (from 0) of the points of a tile, in the C order of the tile.
-  pure function point_indices(self, tile) result(indices)
-    class(tiling_t), intent(in) :: self
-    integer, intent(in) :: tile
-    integer(int64), allocatable :: indices(:)
-    integer(int64) :: lower(size(self%lengths)), extent(size(self%lengths)), i
-    call self%block_of(tile, lower, extent)
-    allocate (indices(product(extent)))
-    do i = 1, size(indices, kind=int64)
-      indices(i) = ravel(lower + unravel(i - 1, extent), self%lengths)
-    end do
-  end function point_indices
-
-  !> The subscripts (from 0, one per dimension) of a C-order index of the grid (from 0).
-  pure function subscripts(self, index) result(place)
-    class(tiling_t), intent(in) :: self
-    integer(int64), intent(in) :: index
-    integer(int64) :: place(size(self%lengths))
-    place = unravel(index, self%lengths)
-  end function subscripts
 
   pure function tiles_along(self) result(counts)
     class(tiling_t), intent(in) :: self
@@ -119,14 +104,5 @@ contains
       rest = rest/lengths(i)
     end do
   end function unravel
-
-  pure integer(int64) function ravel(place, lengths)
-    integer(int64), intent(in) :: place(:), lengths(:)
-    integer :: i
-    ravel = 0
-    do i = 1, size(lengths)
-      ravel = ravel*lengths(i) + place(i)
-    end do
-  end function ravel
 
 end module tiles

@@ -55,7 +55,7 @@ def write_basin(
     word = np.where(impacting, WORD_IMPACT, np.where(attractor > 0, WORD_QUIET, 0))
     values = {
         "regime": (regime, "i1", "1"),
-        "attractor": (attractor, "i2", "1"),
+        "attractor": (attractor, "i4", "1"),
         "reason": (np.where(attractor > 0, 1, 2), "i1", "1"),
         "period": (np.where(attractor > 0, 1, 0), "i2", "1"),
         "event_word": (word, "i8", "1"),
@@ -107,7 +107,7 @@ def write_sweep(path: Path, ratios: np.ndarray, starts: int = 6, samples: int = 
             ("regime", (1 + impact).astype("i1"), "1"),
             ("period", np.ones(impact.shape, "i2"), "1"),
             ("event_word", np.where(impact, WORD_IMPACT, WORD_QUIET), "1"),
-            ("reason", np.ones(impact.shape, "i1"), "1"),
+            ("reason", np.full(impact.shape, 2, "i1"), "1"),
         ):
             _variable(file, name, data, dims, unit)
         wave = 0.05 * np.cos(np.pi * np.arange(samples)) * (impact & (ratios > 1.2))[..., None]
@@ -124,7 +124,7 @@ def write_sweep(path: Path, ratios: np.ndarray, starts: int = 6, samples: int = 
             ("impacts_per_period", branch.astype("f4"), "1"),
             ("regime", (1 + branch).astype("i1"), "1"),
             ("reason", np.ones(branch.shape, "i1"), "1"),
-            ("attractor", (1 + branch).astype("i2"), "1"),
+            ("attractor", (1 + branch).astype("i4"), "1"),
             ("period", np.ones(branch.shape, "i2"), "1"),
             ("event_word", np.where(branch, WORD_IMPACT, WORD_QUIET), "1"),
         ):
@@ -243,7 +243,7 @@ def _catalogue(file: h5py.File, slices: int, regime_of: tuple[int, ...]) -> None
         "regime": regime, "period": np.ones(len(rows)),
         "event_word": np.where(regime == 2, WORD_IMPACT, WORD_QUIET),
     }  # fmt: skip
-    kinds = {"slice": "i4", "attractor": "i2", "regime": "i1", "period": "i2", "event_word": "i8"}
+    kinds = {"slice": "i4", "attractor": "i4", "regime": "i1", "period": "i2", "event_word": "i8"}
     for name, data in columns.items():
         _variable(group, name, np.asarray(data).astype(kinds[name]), ["entry"], "1")
     for name, unit in (

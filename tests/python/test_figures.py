@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from sample_files import write_basin, write_points, write_sweep, write_trajectory
-from separatrix import basin, cli, reduce, style, sweep, trajectory
+from separatrix import basin, cli, points, reduce, style, sweep, trajectory
 from separatrix.labels import share_texts
 from separatrix.open import open_result, table
 from separatrix.regions import Boundary, boundaries, regions
@@ -496,6 +496,80 @@ def test_the_start_in_the_caption_is_that_of_the_case(tmp_path):
         file["provenance/resolved_case"] = text
     figure = drawn(path, trajectory.phase_portrait)
     assert "$x_0$ = 0.4 m, $v_0$ = 0 m/s" in figure.separatrix_caption
+
+
+@pytest.mark.parametrize("change", ["catalogue", "label"])
+def test_without_labels_there_is_no_figure_of_attractors(tmp_path: Path, change: str) -> None:
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, np.zeros((7, 4), int))
+    with h5py.File(path, "r+") as file:
+        if change == "catalogue":
+            del file["catalogue"]
+        else:
+            file["catalogue/count"][...] = 0
+    assert cli.main([str(path), "--formats", "png"]) == 0
+    assert [figure.name for figure in tmp_path.glob("*.png")] == ["b_regime.png"]
+    assert cli.main([str(path), "--formats", "png", "--field", "attractor"]) == 0
+
+
+def add_to_case(path: Path, more: str) -> None:
+    """Put tables at the end of the resolved case of a file."""
+    with h5py.File(path, "r+") as file:
+        text = file["provenance/resolved_case"][()].decode() + more
+        del file["provenance/resolved_case"]
+        file["provenance/resolved_case"] = text
+
+
+@pytest.mark.parametrize(
+    ("axes", "angle", "text"),
+    [
+        ({"x0": X0, "v0": V0}, 0.0, ""),
+        ({"x0": X0, "v0": V0}, 1.5, r"; $\varphi_0$ = 1.5 rad;"),
+        ({"x0": X0, "crank_angle": V0}, 1.5, "; $v_0$ = -1 m/s;"),
+        ({"drive_ratio": V0, "friction_kinetic_coefficient": X0}, 0.0, "; $x_0$ = 0.4 m, $v_0$ = -1 m/s;"),
+    ],
+)
+def test_the_caption_of_a_map_has_the_start_values_that_are_no_axes(
+    tmp_path: Path, axes: dict, angle: float, text: str
+) -> None:
+    path = write_basin(tmp_path / "b.h5", axes, np.ones([len(p) for p in axes.values()], int))
+    add_to_case(path, f"\n[start]\nx0 = 0.4\nv0 = -1.0\ncrank_angle = {angle}\n")
+    caption = draw(path, "regime").separatrix_caption
+    assert text in caption
+    assert sum(caption.count(symbol) for symbol in ("$x_0$", "$v_0$", "varphi")) == text.count("_0$")
+    assert ("Omega" in caption) == ("drive_ratio" not in axes)
+
+
+def test_points_at_several_ratios_have_none_in_the_caption(tmp_path: Path) -> None:
+    path = write_points(tmp_path / "p.h5")
+    with open_result(path) as result:
+        assert "Omega" in points.scatter(result, "title").separatrix_caption
+    with h5py.File(path, "r+") as file:
+        file["ratio"][0] = 1.1
+    with open_result(path) as result:
+        assert "Omega" not in points.scatter(result, "title").separatrix_caption
+
+
+def test_holds_that_failed_are_not_drawn(tmp_path: Path) -> None:
+    path = write_sweep(tmp_path / "s.h5", np.linspace(0.7, 1.8, 23))
+    with h5py.File(path, "r+") as file:
+        for name in ("x_max", "x_min", "mean_impact_speed", "strobe_x"):
+            file[name][0, 5] = np.nan
+        file["reason"][0, 5] = 5
+    figure = drawn(path, sweep.amplitude_diagram)
+    ups = [line for line in figure.axes[0].lines if line.get_markeredgecolor() == style.RUN_UP]
+    assert [int(np.isfinite(line.get_ydata()).sum()) for line in ups] == [22, 22]
+    strobe = drawn(path, sweep.bifurcation_diagram).axes[0].collections[0]
+    assert np.isfinite(strobe.get_offsets().filled(np.nan)).all(axis=1).sum() == 22 * 8
+
+
+@pytest.mark.parametrize(("duration", "end"), [(20.0, 20.0), (20.004, 20.004), (40.0, 20.0)])
+def test_the_time_axis_ends_at_the_duration(tmp_path: Path, duration: float, end: float) -> None:
+    path = write_trajectory(tmp_path / "t.h5")
+    add_to_case(path, f"\n[run]\nduration = {duration}\n")
+    figure = drawn(path, trajectory.time_history)
+    assert [ax.get_xlim()[1] for ax in figure.axes] == [end, end]
+    for ax in figure.axes:
+        assert (end in ax.get_xticks()) == (end == 20.0)
 
 
 def test_values_of_close_limits_do_not_lie_on_each_other():

@@ -25,7 +25,6 @@ module mpi_team
     procedure :: abort => abort_with
     procedure :: broadcast_text
     procedure :: broadcast_integers
-    procedure :: broadcast_reals
     procedure :: sum => sum_integers
     procedure :: gather
     procedure :: allgather
@@ -99,14 +98,6 @@ contains
     integer, intent(in), optional :: root
     call MPI_Bcast(values, size(values), MPI_INTEGER8, from_rank(root), self%comm)
   end subroutine broadcast_integers
-
-  !> Every rank gets the values of rank `root` (0 unless given).
-  subroutine broadcast_reals(self, values, root)
-    class(mpi_team_t), intent(in) :: self
-    real(real64), intent(inout), contiguous :: values(:)
-    integer, intent(in), optional :: root
-    call MPI_Bcast(values, size(values), MPI_REAL8, from_rank(root), self%comm)
-  end subroutine broadcast_reals
 
   !> Every rank gets the sums over the ranks.
   subroutine sum_integers(self, values)

@@ -3,11 +3,16 @@
 
 !> Starts the program's team and makes schedulers: the build without MPI.
 module parallel
+  use, intrinsic :: iso_fortran_env, only: error_unit
   use errors, only: error_t
+  use launcher, only: launched_ranks
   use scheduler, only: scheduler_options_t, scheduler_t
   use serial_scheduler, only: serial_scheduler_t
   use serial_team, only: serial_team_t
+  use status, only: exit_usage
+  use system, only: exit_program
   use team, only: team_t
+  use text, only: to_text
   implicit none
   private
 
@@ -18,9 +23,15 @@ module parallel
 
 contains
 
-  !> The team of the whole program.
+  !> The team of the whole program. Under mpirun every process would do the whole work and write the same file, so
+  !> there the program ends with code 64.
   subroutine start_team(team)
     class(team_t), allocatable, intent(out) :: team
+    if (launched_ranks() > 1) then
+      write (error_unit, '(a)') 'separatrix: this build has no MPI, found '//to_text(launched_ranks())// &
+        ' processes started together, allowed 1'
+      call exit_program(exit_usage)
+    end if
     allocate (serial_team_t :: team)
   end subroutine start_team
 

@@ -1,0 +1,33 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Whether to stop before the tiles have begun: while attractors are searched and chains run.
+module stop_check
+  use errors, only: error_t, fail
+  use journal, only: journal_t
+  use kinds, only: wp
+  use signals, only: signal_count
+  use status, only: exit_resumable
+  use system, only: monotonic_seconds
+  implicit none
+  private
+
+  public :: check_stop
+
+contains
+
+  !> Code 75 if a stop signal came or `time_limit` [s] since the start is over (0 = none); `doing` says what is left undone.
+  subroutine check_stop(journal, time_limit, doing, error)
+    type(journal_t), intent(in) :: journal
+    real(wp), intent(in) :: time_limit
+    character(len=*), intent(in) :: doing
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: elapsed
+    logical :: stop_now
+    stop_now = signal_count() > 0
+    elapsed = monotonic_seconds() - journal%started
+    if (time_limit > 0) stop_now = stop_now .or. elapsed >= time_limit
+    if (stop_now) call fail(error, exit_resumable, 'stopped while '//doing//'; nothing was written yet, start again')
+  end subroutine check_stop
+
+end module stop_check

@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motions, sweeps and labels of real runs: what the case asks for is what the files hold."""
+
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import run, succeed, write_case
+
+NO_STARTS = ["sweep", "case.toml", "--set", "sweep.starts=[0, 0]"]
+FLOATS = ("x_max", "x_min", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period")
+STROBES = ("strobe_x", "strobe_v")
+
+
+def options(*settings: str) -> list[str]:
+    """Settings as arguments of the program."""
+    return [word for setting in settings for word in ("--set", setting)]
+
+
+def foot(angle: np.ndarray) -> np.ndarray:
+    """Position of the foot of the spring of the case, by its series."""
+    harmonics = np.arange(1, 4)
+    phase = np.multiply.outer(angle + np.radians(191.1), harmonics)
+    cosine, sine = np.array([0.09495, 0.01, -0.02003]), np.array([0.0, 0.02849, -0.02686])
+    return 0.31055 + np.cos(phase) @ cosine + np.sin(phase) @ sine
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0])
+def test_the_drive_begins_at_the_crank_angle_of_the_start(separatrix, tmp_path, angle):
+    write_case(tmp_path)
+    start = options(f'start.crank_angle="{angle} deg"')
+    succeed(separatrix, "trajectory", "case.toml", *start, folder=tmp_path)
+    with h5py.File(tmp_path / "case.h5") as file:
+        time, drive = file["time"][()], file["drive"][()]
+        period = file.attrs["drive_period"]
+    expected = foot(np.radians(angle) + 2 * np.pi * time / period)
+    np.testing.assert_allclose(drive, expected, rtol=0, atol=1e-12)
+    assert (time[0], time[-1]) == (0.0, 50.0)
+    assert (np.diff(time) > 0).all()
+
+
+def test_a_body_that_never_moves_has_no_events(separatrix, tmp_path):
+    write_case(tmp_path)
+    held = options("friction.kinetic_coefficient=50")
+    succeed(separatrix, "trajectory", "case.toml", *held, "--csv", "events.csv", folder=tmp_path)
+    with h5py.File(tmp_path / "case.h5") as file:
+        for name in ("event_kind", "event_time", "event_x", "event_v_before", "event_v_after"):
+            assert file[name].shape == (0,)
+        assert (file["x"][()] == 0.4).all()
+        assert (file["v"][()] == 0.0).all()
+    assert (tmp_path / "events.csv").read_text().count("\n") == 1
+    succeed(separatrix, "verify", "case.h5", folder=tmp_path)
+
+
+@pytest.fixture(scope="module")
+def one_way(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sweep of the case in both directions and in each of them."""
+    folder = tmp_path_factory.mktemp("one_way")
+    write_case(folder)
+    for way in ("both", "up", "down"):
+        command = [*NO_STARTS, *options(f'sweep.directions="{way}"')]
+        succeed(separatrix, *command, "-o", f"{way}.h5", folder=folder)
+    return folder
+
+
+@pytest.mark.parametrize(("way", "ran"), [("up", 0), ("down", 1)])
+def test_a_direction_that_was_not_run_is_nan(one_way, way, ran):
+    with h5py.File(one_way / f"{way}.h5") as file, h5py.File(one_way / "both.h5") as both:
+        for name in (*FLOATS, *STROBES):
+            np.testing.assert_array_equal(file[name][ran], both[name][ran], name)
+            assert np.isnan(file[name][1 - ran]).all(), name
+            assert np.isfinite(file[name][ran]).all(), name
+        assert (file["reason"][1 - ran] == 0).all()
+        assert (file["reason"][ran] == 2).all()
+        names = [name.decode().rstrip() for name in file["limits/name"][()]]
+        assert names
+        assert all(name.endswith(f"_{way}") for name in names)
+
+
+@pytest.mark.parametrize(("way", "text"), [("up", "run-up"), ("down", "run-down")])
+def test_only_the_run_that_was_made_is_drawn(one_way, way, text):
+    style = pytest.importorskip("separatrix.style")
+    from separatrix import open_result, sweep
+
+    with style.context(), open_result(one_way / f"{way}.h5") as result:
+        for figure in sweep.figures(result, "title").values():
+            texts = {entry.get_text() for entry in figure.legends[0].get_texts()}
+            assert texts & {"run-up", "run-down"} == {text}
+            for ax in figure.axes:
+                assert np.isfinite([ax.get_xlim(), ax.get_ylim()]).all()
+
+
+def test_a_sweep_begins_at_the_crank_angle_of_the_start(separatrix, tmp_path, one_way):
+    write_case(tmp_path)
+    # so short that the first hold still knows its start
+    short = options("run.duration=2", "start.crank_angle=2.0")
+    succeed(separatrix, *NO_STARTS, *short, "-o", "turned.h5", folder=tmp_path)
+    succeed(separatrix, *NO_STARTS, *short[:2], "-o", "zero.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "turned.h5") as turned, h5py.File(tmp_path / "zero.h5") as zero:
+        for direction, place in ((0, 0), (1, -1)):
+            assert turned["x_max"][direction, place] != zero["x_max"][direction, place]
+
+
+def test_limits_have_the_unit_of_the_swept_parameter(separatrix, tmp_path, one_way):
+    write_case(tmp_path)
+    swept = "sweep={parameter='contact.upper', from=0.7, to=1.5, count=5, starts=[0, 0]}"
+    succeed(separatrix, "sweep", "case.toml", *options(swept), folder=tmp_path)
+    for path, name, unit in (
+        (tmp_path / "case.h5", "contact_upper", "m"),
+        (one_way / "both.h5", "drive_ratio", "1"),
+    ):
+        with h5py.File(path) as file:
+            for item in (name, "limits/lower", "limits/upper"):
+                assert file[item].attrs["units"] == unit, item
+
+
+@pytest.mark.parametrize("command", ["basin", "sweep"])
+def test_a_duration_below_a_drive_period_is_refused(separatrix, tmp_path, command):
+    write_case(tmp_path)
+    # at the ratio 0.8 of the sweep and 1.2 of the map a period is longer than 0.5 s
+    outcome = run(separatrix, command, "case.toml", *options("run.duration=0.5"), folder=tmp_path)
+    assert (outcome.code, len(outcome.messages)) == (65, 1)
+    assert "run.duration" in outcome.err
+    assert "period" in outcome.err
+    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+def write_lists(folder: Path) -> list[str]:
+    """Two lists of the same length; returns the command of the first one."""
+    for name, shift in (("a", 0.0), ("b", 1e-9)):
+        rows = [f"{i / 600 + shift},{i % 7 - 3}" for i in range(600)]
+        (folder / f"{name}.csv").write_text("\n".join(["x0,v0", *rows]) + "\n")
+    return ["points", "case.toml", "--list", "a.csv"]
+
+
+def test_another_list_of_the_same_length_cannot_go_on(separatrix, tmp_path):
+    write_case(tmp_path)
+    command = write_lists(tmp_path)
+    assert run(separatrix, *command, "--time-limit", "0.001", folder=tmp_path).code == 75
+    before = (tmp_path / "case.h5.part").read_bytes()
+    other = [*command[:-1], "b.csv", "--resume"]
+    outcome = run(separatrix, *other, folder=tmp_path)
+    assert (outcome.code, len(outcome.messages)) == (76, 1)
+    assert (tmp_path / "case.h5.part").read_bytes() == before
+    succeed(separatrix, *command, "--resume", folder=tmp_path)
+
+
+def test_a_table_that_exists_is_not_replaced_without_force_not_even_by_a_resumed_run(separatrix, tmp_path):
+    write_case(tmp_path)
+    command = [*write_lists(tmp_path), "--csv", "out.csv"]
+    assert run(separatrix, *command, "--time-limit", "0.001", folder=tmp_path).code == 75
+    (tmp_path / "out.csv").write_text("something dear")
+    for more in ([], ["--resume"]):
+        outcome = run(separatrix, *command, *more, "-o", "case.h5", folder=tmp_path)
+        assert outcome.code == 73
+        assert (tmp_path / "out.csv").read_text() == "something dear"
+    succeed(separatrix, *command, "--force", folder=tmp_path)
+    assert (tmp_path / "out.csv").read_text().startswith("x0,v0,")
+
+
+COARSE = ("axis[1].count=5", "axis[2].count=7")
+TWO_PARAMETERS = (
+    "axis=[{name='friction.kinetic_coefficient', from=0.15, to=0.25, count=3},"
+    " {name='drive.ratio', from=1.15, to=1.25, count=3},"
+    " {name='x0', from=0, to=1.1, count=5}, {name='v0', from=-6, to=6, count=7}]"
+)
+
+
+def test_a_branch_has_one_label_over_two_parameters(separatrix, tmp_path):
+    write_case(tmp_path)
+    succeed(separatrix, "basin", "case.toml", *options(TWO_PARAMETERS), folder=tmp_path)
+    with h5py.File(tmp_path / "case.h5") as file:
+        catalogue = {name: file[f"catalogue/{name}"][()] for name in ("slice", "attractor", "regime")}
+        period = file["catalogue/period"][()]
+    assert set(catalogue["slice"]) == set(range(9))
+    # here there is one free and one impacting motion at each place, both of period 1
+    assert (period == 1).all()
+    labels = {}
+    for regime, label in zip(catalogue["regime"], catalogue["attractor"], strict=True):
+        labels.setdefault(int(regime), set()).add(int(label))
+    assert {regime: len(found) for regime, found in labels.items()} == {1: 1, 2: 1}
+    assert len(set.union(*labels.values())) == 2
+
+
+def test_every_labelled_point_has_the_regime_of_its_attractor(separatrix, tmp_path):
+    write_case(tmp_path)
+    elastic = options(*COARSE, 'friction={law="none"}', "contact.restitution=1.0", "run.duration=20")
+    succeed(separatrix, "basin", "case.toml", *elastic, folder=tmp_path)
+    with h5py.File(tmp_path / "case.h5") as file:
+        label, regime = file["attractor"][()], file["regime"][()]
+        of_label = dict(zip(file["catalogue/attractor"][()], file["catalogue/regime"][()], strict=True))
+    for place in zip(*np.nonzero(label), strict=True):
+        assert regime[place] == of_label[label[place]]
+
+
+@pytest.mark.parametrize("command", ["basin", "trajectory"])
+def test_a_pipe_is_not_replaced(separatrix, tmp_path, command):
+    write_case(tmp_path)
+    pipe = tmp_path / "pipe.h5"
+    os.mkfifo(pipe)
+    outcome = run(separatrix, command, "case.toml", "-o", "pipe.h5", "--force", folder=tmp_path)
+    assert (outcome.code, outcome.out) == (73, "")
+    assert "'pipe.h5'" in outcome.err
+    assert pipe.is_fifo()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["case.toml", "pipe.h5"]
+
+
+def test_the_figures_of_a_plane_say_where_its_motions_start(results):
+    style = pytest.importorskip("separatrix.style")
+    from separatrix import basin, open_result
+
+    captions = {}
+    for kind in ("map", "stack", "plane"):
+        with style.context(), open_result(results[kind]) as result:
+            captions[kind] = basin.basin_map(results[kind], result, "regime", "title").separatrix_caption
+    assert "$x_0$ = 0.4 m, $v_0$ = 0 m/s" in captions["plane"]
+    assert "$x_0$" not in captions["map"]
+    assert r"$\Omega_p/\omega$ = 1.2" in captions["map"]
+    for kind in ("stack", "plane"):
+        assert r"$\Omega_p/\omega$" not in captions[kind]
+    assert r"$\mu" not in captions["plane"]
