@@ -43,7 +43,7 @@ install_packages() {
   echo "bootstrap: installing ${missing[*]}"
   "${as_root[@]}" apt-get update -qq || fail "apt-get update failed"
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get install -y -qq --no-install-recommends "${missing[@]}" ||
+    apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "${missing[@]}" > /dev/null ||
     fail "apt-get could not install: ${missing[*]}"
 }
 

@@ -284,7 +284,7 @@ contains
       '  --validate         checks the case and stops'//nl// &
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &
       '  --force            replaces an existing output'//nl// &
-      '  --resume           goes on with a run that was stopped or killed'//nl// &
+      '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --json             log as JSON lines'//nl// &

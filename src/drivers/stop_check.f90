@@ -27,7 +27,10 @@ contains
     stop_now = signal_count() > 0
     elapsed = monotonic_seconds() - journal%started
     if (time_limit > 0) stop_now = stop_now .or. elapsed >= time_limit
-    if (stop_now) call fail(error, exit_resumable, 'stopped while '//doing//'; nothing was written yet, start again')
+    if (stop_now) then
+      call fail(error, exit_resumable, 'stopped while '//doing//'; nothing was written yet, the same command '// &
+                'starts again')
+    end if
   end subroutine check_stop
 
 end module stop_check

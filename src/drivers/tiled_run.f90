@@ -5,6 +5,7 @@
 module tiled_run
   use command_line, only: command_t
   use errors, only: error_t
+  use files, only: file_exists
   use journal, only: duration_text
   use kinds, only: int64, wp
   use map_file, only: create_working, map_file_t, open_working, working_path
@@ -54,7 +55,8 @@ module tiled_run
 
 contains
 
-  !> Opens the working file: a new one, or with --resume that of the interrupted run. Ends the program on errors.
+  !> Opens the working file: with --resume that of the interrupted run if there is one, else a new one. Ends the program
+  !> on errors.
   subroutine open_tiles(session, path, schema, grid, tile_shape, file)
     type(session_t), intent(inout) :: session
     character(len=*), intent(in) :: path
@@ -63,7 +65,12 @@ contains
     integer, intent(in) :: tile_shape(:)
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable :: error
-    if (session%command%resume) then
+    integer :: found
+    ! Rank 0 decides, before it creates what the others would see.
+    found = 0
+    if (file_exists(working_path(path))) found = 1
+    call session%team%broadcast(found)
+    if (session%command%resume .and. found == 1) then
       call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
     else
       call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
@@ -80,31 +87,31 @@ contains
     logical, intent(out) :: complete
     class(scheduler_t), allocatable :: scheduler
     type(error_t), allocatable :: error
-    integer, allocatable :: todo(:)
+    integer, allocatable :: unfinished(:)
     integer(int64) :: total, before, computed(1)
     integer :: tile, position
     logical :: whole
-    todo = pack([(tile, tile=1, file%tile_count())], [(.not. file%tile_done(tile), tile=1, file%tile_count())])
+    unfinished = pack([(tile, tile=1, file%tile_count())], [(.not. file%tile_done(tile), tile=1, file%tile_count())])
     total = product(file%tiling%lengths)
     before = note_earlier(session, file, work)
-    if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(todo))// &
+    if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(unfinished))// &
       ' of '//to_text(file%tile_count())//' tiles were done before')
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node), &
                         scheduler, error)
-    if (.not. allocated(error)) call scheduler%start(size(todo), error)
+    if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
     call session%stop_if(error)
     computed = 0
     call session%journal%begin('points', total, before)
     do
       call scheduler%next(position)
       if (position == 0) exit
-      call run_tile(session, file, work, todo(position), scheduler, total, before, size(todo), whole)
+      call run_tile(session, file, work, unfinished(position), scheduler, total, before, size(unfinished), whole)
       if (.not. whole) exit
       computed = computed + 1
     end do
     call scheduler%finish()
     call session%team%sum(computed)
-    complete = computed(1) == size(todo)
+    complete = computed(1) == size(unfinished)
   end subroutine run_tiles
 
   !> What the start, the catalogue and the sweep have left of the time limit; 0 = no limit.
@@ -115,11 +122,11 @@ contains
   end function time_left
 
   !> One tile; left unwritten if a stop is requested on the way.
-  subroutine run_tile(session, file, work, tile, scheduler, total, before, todo, whole)
+  subroutine run_tile(session, file, work, tile, scheduler, total, before, unfinished, whole)
     type(session_t), intent(inout) :: session
     type(map_file_t), intent(inout) :: file
     class(point_work_t), intent(inout) :: work
-    integer, intent(in) :: tile, todo
+    integer, intent(in) :: tile, unfinished
     class(scheduler_t), intent(inout) :: scheduler
     integer(int64), intent(in) :: total, before
     logical, intent(out) :: whole
@@ -141,7 +148,7 @@ contains
         return
       end if
       if (.not. session%journal%active) cycle
-      done = before + nint(real(total - before, wp)*scheduler%done_count()/max(todo, 1), int64)
+      done = before + nint(real(total - before, wp)*scheduler%done_count()/max(unfinished, 1), int64)
       call session%journal%progress(done)
     end do
     call file%write_tile(tile, values, error)

@@ -5,7 +5,7 @@
 module output_check
   use errors, only: error_t, fail
   use files, only: check_folder, file_exists, is_special
-  use status, only: exit_cannot_create, exit_no_input
+  use status, only: exit_cannot_create
   implicit none
   private
 
@@ -71,12 +71,11 @@ contains
       ''' of an interrupted run exists; --resume continues it, --force begins again')
   end subroutine check_create
 
-  !> Code 66 unless there is a working file to go on with.
+  !> Without a working file to go on with a run begins anew: then code 73 unless `path` can be created.
   subroutine check_resume(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    if (.not. file_exists(working_path(path))) call fail(error, exit_no_input, 'there is nothing to resume: no file '''// &
-                                                         working_path(path)//'''')
+    if (.not. file_exists(working_path(path))) call check_result(path, .false., error)
   end subroutine check_resume
 
   !> The name of the working file of the final file `path`.
