@@ -106,93 +106,84 @@ contains
     call set_response(moving%flow, flow)
   end subroutine prepare_lanes
 
-  !> Periodic response of y'' +
-2 g y' + w^2 y = sum f_cos cos + f_sin sin; not available at resonance. pure subroutine
-  set_response(from, flow) type(flow_t),
-  intent(in)::from type(lane_flow_t), intent(inout)::flow real(wp)::w, stiff, drag,
-  size_squared integer::n flow % machine
-  % harmonics = from % harmonics do n = 1,
-  from % harmonics w =
-  n *from % drive_frequency stiff =
-  (from % natural - w) * (from % natural + w) drag =
-2 *from % decay *w size_squared =
-  stiff * *2 + drag *
-  *2 if (size_squared * largest_amplification * *2 <
-  from % natural * *4) then flow
-  % available =
-  .false.return end
-  if associate (cosine = > (stiff * from % f_cos(n) - drag * from % f_sin(n)) /
-  size_squared,
-  &sine = > (stiff * from % f_sin(n) + drag * from % f_cos(n)) /
-  size_squared) flow
-  % machine %
-  cosine(n) = cosine flow % machine %
-  sine(n) = sine flow % machine
-  % bound_periodic = flow % machine % bound_periodic +
-  sqrt(cosine * *2 + sine * *2) * w *
-  *7 end associate end
-  do end subroutine set_response
+  !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin; not available at resonance.
+  pure subroutine set_response(from, flow)
+    type(flow_t), intent(in) :: from
+    type(lane_flow_t), intent(inout) :: flow
+    real(wp) :: w, stiff, drag, size_squared
+    integer :: n
+    flow%machine%harmonics = from%harmonics
+    do n = 1, from%harmonics
+      w = n*from%drive_frequency
+      stiff = (from%natural - w)*(from%natural + w)
+      drag = 2*from%decay*w
+      size_squared = stiff**2 + drag**2
+      if (size_squared*largest_amplification**2 < from%natural**4) then
+        flow%available = .false.
+        return
+      end if
+      associate (cosine => (stiff*from%f_cos(n) - drag*from%f_sin(n))/size_squared, &
+                 sine => (stiff*from%f_sin(n) + drag*from%f_cos(n))/size_squared)
+        flow%machine%cosine(n) = cosine
+        flow%machine%sine(n) = sine
+        flow%machine%bound_periodic = flow%machine%bound_periodic + sqrt(cosine**2 + sine**2)*w**7
+      end associate
+    end do
+  end subroutine set_response
 
-    !>
-    Puts a slipping body into a lane,
-    which will fly it until `until` [s after the section]. `new`
-    : without memory of flights before.pure subroutine occupy_lane(flow, lane, state, until, new, batch)
-    type(lane_flow_t),
-    intent(in)::flow integer, intent(in)::lane type(state_t), intent(in)::state real(wp),
-    intent(in)::until logical, intent(in)::new type(lane_batch_t),
-    intent(inout)::batch batch % status(lane) =
-    lane_fresh batch
-    % until(lane) = until batch % time(lane) =
-    state % time batch %
-    x(lane) = state % x batch
-    % v(lane) =
-    state % v batch
-    % direction(lane) =
-    merge(1.0_wp, -1.0_wp,
-    state % mode ==
-    mode_slip_plus) if (.not.new) return batch
-    % up_span(lane) = 0.4_wp * flow % machine % period batch %
-    down_span(lane) =
-    0.4_wp * flow
-    % machine
-    % period batch
-    % up_hits(lane) =
-0   batch % down_hits(lane) =
-0 end subroutine occupy_lane
+  !> Puts a slipping body into a lane, which will fly it until `until` [s after the section]. `new`: without memory of
+  !> flights before.
+  pure subroutine occupy_lane(flow, lane, state, until, new, batch)
+    type(lane_flow_t), intent(in) :: flow
+    integer, intent(in) :: lane
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: until
+    logical, intent(in) :: new
+    type(lane_batch_t), intent(inout) :: batch
+    batch%status(lane) = lane_fresh
+    batch%until(lane) = until
+    batch%time(lane) = state%time
+    batch%x(lane) = state%x
+    batch%v(lane) = state%v
+    batch%direction(lane) = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
+    if (.not. new) return
+    batch%up_span(lane) = 0.4_wp*flow%machine%period
+    batch%down_span(lane) = 0.4_wp*flow%machine%period
+    batch%up_hits(lane) = 0
+    batch%down_hits(lane) = 0
+  end subroutine occupy_lane
 
-  !> The body in a lane
-  : where it stopped,
-  or at the start of the flight that is left to the event loop.pure function lane_state(batch, lane)
-  result(state) type(lane_batch_t),
-  intent(in)::batch integer,
-  intent(in)::lane
-  type(state_t)::state state = state_t(x = batch % x(lane), v = batch % v(lane),
-  time = batch % time(lane),
-  mode = mode_slip_plus) if (batch % direction(lane) < 0) state
-  % mode = mode_slip_minus end function lane_state
+  !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop.
+  pure function lane_state(batch, lane) result(state)
+    type(lane_batch_t), intent(in) :: batch
+    integer, intent(in) :: lane
+    type(state_t) :: state
+    state = state_t(x=batch%x(lane), v=batch%v(lane), time=batch%time(lane), mode=mode_slip_plus)
+    if (batch%direction(lane) < 0) state%mode = mode_slip_minus
+  end function lane_state
 
-  !> Moves what a lane has counted to a tally.pure subroutine
-  take_counts(batch, lane, tally) type(lane_batch_t),
-  intent(inout)::batch integer, intent(in)::lane type(tally_t),
-  intent(inout)::tally tally % events =
-  tally % events + int(batch % flights(lane), kind(tally % events)) tally % slips =
-  tally % slips + int(batch % flights(lane), kind(tally % slips)) tally % impacts =
-  tally % impacts + int(batch % impacts(lane), kind(tally % impacts)) tally
-  % impact_speed_sum =
-  tally % impact_speed_sum
-  + batch % speed_sum(lane) if (batch % impacts(lane) > 0) tally % last_impact_speed =
-  batch % last_speed(lane) tally % grazing_margin =
-  min(tally % grazing_margin, batch % margin(lane)) batch % flights(lane) =
-0 batch % impacts(lane) =
-0 batch % speed_sum(lane) =
-0 batch % margin(lane) =
-  huge(1.0_wp) end subroutine take_counts
+  !> Moves what a lane has counted to a tally.
+  pure subroutine take_counts(batch, lane, tally)
+    type(lane_batch_t), intent(inout) :: batch
+    integer, intent(in) :: lane
+    type(tally_t), intent(inout) :: tally
+    tally%events = tally%events + int(batch%flights(lane), kind(tally%events))
+    tally%slips = tally%slips + int(batch%flights(lane), kind(tally%slips))
+    tally%impacts = tally%impacts + int(batch%impacts(lane), kind(tally%impacts))
+    tally%impact_speed_sum = tally%impact_speed_sum + batch%speed_sum(lane)
+    if (batch%impacts(lane) > 0) tally%last_impact_speed = batch%last_speed(lane)
+    tally%grazing_margin = min(tally%grazing_margin, batch%margin(lane))
+    batch%flights(lane) = 0
+    batch%impacts(lane) = 0
+    batch%speed_sum(lane) = 0
+    batch%margin(lane) = huge(1.0_wp)
+  end subroutine take_counts
 
-  !> Flies every occupied lane until it has stopped
-  or is left to the event loop.pure subroutine
-  fly_lanes(flow, batch) type(lane_flow_t),
-  intent(in)::flow type(lane_batch_t),
-  intent(inout)::batch call separatrix_fly_lanes(int(flow % width, c_int), flow % machine, batch)
-end subroutine fly_lanes
+  !> Flies every occupied lane until it has stopped or is left to the event loop.
+  pure subroutine fly_lanes(flow, batch)
+    type(lane_flow_t), intent(in) :: flow
+    type(lane_batch_t), intent(inout) :: batch
+    call separatrix_fly_lanes(int(flow%width, c_int), flow%machine, batch)
+  end subroutine fly_lanes
 
 end module lanes
