@@ -110,6 +110,7 @@ contains
            line('step', to_text(refine%step))// &
            line('block', to_text(refine%block))// &
            line('contrast', to_text(refine%contrast))// &
+           line('contrast_side', to_text(refine%contrast_side))// &
            line('probes', to_text(refine%probes))// &
            line('seed', to_text(refine%seed))
   end function refine_text

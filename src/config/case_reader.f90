@@ -121,8 +121,9 @@ contains
     call enter_table(source, 'refine', the_case%refine%active)
     associate (refine => the_case%refine)
       call take_integer(source, 'refine.step', 2, refine%step, highest=largest_step)
-      call take_integer(source, 'refine.block', 2, refine%block, highest=largest_block)
+      call take_integer(source, 'refine.block', 0, refine%block, highest=largest_block)
       call take_real(source, 'refine.contrast', more_than(0.0_wp, '1'), refine%contrast)
+      call take_integer(source, 'refine.contrast_side', 1, refine%contrast_side)
       call take_integer(source, 'refine.probes', 1, refine%probes, highest=most_probes)
       call take_integer(source, 'refine.seed', 0, refine%seed)
     end associate

@@ -17,9 +17,9 @@ module basin_driver
   use kinds, only: int64, wp
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
-  use refinement, only: last_origin
+  use refinement, only: automatic_block, last_origin
   use refinement_report, only: add_refinement, report_refinement
-  use refined_tile, only: pilot_share
+  use refined_tile, only: layers_of, pilot_share
   use session, only: describe_file, open_session, session_t
   use status, only: last_reason, exit_done, reason_names, reason_settled
   use text, only: to_text
@@ -123,6 +123,8 @@ contains
     type(basin_work_t), intent(inout) :: work
     work%refine = the_case%refine
     work%refined_axes = two_axes(work%grid)
+    work%refine%block = automatic_block(work%refine, work%grid%shape(work%refined_axes), layers_of(work%grid%shape, &
+                                                                                                   work%refined_axes))
     work%marks = marks_of_attractor
   end subroutine prepare_refinement
 

@@ -11,7 +11,7 @@ module refined_tile
   implicit none
   private
 
-  public :: refine_tile, pilot_share
+  public :: refine_tile, pilot_share, layers_of
 
   !> Blocks from which a dry run estimates the work, and the time after which it is content with those it has [s].
   integer, parameter :: pilot_blocks = 16
@@ -106,6 +106,12 @@ contains
     seconds = (monotonic_seconds() - start)/points
     share = real(work%computed, wp)/points
   end subroutine pilot_share
+
+  !> Planes of a map of `lengths` above each other.
+  pure integer(int64) function layers_of(lengths, axes) result(layers)
+    integer, intent(in) :: lengths(:), axes(2)
+    layers = product(int(lengths, int64))/product(int(lengths(axes), int64))
+  end function layers_of
 
   !> Number of a block's place on the axes that are not refined, the last one fastest.
   pure integer(int64) function layer_of(axes, lengths, place) result(layer)

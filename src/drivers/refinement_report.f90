@@ -6,6 +6,7 @@ module refinement_report
   use kinds, only: int64, wp
   use map_schema, only: schema_t
   use point_work, only: point_work_t
+  use refined_tile, only: layers_of
   use refinement, only: last_origin, origin_agreed, origin_computed, origin_contradicted, probes_drawn, wrong_share_factor
   use session, only: session_t
   use statistics, only: share_upper_limit
@@ -34,7 +35,7 @@ contains
     class(point_work_t), intent(in) :: work
     integer, intent(in) :: lengths(:)
     associate (axes => work%refined_axes)
-      drawn = probes_drawn(work%refine, lengths(axes), product(int(lengths, int64))/product(int(lengths(axes), int64)))
+      drawn = probes_drawn(work%refine, lengths(axes), layers_of(lengths, axes))
     end associate
   end function drawn
 

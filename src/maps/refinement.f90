@@ -10,18 +10,20 @@ module refinement
   implicit none
   private
 
-  public :: open_block, next_points, learn_points, block_content, probes_drawn, wrong_share_factor
+  public :: automatic_block, open_block, next_points, learn_points, block_content, probes_drawn, wrong_share_factor
 
   !> What the settings may be.
   integer, parameter, public :: largest_step = 256, largest_block = 2048, most_probes = 256
 
   type, public :: refine_t
     logical :: active = .false.
-    !> Points from one line of the coarse lattice to the next, and points of a side of a block, a multiple of them.
-    integer :: step = 16, block = 256
-    !> A cell is also divided where settling takes longer at one of its points than at another by more than this
-    !> [drive periods].
+    !> Points from one line of the coarse lattice to the next, and points of a side of a block, a multiple of them; 0 =
+    !> automatic.
+    integer :: step = 16, block = 0
+    !> A cell with a longer side than `contrast_side` points is also divided where settling takes longer at one of its
+    !> points than at another by more than `contrast` [drive periods].
     real(wp) :: contrast = 1.5_wp
+    integer :: contrast_side = 4
     !> Random points per cell of the coarse lattice that are computed to look for what was missed.
     integer :: probes = 1
     integer :: seed = 1
@@ -37,13 +39,18 @@ module refinement
   !> Stands for what is not known in the least and largest of a cell.
   integer, parameter :: unknown = huge(1)
 
+  !> An automatic block has a side of so many steps, or fewer where the map would have too few blocks to share out.
+  integer, parameter :: largest_automatic = 32, smallest_automatic = 4, enough_blocks = 64
+
   !> What a block asks for next. The repair goes on dividing with what the probes found.
   integer, parameter :: stage_lattice = 0, stage_division = 1, stage_probes = 2, stage_repair = 3
 
   type, public :: block_t
     type(refine_t) :: settings
-    !> First and last point of the block, and of it with the cells around it from which its boundaries may come in.
+    !> First and last point of the block, and of it with the first lines of the blocks behind it.
     integer :: own(2, 2) = 0, region(2, 2) = 0
+    !> Sides of the region beyond which the map goes on.
+    logical :: framed(2, 2) = .false.
     !> The probes of the map's cells have numbers of their own: that of the first cell, and cells along the second axis.
     integer(int64) :: first_cell = 0, cells_along = 0
     !> Kinds of points found so far: (values, kinds).
@@ -60,6 +67,19 @@ module refinement
 
 contains
 
+  !> Side of a block where the settings leave it open: long, because the lines between blocks are computed.
+  pure integer function automatic_block(settings, lengths, layers) result(side)
+    type(refine_t), intent(in) :: settings
+    integer, intent(in) :: lengths(2)
+    integer(int64), intent(in) :: layers
+    side = settings%block
+    if (side > 0) return
+    side = largest_automatic*settings%step
+    do while (side > smallest_automatic*settings%step .and. layers*product((int(lengths, int64) - 1)/side + 1) < enough_blocks)
+      side = side/2
+    end do
+  end function automatic_block
+
   !> A block that begins at `lower` (from 0, a multiple of its side) of a map of `lengths` points. `layer` (from 0)
   !> numbers maps that lie above each other along further axes.
   pure subroutine open_block(settings, lengths, lower, layer, block)
@@ -70,8 +90,10 @@ contains
     block%settings = settings
     block%own(1, :) = lower
     block%own(2, :) = min(lower + settings%block, lengths) - 1
-    block%region(1, :) = max(lower - settings%step, 0)
-    block%region(2, :) = min(lower + settings%block + settings%step, lengths - 1)
+    block%region(1, :) = lower
+    block%region(2, :) = min(lower + settings%block, lengths - 1)
+    block%framed(1, :) = lower > 0
+    block%framed(2, :) = lower + settings%block < lengths
     block%cells_along = (lengths(2) - 1)/settings%step + 1
     block%first_cell = layer*cells_of(settings, lengths)
     associate (first => block%region(1, :), last => block%region(2, :))
@@ -178,6 +200,13 @@ contains
     along = lines(block%region(:, 1), block%settings%step)
     across = lines(block%region(:, 2), block%settings%step)
     wanted(along, across) = .true.
+    ! Two blocks know the whole line between them, so that no boundary crosses it unseen.
+    associate (first => block%region(1, :), last => block%region(2, :), framed => block%framed)
+      if (framed(1, 1)) wanted(first(1), :) = .true.
+      if (framed(2, 1)) wanted(last(1), :) = .true.
+      if (framed(1, 2)) wanted(:, first(2)) = .true.
+      if (framed(2, 2)) wanted(:, last(2)) = .true.
+    end associate
     ! An axis of one point has cells without width.
     if (size(along) == 1) along = [along, along]
     if (size(across) == 1) across = [across, across]
@@ -259,11 +288,12 @@ contains
         slowest = max(slowest, block%settling(a, b))
       end do
     end do
-    is_uniform = slowest - fastest <= block%settings%contrast
+    is_uniform = slowest - fastest <= block%settings%contrast .or. &
+                 max(cell(2) - cell(1), cell(4) - cell(3)) <= block%settings%contrast_side
   end function is_uniform
 
-  !> The probes of every cell of the coarse lattice that the region meets: uniform over the cell, the same whichever block
-  !> looks at it. What is known already, or lies beyond the region, needs no probe.
+  !> The probes of the cells of the coarse lattice, uniform over the cell. What is known already, or lies beyond the map,
+  !> needs no probe.
   pure subroutine draw_probes(block, wanted)
     type(block_t), intent(in) :: block
     logical, intent(inout), allocatable :: wanted(:, :)
