@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run a map refined and with every point computed, and compare the two point by point.
 
-    scripts/refine_check.py examples/basin_coulomb_refined.toml --set 'axis[1].count=1024' --set 'axis[2].count=1024'
+    scripts/refine_check.py examples/basin_coulomb_refined.toml --set 'axis[1].count=512'
 
 Ends with code 1 if a point differs.
 """

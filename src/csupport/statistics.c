@@ -7,8 +7,8 @@
 #include <math.h>
 #include <stdint.h>
 
-// Clopper-Pearson upper limit of a share of which `found` in `sample` were seen. The inverse of the incomplete beta
-// function in this library does not converge for some large samples, hence the bisection.
+// Clopper-Pearson upper limit of a share of which `found` in `sample` were seen. The inverse of the
+// incomplete beta function in this library does not converge for some large samples, hence the bisection.
 double separatrix_share_upper_limit(int64_t found, int64_t sample, double confidence) {
   if (sample <= 0 || found >= sample) {
     return 1.0;

@@ -74,7 +74,17 @@ def test_a_killed_run_goes_on_to_the_same_map(mpi_separatrix, tmp_path):
     write_case(tmp_path)
     # Long enough to be killed on the way.
     slow = ["--set", 'run.stop="duration"', "--set", "run.duration=60"]
-    command = [mpi_separatrix, "basin", "case.toml", *FINE, *slow, "--set", "refine.step=4", "--set", "refine.block=8"]
+    command = [
+        mpi_separatrix,
+        "basin",
+        "case.toml",
+        *FINE,
+        *slow,
+        "--set",
+        "refine.step=4",
+        "--set",
+        "refine.block=8",
+    ]
     succeed(*command, "-o", "whole.h5", folder=tmp_path, ranks=2)
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen([*command, "-o", "map.h5"], cwd=tmp_path, stdout=log, stderr=log)
@@ -100,7 +110,16 @@ def test_a_killed_run_goes_on_to_the_same_map(mpi_separatrix, tmp_path):
 def test_verify_counts_what_was_inferred_wrongly(separatrix, tmp_path):
     write_case(tmp_path)
     # The corners of the only cell have the same attractor, and a bay of another one lies between two of them.
-    bay = ["--set", "axis[1].to=0.6", "--set", "axis[2].to=3", "--set", "axis[1].count=65", "--set", "axis[2].count=65"]
+    bay = [
+        "--set",
+        "axis[1].to=0.6",
+        "--set",
+        "axis[2].to=3",
+        "--set",
+        "axis[1].count=65",
+        "--set",
+        "axis[2].count=65",
+    ]
     blind = ["--set", "refine.step=64", "--set", "refine.contrast=1e9", "--set", "refine.seed=1"]
     succeed(separatrix, "basin", "case.toml", *bay, "-o", "whole.h5", folder=tmp_path)
     succeed(separatrix, "basin", "case.toml", *bay, *blind, "-o", "refined.h5", folder=tmp_path)
