@@ -132,9 +132,10 @@ contains
     type(block_t), intent(inout) :: block
     integer, allocatable, intent(out) :: points(:, :)
     logical, allocatable :: wanted(:, :)
+    integer :: first(2)
     logical :: divided
-    associate (first => block%region(1, :), last => block%region(2, :))
-      allocate (wanted(first(1):last(1), first(2):last(2)), source=.false.)
+    associate (region => block%region)
+      allocate (wanted(region(1, 1):region(2, 1), region(1, 2):region(2, 2)), source=.false.)
     end associate
     if (block%stage == stage_lattice) then
       call lay_lattice(block, wanted)
@@ -150,7 +151,8 @@ contains
         exit
       end do
     end if
-    points = list_of(wanted, block%region(1, :))
+    first = block%region(1, :)
+    points = list_of(wanted, first)
     if (block%stage == stage_probes) block%expected = inferred_kinds(block, points)
   end subroutine next_points
 
