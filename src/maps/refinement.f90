@@ -36,11 +36,12 @@ module refinement
     'probe_contradicted', 'inferred_2', 'inferred_4', 'inferred_8', 'inferred_16', 'inferred_32', 'inferred_64', &
     'inferred_128', 'inferred_256']
 
-  !> Stands for what is not known in the least and largest of a cell.
+  !> Kind of a point that is not known.
   integer, parameter :: unknown = huge(1)
 
-  !> An automatic block has a side of so many steps, or fewer where the map would have too few blocks to share out.
-  integer, parameter :: largest_automatic = 32, smallest_automatic = 4, enough_blocks = 64
+  !> An automatic block has a side of so many steps, or fewer where it would be longer than so many points or the map
+  !> would have too few blocks to share out.
+  integer, parameter :: most_steps = 32, fewest_steps = 4, long_side = 512, enough_blocks = 64
 
   !> What a block asks for next. The repair goes on dividing with what the probes found.
   integer, parameter :: stage_lattice = 0, stage_division = 1, stage_probes = 2, stage_repair = 3
@@ -72,11 +73,15 @@ contains
     type(refine_t), intent(in) :: settings
     integer, intent(in) :: lengths(2)
     integer(int64), intent(in) :: layers
+    integer :: steps
     side = settings%block
     if (side > 0) return
-    side = largest_automatic*settings%step
-    do while (side > smallest_automatic*settings%step .and. layers*product((int(lengths, int64) - 1)/side + 1) < enough_blocks)
-      side = side/2
+    steps = most_steps
+    do
+      side = steps*settings%step
+      if (steps == fewest_steps) return
+      if (side <= long_side .and. layers*product((int(lengths, int64) - 1)/side + 1) >= enough_blocks) return
+      steps = steps/2
     end do
   end function automatic_block
 

@@ -112,24 +112,24 @@ def test_verify_counts_what_was_inferred_wrongly(separatrix, tmp_path):
     # The corners of the only cell have the same attractor, and a bay of another one lies between two of them.
     bay = [
         "--set",
-        "axis[1].to=0.6",
+        "axis[1].to=0.7",
         "--set",
-        "axis[2].to=3",
+        "axis[2].to=4",
         "--set",
         "axis[1].count=65",
         "--set",
         "axis[2].count=65",
     ]
-    blind = ["--set", "refine.step=64", "--set", "refine.contrast=1e9", "--set", "refine.seed=1"]
+    blind = ["--set", "refine.step=64", "--set", "refine.contrast=1e9", "--set", "refine.seed=2"]
     succeed(separatrix, "basin", "case.toml", *bay, "-o", "whole.h5", folder=tmp_path)
     succeed(separatrix, "basin", "case.toml", *bay, *blind, "-o", "refined.h5", folder=tmp_path)
     missed = wrong(tmp_path / "whole.h5", tmp_path / "refined.h5")
     with h5py.File(tmp_path / "refined.h5") as file:
         assert 0.01 < missed.mean() <= file["refinement"].attrs["wrong_share_upper_limit"]
-    text = succeed(separatrix, "verify", "refined.h5", "--sample", 60, "--json", folder=tmp_path).out
+    text = succeed(separatrix, "verify", "refined.h5", "--sample", 100, "--json", folder=tmp_path).out
     facts = json.loads(text)
     assert facts["differing"] == 0
-    assert 0 < facts["inferred_differing"] < facts["inferred"] <= 60
+    assert 0 < facts["inferred_differing"] < facts["inferred"] <= 100
 
 
 @pytest.mark.parametrize(
