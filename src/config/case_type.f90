@@ -6,6 +6,7 @@ module case_type
   use axis, only: axis_t
   use kinds, only: wp
   use law_table, only: families, law_choice_t
+  use refinement, only: refine_t
   implicit none
   private
 
@@ -83,6 +84,7 @@ module case_type
     type(axis_t), allocatable :: axes(:)
     !> Points of a tile along each axis, 0 = automatic.
     integer, allocatable :: tile(:)
+    type(refine_t) :: refine
     type(sweep_t) :: sweep
     type(trajectory_t) :: trajectory
   end type case_t

@@ -5,15 +5,16 @@
 module case_setup
   use axis, only: axis_t
   use case_type, only: case_t
-  use grid, only: grid_t, make_grid
+  use grid, only: grid_t, make_grid, two_axes
   use kinds, only: int64, wp
   use lanes, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
+  use refinement, only: refine_t
   use trajectory, only: span_t
   implicit none
   private
 
-  public :: options_of, span_of, grid_of, output_path, automatic_tile
+  public :: options_of, span_of, grid_of, output_path, automatic_tile, tile_of_blocks
 
   !> Doubles per vector, to try a narrower kernel than the processor allows (2, 4, 8). The results are the same.
   character(len=*), parameter :: width_variable = 'SEPARATRIX_LANE_WIDTH'
@@ -104,5 +105,18 @@ contains
       tile(i) = min(tile(i), grid%shape(i))
     end do
   end function automatic_tile
+
+  !> Tile shape of a refined map: whole blocks, one unless more are asked for.
+  pure function tile_of_blocks(grid, refine, asked) result(tile)
+    type(grid_t), intent(in) :: grid
+    type(refine_t), intent(in) :: refine
+    integer, intent(in) :: asked(:)
+    integer :: tile(size(grid%shape)), axes(2)
+    tile = 1
+    tile(:size(asked)) = max(1, asked)
+    axes = two_axes(grid)
+    tile(axes) = (tile(axes) + refine%block - 1)/refine%block*refine%block
+    tile = min(tile, grid%shape)
+  end function tile_of_blocks
 
 end module case_setup

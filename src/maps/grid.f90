@@ -14,7 +14,8 @@ module grid
   implicit none
   private
 
-  public :: make_grid, point_start, point_slice, slice_motion, slice_laws, slice_starts, slice_neighbours, machine_with
+  public :: make_grid, two_axes, point_start, point_slice, slice_motion, slice_laws, slice_period, slice_starts
+  public :: slice_neighbours, machine_with
 
   type, public :: grid_t
     type(axis_t), allocatable :: axes(:)
@@ -94,6 +95,29 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call machine_of(slice_laws(grid, slice), grid%options, moving, error)
   end subroutine slice_motion
+
+  !> Drive period of a slice's machine [s].
+  pure subroutine slice_period(grid, slice, period, error)
+    type(grid_t), intent(in) :: grid
+    integer(int64), intent(in) :: slice
+    real(wp), intent(out) :: period
+    type(error_t), allocatable, intent(out) :: error
+    type(oscillator_t) :: machine
+    period = 0
+    call build_oscillator(slice_laws(grid, slice), machine, error)
+    if (.not. allocated(error)) period = machine%period
+  end subroutine slice_period
+
+  !> The two axes along which a map is refined: of starts if there are as many, otherwise also of parameters, the first
+  !> ones first. 0 if there are no two.
+  pure function two_axes(grid) result(axes)
+    type(grid_t), intent(in) :: grid
+    integer :: axes(2), i
+    integer, allocatable :: starts(:), candidates(:)
+    starts = pack([(i, i=1, size(grid%axes))], [(any(grid%start_axis == i), i=1, size(grid%axes))])
+    candidates = [starts, grid%parameter_axes, 0, 0]
+    axes = [minval(candidates(:2)), maxval(candidates(:2))]
+  end function two_axes
 
   !> The laws of a slice's machine.
   pure function slice_laws(grid, slice) result(laws)
