@@ -44,14 +44,17 @@ class _Outcome(ctypes.Structure):
 # src/parallel: half of a node's fair share, 100 us between two looks
 SHARE = 0.5
 PAUSE = 100e-6
+# a message, and an answer of rank 0, on a usual cluster
+LATENCY = 5e-6
+SERVICE = 5e-6
 
 
 def setting(
     ranks: int,
     ranks_per_node: int,
     *,
-    latency: float = 5e-6,
-    service: float = 5e-6,
+    latency: float = LATENCY,
+    service: float = SERVICE,
     polls_per_tile: float = 1024,
     share: float = SHARE,
     seed: int = 1,

@@ -12,6 +12,9 @@ module case_setup
   implicit none
   private
 
+  !> Most tiles of a grid where the case leaves their shape open.
+  real(wp), parameter :: most_tiles = 2.0_wp**20
+
   public :: options_of, span_of, grid_of, output_path, automatic_tile
 
 contains
@@ -67,14 +70,17 @@ contains
     path = path//'.h5'
   end function output_path
 
-  !> Tile shape where the case leaves it open: about a thousand trajectories of one slice.
+  !> Tile shape where the case leaves it open: about a thousand trajectories of one slice, more on a grid that would have
+  !> more than `most_tiles`, because every rank keeps a list of the tiles.
   pure function automatic_tile(grid, asked) result(tile)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: asked(:)
     integer :: tile(size(grid%shape))
+    logical :: open(size(grid%shape))
     integer :: i, starts
     starts = count(grid%start_axis > 0)
     do i = 1, size(tile)
+      open(i) = any(grid%start_axis == i) .or. starts == 0
       if (any(grid%start_axis == i)) then
         tile(i) = max(1, nint(1024.0_wp**(1.0_wp/starts)))
       else if (starts == 0) then
@@ -83,9 +89,18 @@ contains
         tile(i) = 1
       end if
       if (i <= size(asked)) then
-        if (asked(i) > 0) tile(i) = asked(i)
+        if (asked(i) > 0) then
+          tile(i) = asked(i)
+          open(i) = .false.
+        end if
       end if
       tile(i) = min(tile(i), grid%shape(i))
+    end do
+    do while (product(ceiling(real(grid%shape, wp)/tile)*1.0_wp) > most_tiles)
+      open = open .and. tile < grid%shape
+      if (.not. any(open)) exit
+      i = minloc(tile, dim=1, mask=open)
+      tile(i) = min(2*tile(i), grid%shape(i))
     end do
   end function automatic_tile
 
