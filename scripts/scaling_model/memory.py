@@ -14,6 +14,9 @@ RANKS = 2
 BYTES_PER_POINT = 46
 """Of the working file, as docs/file-format.md says."""
 WORK_SECONDS = 2.0
+USUAL_TILE = 32
+COLUMNS = 4096
+"""From this length of a row on, the final file is packed by slabs of 2^20 values (src/io/slabs.f90)."""
 
 
 @dataclass
@@ -30,18 +33,26 @@ class Peak:
 class Memory:
     """Everything about memory."""
 
-    sizes: list[Peak]
-    """The same tiles, larger maps; the large ones stopped early."""
+    whole: list[Peak]
+    """Whole runs with the usual tiles."""
+    started: list[Peak]
+    """Larger maps, stopped early."""
     tiles: list[Peak]
-    """Whole runs with small tiles: more of them."""
+    """One map, stopped early, with smaller and smaller tiles."""
     catalogue: list[Peak]
     """More slices, each with attractors of its own."""
     entries: list[int]
     """Attractors in the catalogues of those."""
 
     @property
+    def growth(self) -> float:
+        """Largest over smallest peak, of whole runs and of stopped ones."""
+        groups = (self.whole, self.started)
+        return max(max(p.bytes for p in peaks) / min(p.bytes for p in peaks) for peaks in groups)
+
+    @property
     def bytes_per_tile(self) -> float:
-        """Growth of a whole run."""
+        """Growth with the number of tiles."""
         return slope(self.tiles[0].tiles, self.tiles[-1].tiles, self.tiles)
 
     @property
@@ -55,13 +66,13 @@ def slope(first: int, last: int, peaks: list[Peak]) -> float:
     return (peaks[-1].bytes - peaks[0].bytes) / (last - first)
 
 
-def square(program: Program, side: int, tile: int, *words: object) -> Peak:
-    """Peak of a square map."""
-    size = [word for axis in (1, 2) for word in ("--set", f"axis[{axis}].count={side}")]
-    value, path = program.peak(RANKS, CASE, *size, "--set", f"grid.tile=[{tile}, {tile}]", *words)
+def plane(program: Program, rows: int, columns: int, tile: int, *words: object) -> Peak:
+    """Peak of a map of rows x columns."""
+    axes = ("--set", f"axis[1].count={rows}", "--set", f"axis[2].count={columns}")
+    value, path = program.peak(RANKS, CASE, *axes, "--set", f"grid.tile=[{tile}, {tile}]", *words)
     clear(path)
     how = f"stopped after {WORK_SECONDS:g} s" if words else "whole run"
-    return Peak(how, side**2, (side // tile) ** 2, value)
+    return Peak(f"{rows} x {columns}, {how}", rows * columns, rows * columns // tile**2, value)
 
 
 def slices(program: Program, count: int) -> tuple[Peak, int]:
@@ -84,14 +95,15 @@ def clear(path: Path) -> None:
 
 
 def measure(program: Program, whole: tuple, started: tuple, tiles: tuple, counts: tuple) -> Memory:
-    """Sides of maps run as a whole, of maps stopped early, of maps with tiles of 4 x 4, numbers of slices."""
-    sizes = [square(program, side, 32) for side in whole]
+    """Rows of maps run as a whole, sides of maps stopped early, sides of tiles, numbers of slices."""
     free = shutil.disk_usage(program.folder).free
-    sizes += [
-        square(program, side, 32, "--time-limit", WORK_SECONDS)
-        for side in started
-        if free > 2 * BYTES_PER_POINT * side**2
-    ]
-    many = [square(program, side, 4) for side in tiles]
+    stop = ("--time-limit", WORK_SECONDS)
+    large = [side for side in started if free > 2 * BYTES_PER_POINT * side**2]
     catalogues = [slices(program, count) for count in counts]
-    return Memory(sizes, many, [peak for peak, _ in catalogues], [entries for _, entries in catalogues])
+    return Memory(
+        [plane(program, rows, COLUMNS, USUAL_TILE) for rows in whole],
+        [plane(program, side, side, USUAL_TILE, *stop) for side in large],
+        [plane(program, started[0], started[0], tile, *stop) for tile in tiles],
+        [peak for peak, _ in catalogues],
+        [entries for _, entries in catalogues],
+    )

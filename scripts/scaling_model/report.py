@@ -25,6 +25,8 @@ BAR_EFFICIENCY = 0.9
 BAR_MEMORY = 1.1
 """Largest over smallest peak that counts as constant."""
 MIB = 2**20
+MOST_TILES = 2**20
+"""Of src/drivers/case_setup.f90."""
 
 
 def table(header: list[str], rows: list[list[str]]) -> str:
@@ -172,9 +174,11 @@ def bar_table(results: Results) -> str:
     two = gain(results, 2, lambda run: run.wall)
     place = simulation.RANKS.index(simulation.MANY_RANKS)
     many = simulated.by_ranks[simulation.BAR_SPREAD][place]
-    peaks = [peak.bytes for peak in found.sizes]
-    ratio = max(peaks) / min(peaks)
-    sizes = found.sizes[-1].points / found.sizes[0].points
+    groups = [
+        f"{min(p.bytes for p in peaks) / MIB:.1f} to {max(p.bytes for p in peaks) / MIB:.1f} MiB from "
+        f"{number(peaks[0].points)} to {number(peaks[-1].points)} points ({how})"
+        for how, peaks in (("whole runs", found.whole), ("stopped early", found.started))
+    ]
     rows = [
         [
             "two ranks against one, whole program, map of very uneven cost",
@@ -197,9 +201,9 @@ def bar_table(results: Results) -> str:
         [
             "memory per rank",
             "constant in the map size",
-            f"{min(peaks) / MIB:.1f} to {max(peaks) / MIB:.1f} MiB over a factor {number(sizes)} in points; "
-            f"{found.bytes_per_tile:.0f} bytes for each further tile",
-            met[ratio <= BAR_MEMORY],
+            f"{groups[0]}, {groups[1]}; {found.bytes_per_tile:.0f} bytes for each tile, of which there are "
+            f"at most {number(MOST_TILES)} unless the case asks for more",
+            met[found.growth <= BAR_MEMORY],
         ],
     ]
     return table(["figure", "bar", "now", ""], rows)
@@ -260,8 +264,13 @@ def page(results: Results, quick: bool) -> str:
         questions=number(simulated.questions),
         queue=simulated.longest_queue,
         least=least or "more than " + str(max(simulation.CANDIDATES)),
-        least_points="" if least is None else number(least * simulation.MANY_RANKS * 1024 / 1e6),
-        sizes=memory_table(found.sizes),
+        least_points=""
+        if least is None
+        else number(least * simulation.MANY_RANKS * simulation.TRAJECTORIES_PER_TILE / 1e6),
+        whole=memory_table(found.whole),
+        started=memory_table(found.started),
+        most_tiles=number(MOST_TILES),
+        tile_list=f"{found.bytes_per_tile * MOST_TILES / MIB:.0f}",
         many_tiles=memory_table(found.tiles),
         catalogues=memory_table(found.catalogue, found.entries),
         per_tile=f"{found.bytes_per_tile:.0f}",

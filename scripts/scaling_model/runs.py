@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs of the program and of the bare scheduler on the ranks of this machine."""
 
-import os
 import subprocess
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,12 @@ import numpy as np
 SOURCE = Path(__file__).resolve().parents[2]
 CASE = SOURCE / "examples" / "basin_ratio_stack.toml"
 STOPPED = 75
+# A process starts with the peak of the one that forked it, so a small one stands between.
+LARGEST_CHILD = """
+import resource, subprocess, sys
+code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+print(code, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
 RATIOS = (0.7, 1.5)
 X0_COUNT = 48
 TILE = 16
@@ -71,18 +77,22 @@ class Program:
         text = subprocess.run([self.program, "--version"], capture_output=True, text=True, check=True).stdout
         self.version = dict(line.split(" ", 1) for line in text.splitlines())
 
-    def start(self, ranks: int, name: str, case: Path, *words: object) -> tuple[subprocess.Popen, Path]:
-        """Start a basin map under mpirun."""
+    def command(self, ranks: int, name: str, case: Path, *words: object) -> tuple[list[str], Path]:
+        """Return the command of a basin map under mpirun, and its file."""
         path = self.folder / f"{name}.h5"
         command = ["mpirun", "-n", ranks, self.program, "basin", case, "-o", path, "--force", "-q", *words]
+        return [str(word) for word in command], path
+
+    def start(self, ranks: int, name: str, case: Path, *words: object) -> subprocess.Popen:
+        """Start a basin map under mpirun."""
         quiet = subprocess.DEVNULL
-        return subprocess.Popen([str(word) for word in command], stdout=quiet, stderr=quiet), path
+        return subprocess.Popen(self.command(ranks, name, case, *words)[0], stdout=quiet, stderr=quiet)
 
     def uneven(self, ranks: int, ratios: int, v0_count: int, *words: object) -> Run:
         """Run the map of very uneven cost with a table of its tiles."""
         table = self.folder / "tiles.csv"
         began = time.perf_counter()
-        process, _ = self.start(
+        process = self.start(
             ranks, "uneven", CASE, *uneven_map(ratios, v0_count), "--tile-times", table, *words
         )
         if process.wait() != 0:
@@ -97,7 +107,7 @@ class Program:
         """Seconds that so many maps take, each on one rank, all at once."""
         began = time.perf_counter()
         words = uneven_map(ratios, v0_count)
-        processes = [self.start(1, f"copy_{number}", CASE, *words)[0] for number in range(count)]
+        processes = [self.start(1, f"copy_{number}", CASE, *words) for number in range(count)]
         for process in processes:
             if process.wait() != 0:
                 raise RuntimeError(f"a copy ended with code {process.returncode}")
@@ -105,12 +115,12 @@ class Program:
 
     def peak(self, ranks: int, case: Path, *words: object) -> tuple[int, Path]:
         """Bytes of the largest process of a map, which may stop early, and its file."""
-        process, path = self.start(ranks, "memory", case, *words)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode not in (0, STOPPED):
-            raise RuntimeError(f"the map ended with code {process.returncode}")
-        return usage.ru_maxrss * 1024, path
+        command, path = self.command(ranks, "memory", case, *words)
+        counted = [sys.executable, "-S", "-c", LARGEST_CHILD, *command]
+        code, kilobytes = subprocess.run(counted, capture_output=True, text=True, check=True).stdout.split()
+        if int(code) not in (0, STOPPED):
+            raise RuntimeError(f"the map ended with code {code}")
+        return int(kilobytes) * 1024, path
 
     def replay(self, ranks: int, per_node: int, costs: np.ndarray, polls: int) -> Replay:
         """Let the bare scheduler hand out tiles of these costs to ranks that sleep instead of computing."""

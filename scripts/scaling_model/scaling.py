@@ -9,11 +9,11 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import memory
 import numpy as np
 import plots
 import report
 from costs import stretched
+from memory import Memory, measure
 from model import Model, setting
 from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
 from simulation import TRAJECTORIES_PER_TILE, Simulated, Simulation
@@ -31,13 +31,15 @@ class Sizes:
     seconds: float = 20.0
     """Of the map on one rank."""
     replay_seconds: float = 20.0
-    whole: tuple[int, ...] = (128, 256, 512, 1024)
+    whole: tuple[int, ...] = (256, 1024)
+    """Rows of maps run as a whole."""
     started: tuple[int, ...] = (2048, 4096, 8192)
-    tiles: tuple[int, ...] = (128, 256, 512)
+    tiles: tuple[int, ...] = (32, 8, 4, 2)
+    """Sides, on the first of the maps stopped early."""
     slices: tuple[int, ...] = (128, 4096)
 
 
-QUICK = Sizes(1, 21, 4.0, 8.0, (128, 512), (2048,), (128, 256), (128, 1024))
+QUICK = Sizes(1, 21, 4.0, 8.0, (256, 512), (2048, 4096), (32, 4), (128, 1024))
 
 
 @dataclass
@@ -63,7 +65,7 @@ class Results:
     copies: dict[int, list[float]] = field(default_factory=dict)
     checks: list[Check] = field(default_factory=list)
     simulated: Simulated | None = None
-    memory: memory.Memory | None = None
+    memory: Memory | None = None
     version: dict[str, str] = field(default_factory=dict)
     load: tuple[float, float] = (0.0, 0.0)
     seconds: float = 0.0
@@ -153,7 +155,7 @@ def main() -> None:
         results.simulated = Simulation(model, base.costs, mean).everything(BAR)
         say("memory")
         sizes = results.sizes
-        results.memory = memory.measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)
+        results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)
         results.load = before, os.getloadavg()[0]
     results.seconds = time.perf_counter() - began
     plots.draw(options.output.parent / "figures", results.simulated, base, results.sizes.ratios, BAR)

@@ -17,11 +17,11 @@ struct event {
 };
 
 struct node {
-  long next, last; /* positions in the pool, from 0; empty if last < next */
+  long next, last;             /* positions in the pool, from 0; empty if last < next */
   long block_next, block_last; /* the block under way */
-  int first, size; /* its ranks */
-  int asker; /* the rank that refills, -1: none */
-  int waiting; /* head of the list of ranks that wait for the refill, -1: none */
+  int first, size;             /* its ranks */
+  int asker;                   /* the rank that refills, -1: none */
+  int waiting;                 /* head of the list of ranks that wait for the refill, -1: none */
   int exhausted;
 };
 
@@ -72,9 +72,12 @@ static struct event pop(struct model *m) {
   long i = 0;
   for (;;) {
     long child = 2 * i + 1;
-    if (child >= m->events) break;
-    if (child + 1 < m->events && m->heap[child + 1].time < m->heap[child].time) child++;
-    if (m->heap[child].time >= last.time) break;
+    if (child >= m->events)
+      break;
+    if (child + 1 < m->events && m->heap[child + 1].time < m->heap[child].time)
+      child++;
+    if (m->heap[child].time >= last.time)
+      break;
     m->heap[i] = m->heap[child];
     i = child;
   }
@@ -85,8 +88,10 @@ static struct event pop(struct model *m) {
 /* As mpi_node%take: up to one position, or the share of what is left if that is more. */
 static long take(struct node *pool, double share, long *first) {
   long left = pool->last - pool->next + 1, count = (long)((double)left * share);
-  if (count < 1) count = 1;
-  if (count > left) count = left;
+  if (count < 1)
+    count = 1;
+  if (count > left)
+    count = left;
   *first = pool->next;
   pool->next += count;
   return count;
@@ -96,7 +101,8 @@ static double pause_end(struct model *m, double time) { return time + m->setting
 
 /* Rank 0 looks between two trajectories of its tile, and every pause once it has no tile. */
 static void plan_poll(struct model *m, double time) {
-  if (m->poll_due || m->queued == 0) return;
+  if (m->poll_due || m->queued == 0)
+    return;
   double when;
   if (time < m->serving_until) {
     when = m->serving_until;
@@ -105,7 +111,8 @@ static void plan_poll(struct model *m, double time) {
   } else {
     double gap = m->root_cost / m->setting->polls_per_tile;
     when = m->root_begin + gap * ceil((time - m->root_begin) / gap);
-    if (when < time) when = time;
+    if (when < time)
+      when = time;
   }
   m->poll_due = 1;
   push(m, when, POLL, 0);
@@ -166,11 +173,13 @@ static void serve(struct model *m, double time) {
     node->block_last += node->block_next - 1;
     push(m, now + m->setting->latency, REPLY, m->queue[i]);
   }
-  if (m->queued > m->outcome->longest_queue) m->outcome->longest_queue = m->queued;
+  if (m->queued > m->outcome->longest_queue)
+    m->outcome->longest_queue = m->queued;
   m->queued = 0;
   m->serving_until = now;
   m->outcome->service += now - time;
-  if (!m->root_idle) m->root_begin += now - time;
+  if (!m->root_idle)
+    m->root_begin += now - time;
 }
 
 /* A block is there: the pool is filled, those who wait look again at the end of their pause. */
@@ -178,12 +187,14 @@ static void refill(struct model *m, double time, int number) {
   struct node *node = &m->nodes[number];
   int rank = node->asker;
   time = pause_end(m, time);
-  if (node->block_last < node->block_next) node->exhausted = 1;
+  if (node->block_last < node->block_next)
+    node->exhausted = 1;
   node->next = node->block_next;
   node->last = node->block_last;
   node->asker = -1;
   push(m, time, FREE, rank);
-  for (rank = node->waiting; rank >= 0; rank = m->next_waiting[rank]) push(m, pause_end(m, time), FREE, rank);
+  for (rank = node->waiting; rank >= 0; rank = m->next_waiting[rank])
+    push(m, pause_end(m, time), FREE, rank);
   node->waiting = -1;
 }
 
@@ -196,7 +207,8 @@ static int set_up(struct model *m, long tiles) {
   m->next_waiting = calloc((size_t)ranks, sizeof *m->next_waiting);
   m->queue = calloc((size_t)nodes, sizeof *m->queue);
   m->heap = calloc((size_t)m->room, sizeof *m->heap);
-  if (!m->nodes || !m->node_of || !m->next_waiting || !m->queue || !m->heap) return 1;
+  if (!m->nodes || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
+    return 1;
   for (int i = 0; i < nodes; i++) {
     int first = i * per_node, size = per_node < ranks - first ? per_node : ranks - first;
     m->nodes[i] = (struct node){.last = -1, .first = first, .size = size, .asker = -1, .waiting = -1};
@@ -209,24 +221,25 @@ static int set_up(struct model *m, long tiles) {
   return m->failed;
 }
 
-int simulate(const struct scheduler_setting *setting, long tiles, const double *cost, struct outcome *outcome) {
+int simulate(const struct scheduler_setting *setting, long tiles, const double *cost,
+             struct outcome *outcome) {
   struct model m = {.setting = setting, .cost = cost, .outcome = outcome, .random = setting->seed};
   int status = set_up(&m, tiles);
   while (!status && m.events > 0) {
     struct event event = pop(&m);
     switch (event.kind) {
-      case FREE:
-        rank_free(&m, event.time, event.who);
-        break;
-      case ARRIVE:
-        m.queue[m.queued++] = event.who;
-        break;
-      case POLL:
-        serve(&m, event.time);
-        break;
-      case REPLY:
-        refill(&m, event.time, event.who);
-        break;
+    case FREE:
+      rank_free(&m, event.time, event.who);
+      break;
+    case ARRIVE:
+      m.queue[m.queued++] = event.who;
+      break;
+    case POLL:
+      serve(&m, event.time);
+      break;
+    case REPLY:
+      refill(&m, event.time, event.who);
+      break;
     }
     plan_poll(&m, event.time);
     status = m.failed;

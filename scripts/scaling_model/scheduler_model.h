@@ -6,10 +6,10 @@
 
 struct scheduler_setting {
   int ranks, ranks_per_node;
-  double share; /* of the node's fair share of what is left that a block is */
-  double latency; /* of a message, seconds */
-  double service; /* time of rank 0 for a question, seconds */
-  double pause; /* between two looks of a rank that waits, seconds */
+  double share;          /* of the node's fair share of what is left that a block is */
+  double latency;        /* of a message, seconds */
+  double service;        /* time of rank 0 for a question, seconds */
+  double pause;          /* between two looks of a rank that waits, seconds */
   double polls_per_tile; /* looks of rank 0 during a tile: trajectories of a tile */
   unsigned long long seed;
 };
@@ -23,6 +23,7 @@ struct outcome {
 };
 
 /* `cost`: seconds of each tile in the order of handing out. 1 if memory is short. */
-int simulate(const struct scheduler_setting *setting, long tiles, const double *cost, struct outcome *outcome);
+int simulate(const struct scheduler_setting *setting, long tiles, const double *cost,
+             struct outcome *outcome);
 
 #endif

@@ -76,11 +76,11 @@ contains
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: asked(:)
     integer :: tile(size(grid%shape))
-    logical :: open(size(grid%shape))
+    logical :: free(size(grid%shape))
     integer :: i, starts
     starts = count(grid%start_axis > 0)
     do i = 1, size(tile)
-      open(i) = any(grid%start_axis == i) .or. starts == 0
+      free(i) = any(grid%start_axis == i) .or. starts == 0
       if (any(grid%start_axis == i)) then
         tile(i) = max(1, nint(1024.0_wp**(1.0_wp/starts)))
       else if (starts == 0) then
@@ -91,15 +91,15 @@ contains
       if (i <= size(asked)) then
         if (asked(i) > 0) then
           tile(i) = asked(i)
-          open(i) = .false.
+          free(i) = .false.
         end if
       end if
       tile(i) = min(tile(i), grid%shape(i))
     end do
     do while (product(ceiling(real(grid%shape, wp)/tile)*1.0_wp) > most_tiles)
-      open = open .and. tile < grid%shape
-      if (.not. any(open)) exit
-      i = minloc(tile, dim=1, mask=open)
+      free = free .and. tile < grid%shape
+      if (.not. any(free)) exit
+      i = minloc(tile, dim=1, mask=free)
       tile(i) = min(2*tile(i), grid%shape(i))
     end do
   end function automatic_tile

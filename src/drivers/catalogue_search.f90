@@ -50,6 +50,8 @@ contains
       if (round == 2) first_round = catalogues
       call search_round(team, journal, grid, span, settings, time_limit, first_round, catalogues, mine, error)
       if (allocated(error)) return
+      ! Large where the slices are many.
+      if (round == rounds) deallocate (first_round)
       call exchange(team, mine, catalogues)
     end do
     call label_slices(grid, catalogues)

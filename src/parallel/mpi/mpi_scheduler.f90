@@ -2,8 +2,9 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Work for the ranks of an MPI team on two levels. Each node has a pool of positions in shared
-!> memory. That of rank 0's node is the work list itself, in an order in which every block is a fair sample
-!> of it; the others are refilled from it in blocks that shrink with what is left, by messages which rank 0 answers in `poll` and in `finish`.
+!> memory. That of rank 0's node is the work list itself, in an order in which every block is a fair
+!> sample of it; the others are refilled from it in blocks that shrink with what is left, by messages
+!> which rank 0 answers in `poll` and in `finish`.
 module mpi_scheduler
   use errors, only: error_t, fail
   use kinds, only: int64
