@@ -28,9 +28,9 @@ class Sizes:
 
     repetitions: int = 3
     ratios: int = 41
-    seconds: float = 20.0
+    seconds: float = 24.0
     """Of the map on one rank."""
-    replay_seconds: float = 20.0
+    replay_seconds: float = 24.0
     whole: tuple[int, ...] = (256, 1024)
     """Rows of maps run as a whole."""
     started: tuple[int, ...] = (2048, 4096, 8192)
