@@ -237,7 +237,7 @@ def conditions(results: Results) -> str:
         ["machine", f"{fields.get('model name', 'unknown')}, {os.cpu_count()} cores"],
         ["load (1 min) before and after", f"{before:.1f}, {after:.1f}"],
         ["Separatrix", f"commit {results.version['commit']}, `{results.version['flags']}`"],
-        ["repetitions", f"{results.sizes.repetitions}, in turn; medians; {results.seconds:.0f} s in all"],
+        ["repetitions", f"{len(results.strong[1])}, in turn; medians; {results.seconds:.0f} s in all"],
     ]
     return table(["", ""], rows)
 

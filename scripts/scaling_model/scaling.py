@@ -19,6 +19,8 @@ from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
 from simulation import TRAJECTORIES_PER_TILE, Simulated, Simulation
 
 BAR = 0.9
+MOST_SECONDS = 240.0
+"""Of all repetitions."""
 REPLAY_POLLS = 16
 
 
@@ -96,7 +98,11 @@ def measure_here(program: Program, results: Results) -> None:
     widths = round(small / TILE * sizes.seconds / pilot.tile_phase / 2)
     half = TILE * min(max(widths, 1), 64)
     results.v0_count = 2 * half
+    began = time.perf_counter()
     for number in range(sizes.repetitions):
+        # a busy machine gets fewer repetitions
+        if number > 0 and (time.perf_counter() - began) * (number + 1) / number > MOST_SECONDS:
+            break
         for ranks in results.ranks:
             say(f"repetition {number + 1} of {sizes.repetitions}, {ranks} ranks")
             strong = program.uneven(ranks, sizes.ratios, results.v0_count)
