@@ -24,7 +24,7 @@ module command_line
     character(len=:), allocatable :: name
     !> The case, or the file of `info` and `verify`.
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: output, list, csv
+    character(len=:), allocatable :: output, list, csv, tile_times
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -48,6 +48,7 @@ contains
     command%output = ''
     command%list = ''
     command%csv = ''
+    command%tile_times = ''
     allocate (command%overrides(0))
     position = 0
     do while (position < command_argument_count())
@@ -87,6 +88,8 @@ contains
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. command%name /= 'points' .and. command%name /= 'trajectory') then
       call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
+    else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
+      call fail(error, exit_usage, '--tile-times belongs to the commands '//join(resumable, ', '))
     else if (command%resume .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
     else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
@@ -108,6 +111,9 @@ contains
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
     else if (len(command%csv) > 0 .and. command%csv == command%output) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' is the file of -o")
+    else if (len(command%tile_times) > 0 .and. any([command%path == command%tile_times, command%list == command%tile_times, &
+                                                    command%output == command%tile_times, command%csv == command%tile_times])) then
+      call fail(error, exit_usage, "--tile-times '"//command%tile_times//"' is another file of the run")
     end if
   end subroutine check_outputs
 
@@ -139,8 +145,8 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--time-limit', '--ranks-per-node', '--sample', &
-          '--seed')
+    case ('-o', '--output', '--set', '--list', '--csv', '--tile-times', '--time-limit', '--ranks-per-node', &
+          '--sample', '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -165,7 +171,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv')
+    case ('-o', '--output', '--list', '--csv', '--tile-times')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -189,6 +195,8 @@ contains
     select case (name)
     case ('--list')
       command%list = value
+    case ('--tile-times')
+      command%tile_times = value
     case ('--csv')
       command%csv = value
     case default
@@ -287,6 +295,7 @@ contains
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
+      '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &
       '  --json             log as JSON lines'//nl// &
       '  -q, --quiet        errors only'//nl// &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &

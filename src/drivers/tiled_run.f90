@@ -19,6 +19,7 @@ module tiled_run
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
+  use tile_times, only: write_tile_times
   use tiles, only: new_tiling, tiling_t
   implicit none
   private
@@ -85,8 +86,8 @@ contains
     watch%unfinished = size(unfinished)
     if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(unfinished))// &
       ' of '//to_text(file%tile_count())//' tiles were done before')
-    call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node), &
-                        scheduler, error)
+    call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
+                        len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
     call session%stop_if(error)
     watch%scheduler => scheduler
@@ -101,6 +102,7 @@ contains
       computed = computed + 1
     end do
     call scheduler%finish()
+    call write_tile_times(session, scheduler, unfinished)
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles
