@@ -27,9 +27,15 @@ def open_result(path: str | Path) -> xr.Dataset:
     Raises SeparatrixError for a missing, foreign, incomplete or too new file.
     """
     attributes, texts, groups = _read_header(Path(path))
-    parts = [xr.open_dataset(path, engine="h5netcdf", decode_times=False)]
-    parts += [_open_table(path, name) for name in groups]
-    result = xr.merge(parts, join="exact", compat="no_conflicts")
+    parts = []
+    try:
+        parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
+        parts += [_open_table(path, name) for name in groups]
+        result = xr.merge(parts, join="exact", compat="no_conflicts")
+    # What h5netcdf and xarray raise for a file that is HDF5 and not netCDF is no part of their interface.
+    except Exception as error:
+        _close(parts)
+        raise SeparatrixError(f"{path}: cannot be read as netCDF ({_first_line(error)})", BAD_DATA) from error
     result.attrs = attributes | texts
     result.set_close(lambda: _close(parts))
     return result
@@ -98,7 +104,7 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
             _check_header(path, attributes)
             return attributes, _read_provenance(file), [name for name in TABLES if name in file]
-    except OSError as error:
+    except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
         raise SeparatrixError(f"{path}: cannot be read as HDF5 ({_first_line(error)})", BAD_DATA) from error
 
 

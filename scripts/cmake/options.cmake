@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 option(SEPARATRIX_MPI "Build with MPI and parallel HDF5 (OFF: one process, serial HDF5)" ON)
 option(SEPARATRIX_TESTS "Build the tests" ON)
+option(SEPARATRIX_FUZZ "Build the fuzzer of the readers (GCC)" OFF)
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
@@ -20,4 +21,4 @@ target_compile_options(separatrix_strict INTERFACE
   -ffp-contract=off
   "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2018;-fimplicit-none;-Wall;-Wextra;-Wno-compare-reals;-Wno-maybe-uninitialized;-Wno-uninitialized;-Werror=implicit-interface;-ffree-line-length-132>"
   "$<$<COMPILE_LANGUAGE:C>:-Wall;-Wextra>"
-  "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all;-fbacktrace>")
+  "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all,no-array-temps;-fbacktrace>")

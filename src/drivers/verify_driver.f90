@@ -108,6 +108,7 @@ contains
     call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
                            error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
+    if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
     allocate (index(size(axes)), place(size(lengths)))
     call journal%begin('points run again', int(sample, int64), 0_int64)
@@ -131,6 +132,22 @@ contains
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
+
+  !> A map has the lengths of the axes of its case; the starts of a sweep are one dimension of the file.
+  subroutine check_lengths(path, lengths, shape, error)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: lengths(:)
+    integer, intent(in) :: shape(:)
+    type(error_t), allocatable, intent(out) :: error
+    logical :: agree
+    agree = size(lengths) == size(shape)
+    if (agree) then
+      agree = all(lengths == shape)
+    else if (size(lengths) == 2 .and. size(shape) == 3) then
+      agree = all(lengths == [shape(1), shape(2)*shape(3)])
+    end if
+    if (.not. agree) call fail(error, exit_io, "'"//path//"' has not the points that its case asks for")
+  end subroutine check_lengths
 
   !> Every variable must be what the file holds.
   subroutine compare_with_file(reader, prefix, place, values, audit, error)
@@ -224,16 +241,12 @@ contains
     type(catalogue_t) :: none
     type(outcome_t) :: outcome
     type(span_t) :: span
-    real(wp), allocatable :: column(:), table(:, :)
+    real(wp), allocatable :: table(:, :)
     real(wp) :: random_numbers(1), results(6, 1)
     character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
-    integer :: i, k, point
-    do k = 1, size(names)
-      call reader%read_values('/'//trim(names(k)), column, error)
-      if (allocated(error)) return
-      if (k == 1) allocate (table(size(column), size(names)))
-      table(:, k) = column
-    end do
+    integer :: i, point
+    call reader%read_columns('/'//names, table, error)
+    if (allocated(error)) return
     span = span_of(the_case)
     span%stop_when_captured = .false.
     span%extension = 1

@@ -10,7 +10,7 @@ module h5
   use h5_access, only: set_parallel_access
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
-    h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
+    h5dget_storage_size_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
     H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
     h5fcreate_f, h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
@@ -22,16 +22,16 @@ module h5
     H5T_IEEE_F64LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U32LE, &
     H5T_STRING, h5tclose_f, h5tcopy_f, h5tequal_f, h5tis_variable_str_f, h5tset_cset_f, hid_t, &
     hsize_t
-  use kinds, only: int64, int8
+  use kinds, only: int64, int8, real64
   use status, only: exit_cannot_create, exit_io
   use team, only: team_t
   use text, only: to_text
-  use value_types, only: is_float, type_string
+  use value_types, only: bytes_of, is_float, type_string
   implicit none
   private
 
   public :: h5_create, h5_open, h5_close, h5_flush, h5_exists, h5_create_group, h5_create_dataset, &
-    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
+    h5_open_dataset, h5_close_dataset, h5_check_stored, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
     h5_version
 
   !> An open file.
@@ -319,6 +319,23 @@ contains
     if (dataset%type == 0) status = -1
     call h5tclose_f(found, ignored)
   end subroutine find_type
+
+  !> Code 74 if a dataset claims many more values than what is stored of it can hold: before memory is taken for them.
+  subroutine h5_check_stored(dataset, error)
+    type(h5_dataset_t), intent(in) :: dataset
+    type(error_t), allocatable, intent(out) :: error
+    !> Deflate makes no more than 1032 bytes out of one; a string is stored as a reference of 16 bytes.
+    real(real64), parameter :: largest_ratio = 1100, reference = 16
+    integer(hsize_t) :: stored
+    real(real64) :: claimed
+    integer :: status
+    call h5dget_storage_size_f(dataset%id, stored, status)
+    if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return
+    claimed = product(real(dataset%lengths, real64))*merge(reference, real(bytes_of(dataset%type), real64), &
+                                                           dataset%type == type_string)
+    if (claimed > largest_ratio*stored) call fail(error, exit_io, ''''//dataset%name//''' of '''//dataset%path// &
+      ''' is damaged: its values take '//to_text(claimed, 4)//' bytes, '//to_text(int(stored, int64))//' are stored')
+  end subroutine h5_check_stored
 
   !> Closes a dataset; one that is not open stays so.
   subroutine h5_close_dataset(dataset, error)

@@ -4,7 +4,7 @@
 !> Reading a file of Separatrix.
 module map_reader
   use errors, only: error_t, fail
-  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
+  use h5, only: h5_check_stored, h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
     h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
   use h5_list, only: h5_children
@@ -13,6 +13,7 @@ module map_reader
   use status, only: exit_io, exit_no_input
   use files, only: file_exists
   use output_check, only: is_folder
+  use text, only: to_text
   use value_types, only: bytes_of, from_bytes, type_names, type_string
   implicit none
   private
@@ -34,6 +35,7 @@ module map_reader
     procedure :: has
     procedure :: lengths
     procedure :: read_values
+    procedure :: read_columns
     procedure :: read_block
     procedure :: read_strings
     procedure :: read_text
@@ -169,6 +171,8 @@ contains
       call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not numeric')
       return
     end if
+    call h5_check_stored(dataset, error)
+    if (allocated(error)) return
     allocate (values(product(dataset%lengths)))
     allocate (bytes(size(values, kind=int64)*bytes_of(dataset%type)))
     call h5_read(dataset, bytes, error)
@@ -176,6 +180,27 @@ contains
     call from_bytes(dataset%type, bytes, values)
     call h5_close_dataset(dataset, error)
   end subroutine read_values
+
+  !> Numeric variables of one length as the columns of a table; code 74 if they differ in length.
+  subroutine read_columns(self, paths, columns, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: paths(:)
+    real(real64), allocatable, intent(out) :: columns(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: values(:)
+    integer :: k
+    do k = 1, size(paths)
+      call self%read_values(trim(paths(k)), values, error)
+      if (allocated(error)) return
+      if (k == 1) allocate (columns(size(values), size(paths)))
+      if (size(values) /= size(columns, 1)) then
+        call fail(error, exit_io, ''''//trim(paths(k))//''' of '''//self%path//''' has '//to_text(size(values))// &
+                  ' values, '''//trim(paths(1))//''' has '//to_text(size(columns, 1)))
+        return
+      end if
+      columns(:, k) = values
+    end do
+  end subroutine read_columns
 
   !> The values of a block of a numeric variable in C order; `lower` from 0.
   subroutine read_block(self, path, lower, extent, values, error)
@@ -187,6 +212,12 @@ contains
     type(h5_dataset_t) :: dataset
     integer(int8), allocatable :: bytes(:)
     call h5_open_dataset(self%file, path, dataset, error)
+    if (allocated(error)) return
+    if (dataset%type == type_string .or. size(dataset%lengths) /= size(extent)) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not numeric, or has other dimensions')
+      return
+    end if
+    call h5_check_stored(dataset, error)
     if (allocated(error)) return
     allocate (values(product(extent)), bytes(product(extent)*bytes_of(dataset%type)))
     call h5_read(dataset, bytes, error, lower, extent)
@@ -222,6 +253,10 @@ contains
     character(len=:), allocatable :: strings(:)
     call self%read_strings(path, strings, error)
     if (allocated(error)) return
+    if (size(strings) /= 1) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not one text')
+      return
+    end if
     text = strings(1)
   end subroutine read_text
 
@@ -251,6 +286,10 @@ contains
     value = 0
     call h5_get_numbers(self%file, object, name, values, error)
     if (allocated(error)) return
+    if (size(values) /= 1) then
+      call fail(error, exit_io, 'attribute '''//name//''' of '''//object//''' in '''//self%path//''' is not one number')
+      return
+    end if
     value = values(1)
   end subroutine number_attribute
 

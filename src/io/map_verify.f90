@@ -5,7 +5,7 @@
 module map_verify
   use checksum, only: crc32, crc32_text
   use errors, only: error_t, fail
-  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read
+  use h5, only: h5_check_stored, h5_close, h5_close_dataset, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_has_attribute, h5_put_numbers, h5_read_strings
   use h5_list, only: h5_children
   use kinds, only: int64, int8, real64
@@ -40,7 +40,8 @@ contains
         value = crc32_text(trim(strings(i))//achar(0), value)
       end do
     else
-      call checksum_of_slabs(dataset, value, error)
+      call h5_check_stored(dataset, error)
+      if (.not. allocated(error)) call checksum_of_slabs(dataset, value, error)
       if (allocated(error)) return
     end if
     call h5_close_dataset(dataset, error)
@@ -94,7 +95,11 @@ contains
     if (allocated(error)) return
     call h5_get_numbers(file, '/', 'complete', complete, error)
     if (.not. allocated(error)) then
-      if (nint(complete(1)) /= 1) call fail(error, exit_io, ''''//path//''' is not complete')
+      if (size(complete) /= 1) then
+        call fail(error, exit_io, 'attribute ''complete'' of '''//path//''' is not one number')
+      else if (.not. abs(complete(1) - 1) <= 0) then
+        call fail(error, exit_io, ''''//path//''' is not complete')
+      end if
     end if
     if (.not. allocated(error)) call verify_group(file, '', verified, error)
     call h5_close(file, ignored)
@@ -133,7 +138,9 @@ contains
     if (allocated(error)) return
     call dataset_checksum(file, name, found, error)
     if (allocated(error)) return
-    if (nint(expected(1), int64) /= found) then
+    if (size(expected) /= 1) then
+      call fail(error, exit_io, 'attribute ''checksum'' of '''//name//''' in '''//file%path//''' is not one number')
+    else if (.not. abs(expected(1) - real(found, real64)) <= 0) then
       call fail(error, exit_io, 'dataset '''//name//''' of '''//file%path//''' does not match its checksum')
     end if
   end subroutine verify_dataset
