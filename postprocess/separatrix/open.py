@@ -52,16 +52,20 @@ def table(result: xr.Dataset, name: str) -> xr.Dataset:
 def flag_names(variable: xr.DataArray) -> dict[int, str]:
     """Return the meaning of each code of a coded variable."""
     values = np.atleast_1d(variable.attrs.get("flag_values", []))
-    return dict(
-        zip((int(v) for v in values), _text(variable.attrs.get("flag_meanings", "")).split(), strict=True)
-    )
+    names = _text(variable.attrs.get("flag_meanings", "")).split()
+    try:
+        return dict(zip((int(value) for value in values), names, strict=True))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SeparatrixError(
+            f"variable {variable.name}: flag_values and flag_meanings do not belong together", BAD_DATA
+        ) from error
 
 
 def decode_flags(variable: xr.DataArray) -> xr.DataArray:
     """Return a coded variable as text: `regime` 1 -> 'non_impact'. Unknown codes are shown as numbers."""
     names = flag_names(variable)
     codes, where = np.unique(variable.values, return_inverse=True)
-    texts = np.array([names.get(int(code), str(code)) for code in codes], dtype=object)
+    texts = np.array([names.get(code, str(code)) for code in codes.tolist()], dtype=object)
     return variable.copy(data=texts[where].reshape(variable.shape))
 
 

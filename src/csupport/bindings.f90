@@ -13,7 +13,8 @@ module bindings
     c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_file_exists, &
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, &
     c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
-    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special
+    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
+    c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment
 
   interface
     integer(c_int) function c_is_special(path) bind(c, name='separatrix_is_special')
@@ -82,6 +83,33 @@ module bindings
       character(kind=c_char), intent(out) :: text(*)
       integer(c_int), value :: size
     end function c_host_name
+
+    integer(c_int) function c_core_list(text, size) bind(c, name='separatrix_core_list')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end function c_core_list
+
+    integer(c_int) function c_may_use_core(core) bind(c, name='separatrix_may_use_core')
+      import :: c_int
+      integer(c_int), value :: core
+    end function c_may_use_core
+
+    integer(c_int) function c_online_cores() bind(c, name='separatrix_online_cores')
+      import :: c_int
+    end function c_online_cores
+
+    integer(c_int) function c_cpu_name(text, size) bind(c, name='separatrix_cpu_name')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end function c_cpu_name
+
+    subroutine c_environment(text, size) bind(c, name='separatrix_environment')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end subroutine c_environment
 
     integer(c_int) function c_stderr_is_terminal() bind(c, name='separatrix_stderr_is_terminal')
       import :: c_int

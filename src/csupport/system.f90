@@ -4,14 +4,15 @@
 !> Clock, host, memory and environment of this process.
 module system
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_default_environment, c_exit, c_host_name, c_monotonic_seconds, &
-    c_resident_bytes, c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
+  use bindings, only: c_core_list, c_cpu_name, c_default_environment, c_environment, c_exit, c_host_name, &
+    c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
   use kinds, only: int64, real64
   implicit none
   private
 
   public :: monotonic_seconds, utc_now, resident_bytes, host_name, stderr_is_terminal, &
-    default_environment, sleep_microseconds, exit_program, from_c
+    default_environment, sleep_microseconds, exit_program, from_c, core_list, may_use_core, online_cores, cpu_name, &
+    environment_text
 
 contains
 
@@ -46,6 +47,41 @@ contains
       text = 'unknown'
     end if
   end function host_name
+
+  !> The cores that this process may run on, as '0-3,8'; 'unknown' if the system does not tell.
+  function core_list() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(128)
+    text = 'unknown'
+    if (c_core_list(buffer, int(size(buffer), c_int)) > 0) text = from_c(buffer)
+  end function core_list
+
+  !> Whether this process may run on a core (from 0).
+  logical function may_use_core(core)
+    integer, intent(in) :: core
+    may_use_core = c_may_use_core(int(core, c_int)) == 1
+  end function may_use_core
+
+  !> Cores of this host.
+  integer function online_cores()
+    online_cores = int(c_online_cores())
+  end function online_cores
+
+  !> The name of the processor; 'unknown' if the system does not tell.
+  function cpu_name() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(256)
+    text = 'unknown'
+    if (c_cpu_name(buffer, int(size(buffer), c_int)) == 0) text = from_c(buffer)
+  end function cpu_name
+
+  !> The variables that decide how MPI, HDF5 and the batch system work, as 'NAME=VALUE NAME=VALUE'.
+  function environment_text() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(8192)
+    call c_environment(buffer, int(size(buffer), c_int))
+    text = from_c(buffer)
+  end function environment_text
 
   !> Whether stderr is a terminal.
   logical function stderr_is_terminal()

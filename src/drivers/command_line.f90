@@ -24,7 +24,7 @@ module command_line
     character(len=:), allocatable :: name
     !> The case, or the file of `info` and `verify`.
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: output, list, csv
+    character(len=:), allocatable :: output, list, csv, log
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -48,6 +48,7 @@ contains
     command%output = ''
     command%list = ''
     command%csv = ''
+    command%log = ''
     allocate (command%overrides(0))
     position = 0
     do while (position < command_argument_count())
@@ -104,6 +105,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (len(command%output) > 0 .and. (command%output == command%path .or. command%output == command%list)) then
       call fail(error, exit_usage, "-o '"//command%output//"' would replace what is read")
+    else if (len(command%log) > 0 .and. any(command%name == [character(len=10) :: 'laws', 'info', 'verify'])) then
+      call fail(error, exit_usage, '--log belongs to the commands that compute')
+    else if (len(command%log) > 0 .and. (command%log == command%path .or. command%log == command%list .or. &
+                                         command%log == command%output .or. command%log == command%csv)) then
+      call fail(error, exit_usage, "--log '"//command%log//"' is the name of another file of the run")
     else if (len(command%csv) > 0 .and. (command%csv == command%path .or. command%csv == command%list)) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
     else if (len(command%csv) > 0 .and. command%csv == command%output) then
@@ -139,8 +145,8 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--time-limit', '--ranks-per-node', '--sample', &
-          '--seed')
+    case ('-o', '--output', '--set', '--list', '--csv', '--log', '--time-limit', '--ranks-per-node', &
+          '--sample', '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -165,7 +171,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv')
+    case ('-o', '--output', '--list', '--csv', '--log')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -191,6 +197,8 @@ contains
       command%list = value
     case ('--csv')
       command%csv = value
+    case ('--log')
+      command%log = value
     case default
       command%output = value
     end select
@@ -288,6 +296,7 @@ contains
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --json             log as JSON lines'//nl// &
+      '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'//nl// &
       '  -q, --quiet        errors only'//nl// &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &
       'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &

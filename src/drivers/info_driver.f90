@@ -20,8 +20,11 @@ module info_driver
 
   character(len=*), parameter :: root_texts(6) = [character(len=14) :: 'kind', 'title', 'source', 'date_created', &
     'format_version', 'complete']
-  character(len=*), parameter :: provenance_texts(8) = [character(len=12) :: 'commit', 'compiler', 'mpi', 'hdf5', &
-    'hosts', 'started', 'finished', 'command_line']
+  character(len=*), parameter :: provenance_texts(17) = [character(len=13) :: 'version', 'commit', 'compiler', 'flags', &
+    'c_flags', 'mpi', 'hdf5', 'ranks', 'host_count', 'hosts', 'processor', 'environment', 'started', 'finished', &
+    'wall_seconds', 'case_identity', 'command_line']
+  character(len=*), parameter :: numeric(5) = [character(len=14) :: 'format_version', 'complete', 'ranks', 'host_count', &
+    'wall_seconds']
   character(len=*), parameter :: catalogue_columns(8) = [character(len=18) :: 'attractor', 'slice', 'regime', &
     'period', 'event_word', 'amplitude', 'impacts_per_period', 'count']
 
@@ -78,9 +81,11 @@ contains
       character(len=:), allocatable :: text
       real(wp) :: number
       if (.not. reader%has_attribute(object, name)) return
-      if (name == 'format_version' .or. name == 'complete') then
+      if (any(numeric == name)) then
         call reader%number_attribute(object, name, number, error)
-        if (.not. allocated(error)) text = to_text(number)
+        if (allocated(error)) return
+        text = to_text(number)
+        if (abs(number) < 1e15_wp .and. abs(number - anint(number)) <= 0) text = to_text(nint(number, int64))
       else
         call reader%text_attribute(object, name, text, error)
         if (.not. allocated(error) .and. json) text = json_text(text)

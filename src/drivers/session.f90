@@ -3,8 +3,9 @@
 
 !> What every command that computes shares: the case, the team, the log, the provenance.
 module session
-  use build_info, only: build_commit => commit, build_compiler => compiler, build_flags => flags, &
-    build_mpi => mpi, build_version => version
+  use binding, only: report_binding
+  use build_info, only: build_c_flags => c_flags, build_commit => commit, build_compiler => compiler, &
+    build_flags => flags, build_mpi => mpi, build_version => version
   use case_echo, only: case_identity
   use case_reader, only: load_case
   use case_type, only: case_t
@@ -55,6 +56,8 @@ contains
       call start_team(session%team)
     end if
     call session%journal%open(session%team%is_root(), command%json, command%quiet)
+    call session%journal%open_copy(command%log, error)
+    call session%stop_if(error)
     ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
     if (command%name /= 'trajectory') call install_signals(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error)
@@ -76,9 +79,11 @@ contains
       record%commit = build_commit
       record%compiler = build_compiler
       record%flags = build_flags
+      record%c_flags = build_c_flags
       record%mpi = build_mpi
       call start_provenance(self%team, record)
     end associate
+    if (self%team%size() > 1) call report_binding(self%team, self%journal)
   end subroutine begin
 
   subroutine check_outputs(command, path, tiled, error)

@@ -32,12 +32,15 @@ def main() -> int:
     codes: Counter[int] = Counter()
     inputs = 0
     deadline = time.monotonic() + seconds
+    chance.shuffle(seeds)
     for data in seeds:
-        codes[read(data, work)] += 1
+        if deadline - time.monotonic() < seconds / 2:
+            break
         inputs += 1
+        codes[read(data, work, inputs)] += 1
     while time.monotonic() < deadline:
-        codes[read(change(chance.choice(seeds), chance), work)] += 1
         inputs += 1
+        codes[read(change(chance.choice(seeds), chance), work, inputs)] += 1
     print(json.dumps({"target": "figures", "inputs": inputs, "kept": 0, "codes": {str(k): v for k, v in codes.items()}}))
     return 0
 
@@ -61,9 +64,9 @@ def change(data: bytes, chance: random.Random) -> bytes:
     return bytes(changed)
 
 
-def read(data: bytes, work: Path) -> int:
+def read(data: bytes, work: Path, number: int) -> int:
     """Read one input; 0, or the exit code that the command would end with."""
-    (work / "current").write_bytes(struct.pack("<Q", len(data)) + data)
+    (work / "current").write_bytes(struct.pack("<QQ", len(data), number) + data)
     path = work / "input.h5"
     path.write_bytes(data)
     signal.alarm(LONGEST_SECONDS)

@@ -59,15 +59,16 @@ public:
     if (memory_ == MAP_FAILED)
       throw std::runtime_error("cannot map " + path);
   }
-  // Length in 8 bytes, then the input.
+  // Length and number of inputs so far in 8 bytes each, then the input.
   void set(const std::string &input) {
-    const std::uint64_t length = input.size();
-    std::memcpy(memory_, &length, sizeof length);
-    std::memcpy(memory_ + sizeof length, input.data(), input.size());
+    const std::uint64_t head[2] = {input.size(), ++inputs_};
+    std::memcpy(memory_, head, sizeof head);
+    std::memcpy(memory_ + sizeof head, input.data(), input.size());
   }
 
 private:
-  static constexpr std::size_t size = most_binary + 8;
+  static constexpr std::size_t size = most_binary + 16;
+  std::uint64_t inputs_ = 0;
   char *memory_;
 };
 
@@ -99,6 +100,7 @@ std::map<int, long> codes;
 bool run(int target, const std::string &input, const std::string &scratch, Current &current) {
   current.set(input);
   if (target >= 2) {
+    std::filesystem::remove(scratch); // for HDF5 the same file would be one that it knows
     std::ofstream file(scratch, std::ios::binary | std::ios::trunc);
     file.write(input.data(), static_cast<std::streamsize>(input.size()));
   }
@@ -149,7 +151,7 @@ int main(int count, char **arguments) {
   if (target < 0)
     return 64;
   const std::filesystem::path work = arguments[3];
-  const double seconds = std::stod(arguments[5]);
+  const double seconds = std::stod(arguments[5]); // at most half of it for the seeds
   const bool text = target <= 2;
   const std::size_t most = text ? most_text : most_binary;
   Mutator mutator(std::stoull(arguments[7]), text);
@@ -167,6 +169,8 @@ int main(int count, char **arguments) {
   if (target == 5)
     corpus.push_back(read_file(work / "seed.h5.part"));
   std::sort(corpus.begin(), corpus.end());
+  for (std::size_t i = corpus.size(); i > 1; --i)
+    std::swap(corpus[i - 1], corpus[mutator.below(i)]);
   // The reports of `info` and `verify` are not what is looked at.
   const int report = dup(STDOUT_FILENO);
   if (std::freopen("/dev/null", "w", stdout) == nullptr)
@@ -177,6 +181,8 @@ int main(int count, char **arguments) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   };
   for (const std::string &input : corpus) {
+    if (elapsed() > seconds / 2)
+      break;
     run(target, input, scratch, current);
     blocks.insert(fresh.begin(), fresh.end());
     mutator.learn(input);

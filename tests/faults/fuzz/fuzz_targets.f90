@@ -12,6 +12,7 @@ module fuzz_targets
   use contact_law, only: contact_t
   use errors, only: error_t
   use grid, only: grid_t, slice_motion
+  use hdf5, only: h5close_f
   use info_driver, only: run_info
   use kinds, only: int64, wp
   use map_file, only: create_working, map_file_t, open_working
@@ -44,6 +45,7 @@ contains
     character(kind=c_char), intent(in) :: bytes(length), path(*)
     integer(c_int), intent(out) :: code, message_length
     type(error_t), allocatable :: error
+    integer :: ignored
     select case (which)
     case (target_case)
       call read_case(text_of(bytes), error)
@@ -58,6 +60,8 @@ contains
     case (target_resume)
       call read_working(path_text(path), error)
     end select
+    ! After an error the program ends, and leaves objects open that would keep the next file from being read anew.
+    if (which >= target_info) call h5close_f(ignored)
     code = 0
     message_length = 0
     if (.not. allocated(error)) return
