@@ -4,7 +4,7 @@
 !> `separatrix basin`: where every point of a grid ends up.
 module basin_driver
   use attractors, only: last_regime, regime_names
-  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of
   use case_type, only: case_t
@@ -44,7 +44,7 @@ module basin_driver
     !> Entries of the catalogue before each slice.
     integer, allocatable :: offset(:)
   contains
-    procedure :: compute => compute_basin_point
+    procedure :: compute => compute_basin_points
     procedure :: note => note_basin_point
   end type basin_work_t
 
@@ -111,13 +111,13 @@ contains
     allocate (work%captured(work%offset(size(work%offset))), source=0_int64)
   end subroutine prepare_counts
 
-  subroutine compute_basin_point(self, index, values, error)
+  subroutine compute_basin_points(self, index, values, error)
     class(basin_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    real(wp), intent(out) :: values(:)
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    call basin_point(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
-  end subroutine compute_basin_point
+    call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
+  end subroutine compute_basin_points
 
   subroutine note_basin_point(self, index, values)
     class(basin_work_t), intent(inout) :: self

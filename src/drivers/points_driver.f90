@@ -40,7 +40,7 @@ module points_driver
     real(wp) :: ratio = -1
     integer(int64) :: reasons(0:last_reason) = 0
   contains
-    procedure :: compute => compute_list_point
+    procedure :: compute => compute_list_points
     procedure :: note => note_list_point
   end type list_work_t
 
@@ -134,25 +134,28 @@ contains
 
   end subroutine describe_points
 
-  subroutine compute_list_point(self, index, values, error)
+  subroutine compute_list_points(self, index, values, error)
     class(list_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    real(wp), intent(out) :: values(:)
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(outcome_t) :: outcome
     type(attractor_t) :: no_catalogue(0)
-    associate (ratio => self%list%ratio(index(1)))
-      if (abs(ratio - self%ratio) > 0) then
-        call machine_with(self%grid, 'drive.ratio', ratio, self%moving, error)
-        if (allocated(error)) return
-        self%ratio = ratio
-      end if
-    end associate
-    call run_trajectory(self%moving, no_catalogue, self%span, self%list%x0(index(1)), self%list%v0(index(1)), &
-                        self%grid%start(3), outcome)
-    values = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &
-              real(outcome%features%regime, wp), real(outcome%reason, wp)]
-  end subroutine compute_list_point
+    integer :: i
+    do i = 1, size(index, 2)
+      associate (ratio => self%list%ratio(index(1, i)))
+        if (abs(ratio - self%ratio) > 0) then
+          call machine_with(self%grid, 'drive.ratio', ratio, self%moving, error)
+          if (allocated(error)) return
+          self%ratio = ratio
+        end if
+      end associate
+      call run_trajectory(self%moving, no_catalogue, self%span, self%list%x0(index(1, i)), self%list%v0(index(1, i)), &
+                          self%grid%start(3), outcome)
+      values(i, :) = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &
+                      real(outcome%features%regime, wp), real(outcome%reason, wp)]
+    end do
+  end subroutine compute_list_points
 
   subroutine note_list_point(self, index, values)
     class(list_work_t), intent(inout) :: self

@@ -6,7 +6,7 @@
 module verify_driver
   use attractors, only: regime_names
   use axis, only: axis_t
-  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of, options_of, span_of
   use case_type, only: case_t
@@ -100,7 +100,7 @@ contains
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
-    real(wp) :: values(basin_variables), random_numbers(6)
+    real(wp) :: values(1, basin_variables), random_numbers(6)
     integer, allocatable :: index(:)
     integer(int64), allocatable :: lengths(:), place(:)
     integer :: i, k
@@ -122,11 +122,12 @@ contains
       else
         place = [index(1) - 1, (index(2) - 1)*grid%shape(3) + index(3) - 1]
       end if
-      call basin_point(grid, span_of(the_case), the_case%attractors%max_period, catalogues, index, cache, values, error)
+      call basin_points(grid, span_of(the_case), the_case%attractors%max_period, catalogues, reshape(index, [size(index), 1]), &
+                        cache, values, error)
       if (allocated(error)) return
-      call compare_with_file(reader, prefix, place, values, audit, error)
+      call compare_with_file(reader, prefix, place, values(1, :), audit, error)
       if (allocated(error)) return
-      call compare_with_reference(the_case, grid, catalogues, index, values, cache%moving, &
+      call compare_with_reference(the_case, grid, catalogues, index, values(1, :), cache%moving, &
                                   audit, error)
       if (allocated(error)) return
       call journal%progress(int(i, int64))

@@ -17,7 +17,7 @@ module basin
   implicit none
   private
 
-  public :: open_slice, search_starts, label_slices, basin_point, outcome_values
+  public :: open_slice, search_starts, label_slices, basin_points, outcome_values
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13
@@ -94,37 +94,42 @@ contains
     end do
   end subroutine label_slices
 
-  !> Values of the point at `index` (from 1 along each axis). Without a start among the axes every point is its own
-  !> slice: then `catalogues` is empty and the point's attractor is discovered on the spot, unlabelled.
-  subroutine basin_point(grid, span, max_period, catalogues, index, cache, values, error)
+  !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Without a start among the
+  !> axes every point is its own slice: then `catalogues` is empty and the point's attractor is discovered on the spot,
+  !> unlabelled.
+  subroutine basin_points(grid, span, max_period, catalogues, index, cache, values, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer, intent(in) :: max_period
     type(catalogue_t), intent(in) :: catalogues(:)
-    integer, intent(in) :: index(:)
+    integer, intent(in) :: index(:, :)
     type(slice_cache_t), intent(inout) :: cache
-    real(wp), intent(out) :: values(basin_variables)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
     type(attractor_t), allocatable :: own(:)
     type(outcome_t) :: outcome
     integer(int64) :: slice
     real(wp) :: start(3)
-    slice = point_slice(grid, index)
-    if (slice /= cache%slice) then
-      call open_slice(grid, span, slice, cache%moving, error)
-      if (allocated(error)) return
-      cache%slice = slice
-    end if
-    start = point_start(grid, index)
-    if (size(catalogues) > 0) then
-      call run_trajectory(cache%moving, catalogues(slice + 1)%attractors, span, start(1), start(2), start(3), &
-                          outcome)
-    else
-      call discover_attractors(cache%moving, span, reshape(start, [3, 1]), max_period, own)
-      call run_trajectory(cache%moving, own, span, start(1), start(2), start(3), outcome)
-    end if
-    values = outcome_values(outcome)
-  end subroutine basin_point
+    integer :: i
+    do i = 1, size(index, 2)
+      slice = point_slice(grid, index(:, i))
+      if (slice /= cache%slice) then
+        call open_slice(grid, span, slice, cache%moving, error)
+        if (allocated(error)) return
+        cache%slice = slice
+      end if
+      start = point_start(grid, index(:, i))
+      if (size(catalogues) > 0) then
+        call run_trajectory(cache%moving, catalogues(slice + 1)%attractors, span, start(1), start(2), start(3), &
+                            outcome)
+      else
+        if (allocated(own)) deallocate (own)
+        call discover_attractors(cache%moving, span, reshape(start, [3, 1]), max_period, own)
+        call run_trajectory(cache%moving, own, span, start(1), start(2), start(3), outcome)
+      end if
+      values(i, :) = outcome_values(outcome)
+    end do
+  end subroutine basin_points
 
   !> An outcome in the order of the file: regime, attractor, reason, period, event word, impacts per period, mean
   !> impact speed, amplitude, x_max, x_min, v_max, settle time (not a number: not captured), grazing margin (infinite:
