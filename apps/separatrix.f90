@@ -9,6 +9,7 @@ program separatrix
   use info_driver, only: run_info
   use launcher, only: launched_rank
   use laws_driver, only: run_laws
+  use merge_driver, only: run_merge
   use points_driver, only: run_points
   use sweep_driver, only: run_sweep
   use system, only: exit_program, sleep_microseconds
@@ -40,6 +41,8 @@ program separatrix
         call run_trajectory_command(command)
       case ('points')
         call run_points(command)
+      case ('merge')
+        if (first) call run_merge(command)
       case ('laws')
         if (first) call run_laws(command%json)
       case ('info')

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Open a result file: HDF5 -> xarray, codes -> text."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -26,19 +28,33 @@ def open_result(path: str | Path) -> xr.Dataset:
     the texts and attributes of `/provenance` are attributes (`resolved_case`, `provenance_version`, ...).
     Raises SeparatrixError for a missing, foreign, incomplete or too new file.
     """
-    attributes, texts, groups = _read_header(Path(path))
-    parts = []
-    try:
-        parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
-        parts += [_open_table(path, name) for name in groups]
-        result = xr.merge(parts, join="exact", compat="no_conflicts")
-    # What h5netcdf and xarray raise for a file that is HDF5 and not netCDF is no part of their interface.
-    except Exception as error:
-        _close(parts)
-        raise SeparatrixError(f"{path}: cannot be read as netCDF ({_first_line(error)})", BAD_DATA) from error
+    with reading(path):
+        attributes, texts, groups = _read_header(Path(path))
+    parts: list[xr.Dataset] = []
+    with reading(path):
+        try:
+            parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
+            parts += [_open_table(path, name) for name in groups]
+            result = xr.merge(parts, join="exact", compat="no_conflicts")
+        except Exception:
+            _close(parts)
+            raise
     result.attrs = attributes | texts
     result.set_close(lambda: _close(parts))
     return result
+
+
+@contextmanager
+def reading(path: str | Path) -> Iterator[None]:
+    """Turn what the libraries raise for a damaged file into a SeparatrixError; their choice of types is their own."""
+    try:
+        yield
+    except SeparatrixError:
+        raise
+    except KeyError as error:
+        raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
+    except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise SeparatrixError(f"{path}: is damaged ({_first_line(error)})") from error
 
 
 def table(result: xr.Dataset, name: str) -> xr.Dataset:
@@ -108,7 +124,7 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
             _check_header(path, attributes)
             return attributes, _read_provenance(file), [name for name in TABLES if name in file]
-    except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
+    except OSError as error:
         raise SeparatrixError(f"{path}: cannot be read as HDF5 ({_first_line(error)})", BAD_DATA) from error
 
 

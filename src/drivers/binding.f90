@@ -16,7 +16,7 @@ module binding
 
 contains
 
-  !> Asks every rank, and tells on rank 0. Collective.
+  !> Asks every rank, and tells on rank 0; in plain text only for several ranks. Collective.
   subroutine report_binding(team, journal)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
@@ -57,7 +57,8 @@ contains
     bound = any(count(allowed(:, ranks), dim=1) < all_cores(ranks(1)))
     call journal%line('binding', 'host '//name//': '//to_text(size(ranks))//' ranks on '//to_text(all_cores(ranks(1)))// &
       ' cores; rank: cores '//lists, '"host": '//json_text(name)//', "ranks": '//to_text(size(ranks))// &
-      ', "cores": '//to_text(all_cores(ranks(1)))//', "bound": '//to_text(bound)//', "rank_cores": '//json_text(lists))
+      ', "cores": '//to_text(all_cores(ranks(1)))//', "bound": '//to_text(bound)//', "rank_cores": '//json_text(lists), &
+      plain=size(all_cores) > 1)
     warning = conflict(allowed(:, ranks))
     if (len(warning) > 0) call journal%line('warning', 'warning: host '//name//': '//warning, '"host": '//json_text(name))
   end subroutine report_host

@@ -19,8 +19,7 @@ module catalogue_search
   implicit none
   private
 
-  public :: search_catalogues
-
+  public :: search_catalogues, pack_catalogues, unpack_catalogues
 
 contains
 
@@ -99,39 +98,50 @@ contains
     end do
   end function attractors_of
 
-  !> Every rank gets the catalogues of the slices that the others searched: slice, number of attractors, and these.
+  !> Every rank gets the catalogues of the slices that the others searched.
   subroutine exchange(team, catalogues)
     class(team_t), intent(in) :: team
     type(catalogue_t), intent(inout) :: catalogues(:)
-    real(wp), allocatable :: mine(:), all_values(:)
-    integer :: slice, i, position, count
-    count = 0
-    do slice = team%rank() + 1, size(catalogues), team%size()
-      count = count + 2 + packed_size*size(catalogues(slice)%attractors)
-    end do
-    allocate (mine(count))
+    real(wp), allocatable :: all_values(:)
+    call team%allgather(pack_catalogues(catalogues, team%rank() + 1, team%size()), all_values)
+    call unpack_catalogues(all_values, catalogues)
+  end subroutine exchange
+
+  !> The catalogues of the slices from `first` on, every `step`-th, as numbers: slice, number of attractors, and these.
+  pure function pack_catalogues(catalogues, first, step) result(packed)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer, intent(in) :: first, step
+    real(wp), allocatable :: packed(:)
+    integer :: slice, i, position
+    allocate (packed(sum([(2 + packed_size*size(catalogues(slice)%attractors), slice=first, size(catalogues), step)])))
     position = 0
-    do slice = team%rank() + 1, size(catalogues), team%size()
-      mine(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
+    do slice = first, size(catalogues), step
+      packed(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
       position = position + 2
       do i = 1, size(catalogues(slice)%attractors)
-        mine(position + 1:position + packed_size) = pack_attractor(catalogues(slice)%attractors(i))
+        packed(position + 1:position + packed_size) = pack_attractor(catalogues(slice)%attractors(i))
         position = position + packed_size
       end do
     end do
-    call team%allgather(mine, all_values)
+  end function pack_catalogues
+
+  !> What `pack_catalogues` packed, into the slices that it names.
+  pure subroutine unpack_catalogues(packed, catalogues)
+    real(wp), intent(in) :: packed(:)
+    type(catalogue_t), intent(inout) :: catalogues(:)
+    integer :: slice, i, position, count
     position = 0
-    do while (position < size(all_values))
-      slice = nint(all_values(position + 1))
-      count = nint(all_values(position + 2))
+    do while (position < size(packed))
+      slice = nint(packed(position + 1))
+      count = nint(packed(position + 2))
       position = position + 2
       if (allocated(catalogues(slice)%attractors)) deallocate (catalogues(slice)%attractors)
       allocate (catalogues(slice)%attractors(count))
       do i = 1, count
-        catalogues(slice)%attractors(i) = unpack_attractor(all_values(position + 1:position + packed_size))
+        catalogues(slice)%attractors(i) = unpack_attractor(packed(position + 1:position + packed_size))
         position = position + packed_size
       end do
     end do
-  end subroutine exchange
+  end subroutine unpack_catalogues
 
 end module catalogue_search

@@ -70,17 +70,22 @@ contains
     call fail(error, exit_cannot_create, "cannot write the log '"//path//"': "//trim(message))
   end subroutine open_copy
 
-  !> One line of the log. `fields`: further members of the JSON object, '"name": value, ...'.
-  subroutine line(self, event, message, fields)
+  !> One line of the log. `fields`: further members of the JSON object, '"name": value, ...'. `plain` = .false.: left out
+  !> of a log in plain text.
+  subroutine line(self, event, message, fields, plain)
     class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: event, message
     character(len=*), intent(in), optional :: fields
+    logical, intent(in), optional :: plain
     character(len=:), allocatable :: more
+    logical :: shown
     if (.not. self%active) return
+    shown = .true.
+    if (present(plain)) shown = plain .or. self%json
     more = ''
     if (present(fields)) more = ', '//fields
     call write_copy(self, event, message, more)
-    if (self%quiet) return
+    if (self%quiet .or. .not. shown) return
     call close_line(self)
     if (self%json) then
       write (output_unit, '(a)') json_line(self, event, message, more)

@@ -17,6 +17,7 @@ module points_driver
   use motion, only: motion_t
   use point_list, only: point_list_t, read_point_list
   use session, only: describe_file, open_session, session_t
+  use span_check, only: check_periods
   use status, only: last_reason, exit_done, exit_io, reason_names
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
@@ -68,6 +69,7 @@ contains
     if (.not. allocated(error)) work%ratio = work%moving%machine%drive%ratio
     if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%moving%machine%contact, &
                                                      work%list, error)
+    if (.not. allocated(error)) call check_periods(work%span, shortest_period(work), error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate) then
@@ -96,6 +98,13 @@ contains
     if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     call session%end_with(exit_done)
   end subroutine run_points
+
+  !> The drive period of the fastest point.
+  pure real(wp) function shortest_period(work)
+    type(list_work_t), intent(in) :: work
+    shortest_period = work%moving%machine%period
+    if (work%ratio > 0) shortest_period = shortest_period*work%ratio/maxval(work%list%ratio)
+  end function shortest_period
 
   !> Checksum of the starts.
   function list_identity(list) result(identity)

@@ -83,7 +83,7 @@ contains
       record%mpi = build_mpi
       call start_provenance(self%team, record)
     end associate
-    if (self%team%size() > 1) call report_binding(self%team, self%journal)
+    call report_binding(self%team, self%journal)
   end subroutine begin
 
   subroutine check_outputs(command, path, tiled, error)

@@ -12,8 +12,10 @@ module tiled_run
   use map_final, only: finalise
   use map_schema, only: schema_t
   use parallel, only: make_scheduler
+  use balance, only: report_balance
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
+  use shard, only: in_shard
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -21,7 +23,7 @@ module tiled_run
   implicit none
   private
 
-  public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds
+  public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds, index_in_block
 
   !> Points of the small sample from which a dry run estimates the time.
   integer, parameter :: pilot_points = 64
@@ -76,7 +78,7 @@ contains
       call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
     else
       call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
-                          error)
+                          error, shares=max(1, session%command%shard_count))
     end if
     call session%stop_if(error)
   end subroutine open_tiles
@@ -89,29 +91,39 @@ contains
     logical, intent(out) :: complete
     class(scheduler_t), allocatable :: scheduler
     type(error_t), allocatable :: error
-    integer, allocatable :: unfinished(:)
+    integer, allocatable :: mine(:), unfinished(:)
     integer(int64) :: total, before, computed(1)
+    real(wp) :: busy, begun
     integer :: tile, position
     logical :: whole
-    unfinished = pack([(tile, tile=1, file%tile_count())], [(.not. file%tile_done(tile), tile=1, file%tile_count())])
-    total = product(file%tiling%lengths)
+    associate (command => session%command)
+      mine = pack([(tile, tile=1, file%tile_count())], &
+                  [(in_shard(tile, command%shard, command%shard_count), tile=1, file%tile_count())])
+    end associate
+    unfinished = pack(mine, [(.not. file%tile_done(mine(tile)), tile=1, size(mine))])
+    total = sum([(file%tiling%points(mine(tile)), tile=1, size(mine))])
     before = note_earlier(session, file, work)
-    if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(unfinished))// &
-      ' of '//to_text(file%tile_count())//' tiles were done before')
+    if (session%command%resume) call session%journal%line('resumed', to_text(size(mine) - size(unfinished))// &
+      ' of '//to_text(size(mine))//' tiles were done before')
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node), &
                         scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
     call session%stop_if(error)
     computed = 0
+    busy = 0
     call session%journal%begin('points', total, before)
     do
       call scheduler%next(position)
       if (position == 0) exit
+      begun = monotonic_seconds()
       call run_tile(session, file, work, unfinished(position), scheduler, total, before, size(unfinished), whole)
+      busy = busy + (monotonic_seconds() - begun)
       if (.not. whole) exit
       computed = computed + 1
     end do
+    begun = scheduler%started
     call scheduler%finish()
+    call report_balance(session%team, session%journal, busy, monotonic_seconds() - begun)
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles
@@ -159,6 +171,7 @@ contains
     end do
     call file%write_tile(tile, values, error)
     call session%abort_if(error)
+    session%journal%written = session%journal%written + file%tile_bytes(tile)
     do point = 1, points
       call work%note(index(:, point), values(point, :))
     end do

@@ -19,6 +19,7 @@ module trajectory_driver
   use motion, only: motion_t
   use motion_state, only: event_names, log_t, open_log
   use session, only: describe_file, open_session, session_t
+  use span_check, only: check_periods
   use status, only: exit_done, exit_io, reason_name, reason_time_over
   use text, only: to_text
   use trajectory, only: outcome_t, run_trajectory, span_t
@@ -50,6 +51,7 @@ contains
     span%extension = 1
     span%stop_when_captured = .false.
     call slice_motion(grid, 0_int64, moving, error)
+    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate .or. command%dry_run) then

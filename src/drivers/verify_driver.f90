@@ -25,6 +25,7 @@ module verify_driver
   use random, only: uniform
   use reference, only: run_reference
   use serial_team, only: serial_team_t
+  use span_check, only: check_periods
   use statistics, only: share_upper_limit
   use status, only: exit_io, reason_settled
   use sweep_driver, only: sweep_axes
@@ -255,9 +256,14 @@ contains
     do i = 1, min(sample, size(table, 1))
       call uniform(int(seed, int64), int(i, int64), random_numbers)
       point = 1 + int(random_numbers(1)*size(table, 1))
+      if (.not. all(abs(table(point, :3)) <= huge(1.0_wp))) then
+        call fail(error, exit_io, "'"//reader%path//"', point "//to_text(point - 1)//': the start is not finite')
+        return
+      end if
       axes(1) = axis_t('drive.ratio', '1', [table(point, 3)])
       grid = grid_of(the_case, axes(:merge(1, 0, table(point, 3) > 0)))
       call slice_motion(grid, 0_int64, moving, error)
+      if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
       if (allocated(error)) return
       call run_trajectory(moving, none%attractors, span, table(point, 1), table(point, 2), grid%start(3), outcome)
       audit%points = audit%points + 1

@@ -165,7 +165,8 @@ int main(int count, char **arguments) {
   std::vector<std::string> corpus;
   std::set<std::uintptr_t> blocks;
   for (const auto &entry : std::filesystem::directory_iterator(arguments[2]))
-    corpus.push_back(read_file(entry.path()));
+    if (entry.file_size() <= most)
+      corpus.push_back(read_file(entry.path()));
   if (target == 5)
     corpus.push_back(read_file(work / "seed.h5.part"));
   std::sort(corpus.begin(), corpus.end());
