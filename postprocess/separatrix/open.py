@@ -53,7 +53,7 @@ def reading(path: str | Path) -> Iterator[None]:
         raise
     except KeyError as error:
         raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
-    except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
         raise SeparatrixError(f"{path}: is damaged ({_first_line(error)})") from error
 
 

@@ -26,7 +26,7 @@ static void give_up(int number) {
 }
 
 /* From here to separatrix_guard_end the program ends with `code`, and says `text`, when a library crashes or uses more
-   than `seconds` of the processor. Not to be nested. */
+   than `seconds` of the processor (0 = no limit). Not to be nested. */
 void separatrix_guard_begin(const char *text, int seconds, int code) {
   const struct itimerval limit = {{0, 0}, {seconds, 0}};
   struct sigaction action = {0};

@@ -371,6 +371,22 @@ int64_t separatrix_toml_text(const void *document, int entry, int field, char *b
   return copy_into(field == SEPARATRIX_TOML_PATH ? found.path : found.text, buffer, capacity);
 }
 
+int64_t separatrix_first_bad_byte(const char *text, int64_t length) {
+  try {
+    const std::string all(text, static_cast<std::size_t>(length));
+    for (std::size_t at = 0; at < all.size();) {
+      const std::size_t step = sequence_at(all, at);
+      const bool control = static_cast<unsigned char>(all[at]) < 0x20 && std::strchr("\t\r\n", all[at]) == nullptr;
+      if (step == 0 || control || all[at] == '\0')
+        return static_cast<int64_t>(at);
+      at += step;
+    }
+    return -1;
+  } catch (...) {
+    return 0;
+  }
+}
+
 uint64_t separatrix_fnv1a(const char *text, int64_t length) {
   uint64_t hash = 14695981039346656037ULL;
   for (int64_t i = 0; i < length; ++i) {

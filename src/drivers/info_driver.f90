@@ -44,6 +44,7 @@ contains
     if (allocated(error)) return
     body = ''
     call add_attributes(reader, json, body, error)
+    if (.not. allocated(error)) call add_tiles(reader, json, body, error)
     if (.not. allocated(error)) call add_variables(variables, json, body)
     if (.not. allocated(error)) call add_codes(reader, json, 'regime', regime_names, body, error)
     if (.not. allocated(error)) call add_codes(reader, json, 'reason', reason_names, body, error)
@@ -99,6 +100,25 @@ contains
     end subroutine add_one
 
   end subroutine add_attributes
+
+  !> How many tiles of a file are done.
+  subroutine add_tiles(reader, json, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: states(:)
+    integer :: done
+    if (.not. reader%has('/tiles/state')) return
+    call reader%read_values('/tiles/state', states, error)
+    if (allocated(error)) return
+    done = count(abs(states - 1) <= 0)
+    if (json) then
+      body = body//', "tiles_done": '//to_text(done)//', "tiles": '//to_text(size(states))
+    else
+      body = body//new_line('a')//'  tiles: '//to_text(done)//' of '//to_text(size(states))//' done'
+    end if
+  end subroutine add_tiles
 
   subroutine add_variables(variables, json, body)
     type(variable_info_t), intent(in) :: variables(:)

@@ -264,7 +264,11 @@ contains
       grid = grid_of(the_case, axes(:merge(1, 0, table(point, 3) > 0)))
       call slice_motion(grid, 0_int64, moving, error)
       if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
-      if (allocated(error)) return
+      if (allocated(error)) then
+        error%code = exit_io
+        error%message = "'"//reader%path//"', point "//to_text(point - 1)//': '//error%message
+        return
+      end if
       call run_trajectory(moving, none%attractors, span, table(point, 1), table(point, 2), grid%start(3), outcome)
       audit%points = audit%points + 1
       if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &

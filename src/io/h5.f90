@@ -7,6 +7,7 @@ module h5
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use errors, only: error_t, fail
   use files, only: free_bytes
+  use guard, only: begin_guard, end_guard
   use h5_access, only: set_parallel_access
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
@@ -32,7 +33,7 @@ module h5
 
   public :: h5_create, h5_open, h5_close, h5_flush, h5_exists, h5_create_group, h5_create_dataset, &
     h5_open_dataset, h5_close_dataset, h5_check_stored, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
-    h5_version
+    h5_version, h5_trap
 
   !> An open file.
   type, public :: h5_file_t
@@ -56,7 +57,18 @@ module h5
     logical :: fixed = .false.
   end type h5_storage_t
 
+  !> Seconds of the processor that no reading of names, types and strings takes.
+  integer, parameter, public :: trap_seconds = 30
+
 contains
+
+  !> Until `end_guard`: where HDF5 crashes in a damaged file, or reads names, types or strings for ever (`endless`), the
+  !> program ends with code 74. HDF5 1.10 does both: its heap of strings, for one, has no checksum.
+  subroutine h5_trap(what, path, endless)
+    character(len=*), intent(in) :: what, path
+    logical, intent(in) :: endless
+    call begin_guard('HDF5 fails in '''//path//''' at '//what//': the file is damaged', merge(trap_seconds, 0, endless), exit_io)
+  end subroutine h5_trap
 
   !> Whether the step failed; then sets the error, unless there is one already.
   logical function h5_failed(status, action, object, path, error)
@@ -148,7 +160,9 @@ contains
     if (present(team) .and. status >= 0) then
       if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
     end if
+    call h5_trap('its beginning', path, endless=.true.)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
+    call end_guard()
     if (h5_failed(status, 'open', '', path, error)) return
     call h5pclose_f(access, ignored)
   end subroutine h5_open
@@ -180,8 +194,10 @@ contains
     integer :: status, slash
     h5_exists = .true.
     slash = index(name, '/', back=.true.)
+    call h5_trap(name, file%path, endless=.true.)
     if (slash > 1) call h5lexists_f(file%id, name(:slash - 1), h5_exists, status)
     if (h5_exists) call h5lexists_f(file%id, name, h5_exists, status)
+    call end_guard()
   end function h5_exists
 
   !> Creates a group unless it exists.
@@ -290,9 +306,11 @@ contains
     integer :: status, rank
     dataset%name = name
     dataset%path = file%path
+    call h5_trap(name, file%path, endless=.true.)
     call h5dopen_f(file%id, name, dataset%id, status)
     if (status >= 0) call h5dget_space_f(dataset%id, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
+    call end_guard()
     if (h5_failed(status, 'open', name, file%path, error)) return
     allocate (sizes(rank), most(rank))
     if (rank > 0) call h5sget_simple_extent_dims_f(space, sizes, most, status)
@@ -330,7 +348,9 @@ contains
     real(real64) :: claimed
     integer :: status
     ! The Fortran interface reports nothing stored as an error.
+    call h5_trap(dataset%name, dataset%path, endless=.true.)
     call h5dget_storage_size_f(dataset%id, stored, status)
+    call end_guard()
     if (status < 0) stored = 0
     claimed = product(real(dataset%lengths, real64))*merge(reference, real(bytes_of(dataset%type), real64), &
                                                            dataset%type == type_string)
@@ -377,7 +397,9 @@ contains
     if (size(bytes) == 0) return
     address = c_loc(bytes)
     call select_block(dataset, memory, space, status, lower, extent)
+    call h5_trap(dataset%name, dataset%path, endless=.false.)
     if (status >= 0) call h5dread_f(dataset%id, h5_type(dataset%type), address, status, memory, space)
+    call end_guard()
     if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return
     call h5sclose_f(memory, ignored)
     call h5sclose_f(space, ignored)

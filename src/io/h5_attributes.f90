@@ -7,8 +7,8 @@ module h5_attributes
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr
   use bindings, only: c_string_length
   use errors, only: error_t
-  use guard, only: begin_guard, end_guard
-  use h5, only: h5_check_stored, h5_dataset_t, h5_failed, h5_file_t, h5_string_type, h5_type
+  use guard, only: end_guard
+  use h5, only: h5_check_stored, h5_dataset_t, h5_failed, h5_file_t, h5_string_type, h5_trap, h5_type
   use h5ds, only: h5dsattach_scale_f, h5dsset_scale_f
   use hdf5, only: &
     h5aclose_f, h5acreate_by_name_f, h5adelete_by_name_f, h5aexists_by_name_f, h5aget_space_f, &
@@ -16,16 +16,12 @@ module h5_attributes
     h5dwrite_f, H5P_DEFAULT_F, H5S_SCALAR_F, h5sclose_f, h5screate_f, h5screate_simple_f, &
     h5sget_simple_extent_npoints_f, h5tclose_f, hid_t, hsize_t
   use kinds, only: int64, int8, real64
-  use status, only: exit_io
   use value_types, only: bytes_of, from_bytes, to_bytes, type_float64
   implicit none
   private
 
   public :: h5_put_text, h5_put_numbers, h5_get_text, h5_get_numbers, h5_has_attribute, &
     h5_write_strings, h5_read_strings, h5_make_scale, h5_attach_scale
-
-  !> Seconds of the processor that no reading of strings takes.
-  integer, parameter :: trap_seconds = 5
 
 contains
 
@@ -34,7 +30,9 @@ contains
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: object, name
     integer :: status
+    call h5_trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aexists_by_name_f(file%id, object, name, h5_has_attribute, status)
+    call end_guard()
     if (status < 0) h5_has_attribute = .false.
   end function h5_has_attribute
 
@@ -114,16 +112,14 @@ contains
     integer :: status, ignored
     pointers = c_null_ptr
     address = c_loc(pointers)
+    call h5_trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aopen_by_name_f(file%id, object, name, attribute, status)
     if (status >= 0) call h5aget_space_f(attribute, space, status)
     if (status >= 0) call h5sget_simple_extent_npoints_f(space, count, status)
     if (status >= 0 .and. count > 1) status = -1
     if (status >= 0) call h5_string_type(type_id, status)
-    if (status >= 0) then
-      call begin_guard(trap_text('attribute '''//name//''' of '''//object//'''', file%path), trap_seconds, exit_io)
-      call h5aread_f(attribute, type_id, address, status)
-      call end_guard()
-    end if
+    if (status >= 0) call h5aread_f(attribute, type_id, address, status)
+    call end_guard()
     if (h5_failed(status, 'read attribute '''//name//''' of', object, file%path, error)) return
     call copy_string(pointers(1), text)
     call h5dvlen_reclaim_f(type_id, space, H5P_DEFAULT_F, address, ignored)
@@ -143,9 +139,11 @@ contains
     integer(hid_t) :: attribute, space
     integer(hsize_t) :: count
     integer :: status, ignored
+    call h5_trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aopen_by_name_f(file%id, object, name, attribute, status)
     if (status >= 0) call h5aget_space_f(attribute, space, status)
     if (status >= 0) call h5sget_simple_extent_npoints_f(space, count, status)
+    call end_guard()
     if (h5_failed(status, 'read attribute '''//name//''' of', object, file%path, error)) return
     allocate (bytes(count*bytes_of(type_float64)), values(count))
     address = c_loc(bytes)
@@ -199,11 +197,9 @@ contains
     if (size(pointers) > 0) then
       address = c_loc(pointers)
       call h5_string_type(type_id, status)
-      if (status >= 0) then
-        call begin_guard(trap_text(dataset%name, dataset%path), trap_seconds, exit_io)
-        call h5dread_f(dataset%id, type_id, address, status)
-        call end_guard()
-      end if
+      call h5_trap(dataset%name, dataset%path, endless=.true.)
+      if (status >= 0) call h5dread_f(dataset%id, type_id, address, status)
+      call end_guard()
       if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return
       do i = 1, size(pointers)
         if (c_associated(pointers(i))) longest = max(longest, int(c_string_length(pointers(i))))
@@ -220,14 +216,6 @@ contains
     call h5sclose_f(space, ignored)
     call h5tclose_f(type_id, ignored)
   end subroutine h5_read_strings
-
-  !> What is said where the library does not come back: it keeps strings in a heap that has no checksum, and loops for
-  !> ever where a length in there is zero.
-  pure function trap_text(what, path) result(message)
-    character(len=*), intent(in) :: what, path
-    character(len=:), allocatable :: message
-    message = 'HDF5 cannot read '//what//' in '''//path//''': the strings of the file are damaged'
-  end function trap_text
 
   subroutine copy_string(pointer, text)
     type(c_ptr), intent(in) :: pointer
