@@ -46,14 +46,23 @@ def open_result(path: str | Path) -> xr.Dataset:
 
 @contextmanager
 def reading(path: str | Path) -> Iterator[None]:
-    """Turn what the libraries raise for a damaged file into a SeparatrixError; their choice of types is their own."""
+    """Turn what the libraries raise for a damaged file into a SeparatrixError."""
     try:
         yield
     except SeparatrixError:
         raise
     except KeyError as error:
         raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
-    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        MemoryError,
+        OSError,
+        RuntimeError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise SeparatrixError(f"{path}: is damaged ({_first_line(error)})") from error
 
 

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: The Separatrix developers */
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 
-/* Ends the program with a message where a library loops for ever, or crashes, on a damaged file. The time is that of
-   the processor, so that a slow file system is not taken for a loop. */
+/* Ends the program with a message where a library loops for ever, or crashes, on a damaged file. The time is
+   that of the processor, so that a slow file system is not taken for a loop. */
 #define _GNU_SOURCE
 #include <signal.h>
 #include <stddef.h>
@@ -25,8 +25,8 @@ static void give_up(int number) {
   _exit(exit_code);
 }
 
-/* From here to separatrix_guard_end the program ends with `code`, and says `text`, when a library crashes or uses more
-   than `seconds` of the processor (0 = no limit). Not to be nested. */
+/* From here to separatrix_guard_end the program ends with `code`, and says `text`, when a library crashes or
+   uses more than `seconds` of the processor (0 = no limit). Not to be nested. */
 void separatrix_guard_begin(const char *text, int seconds, int code) {
   const struct itimerval limit = {{0, 0}, {seconds, 0}};
   struct sigaction action = {0};

@@ -104,14 +104,14 @@ int separatrix_cpu_name(char *text, int size) {
   return -1;
 }
 
-/* The environment variables that decide how MPI, HDF5 and the batch system work, NAME=VALUE separated by blanks, in
-   the order of the alphabet. */
+/* The environment variables that decide how MPI, HDF5 and the batch system work, NAME=VALUE separated by
+   blanks, in the order of the alphabet. */
 void separatrix_environment(char *text, int size) {
   static const char *const wanted[] = {"FI_",   "HDF5_", "OMPI_MCA_",     "OMP_",         "PRTE_MCA_",
                                        "ROMIO", "UCX_",  "SLURM_JOB_ID=", "SLURM_ARRAY_", "TMPDIR="};
   /* What mpirun tells its processes. */
-  static const char *const internal[] = {"OMPI_MCA_orte_", "OMPI_MCA_ess", "OMPI_MCA_initial_wdir", "OMPI_MCA_pmix",
-                                         "OMPI_MCA_shmem_RUNTIME"};
+  static const char *const internal[] = {"OMPI_MCA_orte_", "OMPI_MCA_ess", "OMPI_MCA_initial_wdir",
+                                         "OMPI_MCA_pmix", "OMPI_MCA_shmem_RUNTIME"};
   size_t used = 0;
   const char *last = "";
   text[0] = '\0';

@@ -245,8 +245,8 @@ std::size_t sequence_at(const std::string &text, std::size_t at) {
       return 0;
   // Overlong forms, surrogates, and what is beyond the last code point.
   const unsigned second = byte(at + 1);
-  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) || (first == 0xF0 && second < 0x90) ||
-      (first == 0xF4 && second > 0x8F))
+  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+      (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F))
     return 0;
   return length;
 }
@@ -376,7 +376,8 @@ int64_t separatrix_first_bad_byte(const char *text, int64_t length) {
     const std::string all(text, static_cast<std::size_t>(length));
     for (std::size_t at = 0; at < all.size();) {
       const std::size_t step = sequence_at(all, at);
-      const bool control = static_cast<unsigned char>(all[at]) < 0x20 && std::strchr("\t\r\n", all[at]) == nullptr;
+      const bool control =
+          static_cast<unsigned char>(all[at]) < 0x20 && std::strchr("\t\r\n", all[at]) == nullptr;
       if (step == 0 || control || all[at] == '\0')
         return static_cast<int64_t>(at);
       at += step;

@@ -29,7 +29,7 @@ module basin_driver
   public :: run_basin, prepare_basin, prepare_counts, describe_basin, end_basin
 
   !> Bytes of a point in the working file.
-  integer, parameter, public :: bytes_per_point = 1 + 2 + 1 + 2 + 8 + 8*4
+  integer, parameter, public :: bytes_per_point = 1 + 4 + 1 + 2 + 8 + 8*4
   !> Slices up to which a dry run builds the catalogues.
   integer, parameter :: most_dry_slices = 16
 

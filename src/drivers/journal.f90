@@ -95,14 +95,18 @@ contains
     flush (output_unit)
   end subroutine line
 
+  !> A log that cannot be written does not end the work: it is said once.
   subroutine write_copy(self, event, message, more)
-    class(journal_t), intent(in) :: self
+    class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: event, message, more
-    integer :: ignored
+    character(len=256) :: reason
+    integer :: status
     if (self%copy == 0) return
-    ! A log that cannot be written does not end the work.
-    write (self%copy, '(a)', iostat=ignored) json_line(self, event, message, more)
-    flush (self%copy, iostat=ignored)
+    write (self%copy, '(a)', iostat=status, iomsg=reason) json_line(self, event, message, more)
+    if (status == 0) flush (self%copy, iostat=status, iomsg=reason)
+    if (status == 0) return
+    self%copy = 0
+    write (error_unit, '(a)') 'separatrix: the log cannot be written any more: '//trim(reason)
   end subroutine write_copy
 
   function json_line(self, event, message, more) result(line)

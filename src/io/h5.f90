@@ -7,11 +7,12 @@ module h5
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use errors, only: error_t, fail
   use files, only: free_bytes
-  use guard, only: begin_guard, end_guard
+  use guard, only: end_guard
   use h5_access, only: set_parallel_access
+  use h5_trap, only: trap
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
-    h5dget_storage_size_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
+    h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
     H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
     h5fcreate_f, h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
@@ -23,17 +24,17 @@ module h5
     H5T_IEEE_F64LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U32LE, &
     H5T_STRING, h5tclose_f, h5tcopy_f, h5tequal_f, h5tis_variable_str_f, h5tset_cset_f, hid_t, &
     hsize_t
-  use kinds, only: int64, int8, real64
+  use kinds, only: int64, int8
   use status, only: exit_cannot_create, exit_io
   use team, only: team_t
   use text, only: to_text
-  use value_types, only: bytes_of, is_float, type_string
+  use value_types, only: is_float, type_string
   implicit none
   private
 
   public :: h5_create, h5_open, h5_close, h5_flush, h5_exists, h5_create_group, h5_create_dataset, &
-    h5_open_dataset, h5_close_dataset, h5_check_stored, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
-    h5_version, h5_trap
+    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
+    h5_version
 
   !> An open file.
   type, public :: h5_file_t
@@ -57,18 +58,7 @@ module h5
     logical :: fixed = .false.
   end type h5_storage_t
 
-  !> Seconds of the processor that no reading of names, types and strings takes.
-  integer, parameter, public :: trap_seconds = 30
-
 contains
-
-  !> Until `end_guard`: where HDF5 crashes in a damaged file, or reads names, types or strings for ever (`endless`), the
-  !> program ends with code 74. HDF5 1.10 does both: its heap of strings, for one, has no checksum.
-  subroutine h5_trap(what, path, endless)
-    character(len=*), intent(in) :: what, path
-    logical, intent(in) :: endless
-    call begin_guard('HDF5 fails in '''//path//''' at '//what//': the file is damaged', merge(trap_seconds, 0, endless), exit_io)
-  end subroutine h5_trap
 
   !> Whether the step failed; then sets the error, unless there is one already.
   logical function h5_failed(status, action, object, path, error)
@@ -160,7 +150,7 @@ contains
     if (present(team) .and. status >= 0) then
       if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
     end if
-    call h5_trap('its beginning', path, endless=.true.)
+    call trap('its beginning', path, endless=.true.)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
     call end_guard()
     if (h5_failed(status, 'open', '', path, error)) return
@@ -194,7 +184,7 @@ contains
     integer :: status, slash
     h5_exists = .true.
     slash = index(name, '/', back=.true.)
-    call h5_trap(name, file%path, endless=.true.)
+    call trap(name, file%path, endless=.true.)
     if (slash > 1) call h5lexists_f(file%id, name(:slash - 1), h5_exists, status)
     if (h5_exists) call h5lexists_f(file%id, name, h5_exists, status)
     call end_guard()
@@ -306,7 +296,7 @@ contains
     integer :: status, rank
     dataset%name = name
     dataset%path = file%path
-    call h5_trap(name, file%path, endless=.true.)
+    call trap(name, file%path, endless=.true.)
     call h5dopen_f(file%id, name, dataset%id, status)
     if (status >= 0) call h5dget_space_f(dataset%id, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
@@ -337,26 +327,6 @@ contains
     if (dataset%type == 0) status = -1
     call h5tclose_f(found, ignored)
   end subroutine find_type
-
-  !> Code 74 if a dataset claims many more values than what is stored of it can hold: before memory is taken for them.
-  subroutine h5_check_stored(dataset, error)
-    type(h5_dataset_t), intent(in) :: dataset
-    type(error_t), allocatable, intent(out) :: error
-    !> Deflate makes no more than 1032 bytes out of one; a string is stored as a reference of 16 bytes.
-    real(real64), parameter :: largest_ratio = 1100, reference = 16
-    integer(hsize_t) :: stored
-    real(real64) :: claimed
-    integer :: status
-    ! The Fortran interface reports nothing stored as an error.
-    call h5_trap(dataset%name, dataset%path, endless=.true.)
-    call h5dget_storage_size_f(dataset%id, stored, status)
-    call end_guard()
-    if (status < 0) stored = 0
-    claimed = product(real(dataset%lengths, real64))*merge(reference, real(bytes_of(dataset%type), real64), &
-                                                           dataset%type == type_string)
-    if (claimed > largest_ratio*stored) call fail(error, exit_io, ''''//dataset%name//''' of '''//dataset%path// &
-      ''' is damaged: its values take '//to_text(claimed, 4)//' bytes, '//to_text(int(stored, int64))//' are stored')
-  end subroutine h5_check_stored
 
   !> Closes a dataset; one that is not open stays so.
   subroutine h5_close_dataset(dataset, error)
@@ -397,7 +367,7 @@ contains
     if (size(bytes) == 0) return
     address = c_loc(bytes)
     call select_block(dataset, memory, space, status, lower, extent)
-    call h5_trap(dataset%name, dataset%path, endless=.false.)
+    call trap(dataset%name, dataset%path, endless=.false.)
     if (status >= 0) call h5dread_f(dataset%id, h5_type(dataset%type), address, status, memory, space)
     call end_guard()
     if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return

@@ -8,7 +8,9 @@ module h5_attributes
   use bindings, only: c_string_length
   use errors, only: error_t
   use guard, only: end_guard
-  use h5, only: h5_check_stored, h5_dataset_t, h5_failed, h5_file_t, h5_string_type, h5_trap, h5_type
+  use h5, only: h5_dataset_t, h5_failed, h5_file_t, h5_string_type, h5_type
+  use h5_stored, only: h5_check_stored
+  use h5_trap, only: trap
   use h5ds, only: h5dsattach_scale_f, h5dsset_scale_f
   use hdf5, only: &
     h5aclose_f, h5acreate_by_name_f, h5adelete_by_name_f, h5aexists_by_name_f, h5aget_space_f, &
@@ -30,7 +32,7 @@ contains
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: object, name
     integer :: status
-    call h5_trap('attribute '//name//' of '//object, file%path, endless=.true.)
+    call trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aexists_by_name_f(file%id, object, name, h5_has_attribute, status)
     call end_guard()
     if (status < 0) h5_has_attribute = .false.
@@ -112,7 +114,7 @@ contains
     integer :: status, ignored
     pointers = c_null_ptr
     address = c_loc(pointers)
-    call h5_trap('attribute '//name//' of '//object, file%path, endless=.true.)
+    call trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aopen_by_name_f(file%id, object, name, attribute, status)
     if (status >= 0) call h5aget_space_f(attribute, space, status)
     if (status >= 0) call h5sget_simple_extent_npoints_f(space, count, status)
@@ -139,7 +141,7 @@ contains
     integer(hid_t) :: attribute, space
     integer(hsize_t) :: count
     integer :: status, ignored
-    call h5_trap('attribute '//name//' of '//object, file%path, endless=.true.)
+    call trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aopen_by_name_f(file%id, object, name, attribute, status)
     if (status >= 0) call h5aget_space_f(attribute, space, status)
     if (status >= 0) call h5sget_simple_extent_npoints_f(space, count, status)
@@ -197,7 +199,7 @@ contains
     if (size(pointers) > 0) then
       address = c_loc(pointers)
       call h5_string_type(type_id, status)
-      call h5_trap(dataset%name, dataset%path, endless=.true.)
+      call trap(dataset%name, dataset%path, endless=.true.)
       if (status >= 0) call h5dread_f(dataset%id, type_id, address, status)
       call end_guard()
       if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return

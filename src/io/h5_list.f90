@@ -5,7 +5,8 @@
 module h5_list
   use errors, only: error_t
   use guard, only: end_guard
-  use h5, only: h5_failed, h5_file_t, h5_trap
+  use h5, only: h5_failed, h5_file_t
+  use h5_trap, only: trap
   use hdf5, only: &
     H5_INDEX_CRT_ORDER_F, H5_INDEX_NAME_F, H5_ITER_INC_F, h5gclose_f, h5gget_create_plist_f, h5gget_info_f, &
     h5gopen_f, H5I_GROUP_F, h5iget_type_f, h5lget_name_by_idx_f, h5oclose_f, h5oopen_f, H5P_CRT_ORDER_TRACKED_F, &
@@ -27,7 +28,7 @@ contains
     integer(hid_t) :: parent, child, creation
     integer :: status, storage, count, order, i, kind, index_type, flags
     integer(size_t) :: length
-    call h5_trap(group, file%path, endless=.true.)
+    call trap(group, file%path, endless=.true.)
     call h5gopen_f(file%id, group, parent, status)
     if (status >= 0) call h5gget_info_f(parent, storage, count, order, status)
     if (status >= 0) call h5gget_create_plist_f(parent, creation, status)
@@ -42,7 +43,7 @@ contains
     if (iand(flags, H5P_CRT_ORDER_TRACKED_F) /= 0) index_type = H5_INDEX_CRT_ORDER_F
     do i = 1, count
       names(i) = ''
-      call h5_trap(group, file%path, endless=.true.)
+      call trap(group, file%path, endless=.true.)
       call h5lget_name_by_idx_f(parent, '.', index_type, H5_ITER_INC_F, int(i - 1, hsize_t), names(i), status, length)
       if (status >= 0) call h5oopen_f(parent, trim(names(i)), child, status)
       if (status >= 0) call h5iget_type_f(child, kind, status)

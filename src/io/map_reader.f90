@@ -4,9 +4,10 @@
 !> Reading a file of Separatrix.
 module map_reader
   use errors, only: error_t, fail
-  use h5, only: h5_check_stored, h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
+  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
     h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
+  use h5_stored, only: h5_check_stored
   use h5_list, only: h5_children
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of

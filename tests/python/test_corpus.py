@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 from program import CASE, STARTS, Outcome, run, write_case
-
 from separatrix import SeparatrixError, open_result
 from separatrix.open import reading
 
@@ -41,7 +40,9 @@ def test_case_files(separatrix, tmp_path, path):
     refused(run(separatrix, "basin", path, "--validate", folder=tmp_path, timeout=10), 65)
 
 
-@pytest.mark.parametrize("path", sorted([*CORPUS.glob("*.hdf"), *CORPUS.glob("*.part")]), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted([*CORPUS.glob("*.hdf"), *CORPUS.glob("*.part")]), ids=lambda path: path.name
+)
 def test_result_files(separatrix, tmp_path, path):
     check(run(separatrix, "info", path, folder=tmp_path, timeout=60))
     outcome = run(separatrix, "verify", path, "--sample", "1", folder=tmp_path, timeout=60)
@@ -118,7 +119,18 @@ def awkward_lists() -> dict[str, bytes]:
 def test_awkward_lists(separatrix, tmp_path, name):
     write_case(tmp_path)
     (tmp_path / "starts.csv").write_bytes(awkward_lists()[name])
-    check(run(separatrix, "points", "case.toml", "--list", "starts.csv", "--validate", folder=tmp_path, timeout=10))
+    check(
+        run(
+            separatrix,
+            "points",
+            "case.toml",
+            "--list",
+            "starts.csv",
+            "--validate",
+            folder=tmp_path,
+            timeout=10,
+        )
+    )
 
 
 def test_flipped_bits_and_cuts_of_a_result(separatrix, results, tmp_path):

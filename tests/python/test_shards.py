@@ -156,5 +156,3 @@ def test_bad_shares(separatrix, tmp_path, value):
     assert outcome.code == 64
     assert f"'{value}'" in outcome.err and "I/N" in outcome.err
     assert list(listing(tmp_path)) == ["case.toml"]
-
-

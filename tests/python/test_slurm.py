@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The batch scripts on a one-node SLURM that this test starts; as root, asked for by SEPARATRIX_SLURM=1.
 
-    apt-get install slurmctld slurmd slurm-client munge
-    SEPARATRIX_SLURM=1 pytest tests/python/test_slurm.py
+apt-get install slurmctld slurmd slurm-client munge
+SEPARATRIX_SLURM=1 pytest tests/python/test_slurm.py
 """
 
 import json
@@ -53,8 +53,8 @@ StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
 SlurmctldPidFile={folder}/slurmctld.pid
 SlurmdPidFile={folder}/slurmd.pid
-SlurmctldPort=16817
-SlurmdPort=16818
+SlurmctldPort={free_port()}
+SlurmdPort={free_port()}
 ProctrackType=proctrack/pgid
 TaskPlugin=task/none
 MpiDefault=none
@@ -69,26 +69,35 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """
     )
     environment = os.environ | {"SLURM_CONF": str(folder / "slurm.conf"), "SEPARATRIX_ROOT": str(ROOT)}
+    munge = ["munged", "-F", "-f", f"--key-file={folder}/key", f"--socket={folder}/munge.socket"]
+    munge += [f"--pid-file={folder}/munged.pid", f"--seed-file={folder}/munged.seed"]
     daemons = []
-    for command in (
-        ["munged", "-F", "-f", f"--key-file={folder}/key", f"--socket={folder}/munge.socket"]
-        + [f"--pid-file={folder}/munged.pid", f"--seed-file={folder}/munged.seed"],
-        ["slurmctld", "-D"],
-        ["slurmd", "-D"],
-    ):
-        log = (folder / "log" / command[0]).open("w")
-        daemons.append(subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT))
+    try:
+        for command in (munge, ["slurmctld", "-D"], ["slurmd", "-D"]):
+            log = (folder / "log" / command[0]).open("w")
+            daemons.append(subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT))
+            time.sleep(1)
+        deadline = time.monotonic() + 60
+        while (
+            "idle"
+            not in subprocess.run(["sinfo", "-h"], env=environment, capture_output=True, text=True).stdout
+        ):
+            assert time.monotonic() < deadline, [path.read_text() for path in (folder / "log").iterdir()]
+            time.sleep(0.5)
+        yield environment
+        subprocess.run(["scancel", "--user=root"], env=environment)
         time.sleep(1)
-    deadline = time.monotonic() + 60
-    while "idle" not in subprocess.run(["sinfo", "-h"], env=environment, capture_output=True, text=True).stdout:
-        assert time.monotonic() < deadline, [path.read_text() for path in (folder / "log").iterdir()]
-        time.sleep(0.5)
-    yield environment
-    subprocess.run(["scancel", "--user=root"], env=environment)
-    time.sleep(1)
-    for daemon in reversed(daemons):
-        daemon.terminate()
-        daemon.wait(30)
+    finally:
+        for daemon in reversed(daemons):
+            daemon.terminate()
+            daemon.wait(30)
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as found:
+        found.bind(("", 0))
+        return found.getsockname()[1]
 
 
 def sbatch(cluster: dict[str, str], separatrix: Path, folder: Path, *arguments: str) -> str:
@@ -106,7 +115,9 @@ def sbatch(cluster: dict[str, str], separatrix: Path, folder: Path, *arguments: 
 
 def facts(cluster: dict[str, str], job: str) -> dict[str, str]:
     """What the controller knows of a job."""
-    shown = subprocess.run(["scontrol", "show", "job", "-o", job], env=cluster, capture_output=True, text=True).stdout
+    shown = subprocess.run(
+        ["scontrol", "show", "job", "-o", job], env=cluster, capture_output=True, text=True
+    ).stdout
     return dict(word.split("=", 1) for word in shown.split() if "=" in word)
 
 

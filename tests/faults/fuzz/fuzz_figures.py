@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""fuzz_figures.py SEEDS WORK --seconds S --seed N: the reader of the figures, as fuzz_readers does the others.
+"""fuzz_figures.py SEEDS WORK --seconds S --seed N: the reader of the figures under changed inputs.
 
 A file that is not refused has every variable read and decoded. Only the package's own exception may come out.
 """
@@ -54,7 +54,9 @@ def change(data: bytes, chance: random.Random) -> bytes:
         if what < 3:
             changed[at] ^= 1 << chance.randrange(8)
         elif what == 3:
-            changed[at : at + 8] = struct.pack("<q", chance.choice([0, -1, 2**31, 2**62, 255]))[: len(changed) - at]
+            changed[at : at + 8] = struct.pack("<q", chance.choice([0, -1, 2**31, 2**62, 255]))[
+                : len(changed) - at
+            ]
         elif what == 4:
             changed[at : at + chance.randrange(64)] = chance.randbytes(chance.randrange(64))
         else:

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// fuzz_readers TARGET SEEDS WORK --seconds S --seed N: feeds a reader with mutated inputs in one process, keeps
-// what reaches new basic blocks, and prints one JSON line. WORK/current is the input under way, so that the
-// caller has it when this process dies; an input that takes too long, an exit or an internal error of the reader
-// (code 70) ends the process as a crash does.
+// fuzz_readers TARGET SEEDS WORK --seconds S --seed N: feeds a reader with mutated inputs in one process,
+// keeps what reaches new basic blocks, and prints one JSON line. WORK/current is the input under way, so that
+// the caller has it when this process dies; an input that takes too long, an exit or an internal error of the
+// reader (code 70) ends the process as a crash does.
 #include "mutator.hpp"
 
 #include <algorithm>
@@ -26,9 +26,9 @@
 #include <vector>
 
 // fuzz_targets.f90: exit code and length of the message of a reader.
-extern "C" void fuzz_target(int target, const char *bytes, int64_t length, const char *path, int *code,
-                            int *message_length);
-extern "C" void fuzz_make_working(const char *path);
+extern "C" void fuzz_target(int target, const char *bytes, int64_t length, const char *path,
+                            int64_t path_length, int *code, int *message_length);
+extern "C" void fuzz_make_working(const char *path, int64_t path_length);
 
 namespace {
 
@@ -95,6 +95,10 @@ std::string read_file(const std::filesystem::path &path) {
   return content.str();
 }
 
+void make_working(const std::string &path) {
+  fuzz_make_working(path.data(), static_cast<int64_t>(path.size()));
+}
+
 std::map<int, long> codes;
 
 // Runs one input; returns whether it reached new blocks.
@@ -112,7 +116,8 @@ bool run(int target, const std::string &input, const std::string &scratch, Curre
   const itimerval none = {{0, 0}, {0, 0}};
   setitimer(ITIMER_REAL, &limit, nullptr);
   running = tracing = true;
-  fuzz_target(target, input.data(), static_cast<int64_t>(input.size()), scratch.c_str(), &code, &message_length);
+  fuzz_target(target, input.data(), static_cast<int64_t>(input.size()), scratch.data(),
+              static_cast<int64_t>(scratch.size()), &code, &message_length);
   running = tracing = false;
   setitimer(ITIMER_REAL, &none, nullptr);
   ++codes[code];
@@ -193,7 +198,7 @@ int main(int count, char **arguments) {
   std::atexit(on_exit);
   __sanitizer_set_death_callback(give_up);
   if (target == 5)
-    fuzz_make_working((work / "seed.h5").c_str());
+    make_working(work / "seed.h5");
 
   reached = reinterpret_cast<unsigned char *>(map_file(work / "reached", map_size));
 
@@ -238,7 +243,9 @@ int main(int count, char **arguments) {
     if (run(target, input, scratch, current)) {
       corpus.push_back(input);
       ++kept;
-      std::ofstream(work / "kept" / (std::string(arguments[7]) + "-" + std::to_string(kept)), std::ios::binary) << input;
+      std::ofstream(work / "kept" / (std::string(arguments[7]) + "-" + std::to_string(kept)),
+                    std::ios::binary)
+          << input;
     }
   }
   std::ostringstream line;

@@ -3,8 +3,7 @@
 
 !> The readers as one C function for fuzz_readers.cpp: bytes or a file in, exit code and length of the message out.
 module fuzz_targets
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
-  use axis, only: axis_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of
   use case_type, only: case_t
@@ -39,10 +38,10 @@ module fuzz_targets
 contains
 
   !> Runs the reader `which` on `length` bytes; the readers of files find them in `path`.
-  subroutine fuzz_target(which, bytes, length, path, code, message_length) bind(c)
+  subroutine fuzz_target(which, bytes, length, path, path_length, code, message_length) bind(c)
     integer(c_int), value :: which
-    integer(c_int64_t), value :: length
-    character(kind=c_char), intent(in) :: bytes(length), path(*)
+    integer(c_int64_t), value :: length, path_length
+    character(kind=c_char), intent(in) :: bytes(length), path(path_length)
     integer(c_int), intent(out) :: code, message_length
     type(error_t), allocatable :: error
     integer :: ignored
@@ -52,13 +51,13 @@ contains
     case (target_override)
       call read_override(text_of(bytes), error)
     case (target_points)
-      call read_points(path_text(path), error)
+      call read_points(text_of(path), error)
     case (target_info)
-      call run_info(path_text(path), .true., error)
+      call run_info(text_of(path), .true., error)
     case (target_verify)
-      call read_verify(path_text(path), error)
+      call read_verify(text_of(path), error)
     case (target_resume)
-      call read_working(path_text(path), error)
+      call read_working(text_of(path), error)
     end select
     ! After an error the program ends, and leaves objects open that would keep the next file from being read anew.
     if (which >= target_info) call h5close_f(ignored)
@@ -137,14 +136,15 @@ contains
   end subroutine read_working
 
   !> Writes a working file with some tiles done, to be resumed.
-  subroutine fuzz_make_working(path) bind(c)
-    character(kind=c_char), intent(in) :: path(*)
+  subroutine fuzz_make_working(path, path_length) bind(c)
+    integer(c_int64_t), value :: path_length
+    character(kind=c_char), intent(in) :: path(path_length)
     type(error_t), allocatable :: error
     type(map_file_t) :: file
     type(serial_team_t) :: alone
     real(wp) :: values(6, 2)
     integer :: tile, i
-    call create_working(path_text(path), small_schema(), ['x0', 'v0'], [2_int64, 3_int64], .true., alone, file, error)
+    call create_working(text_of(path), small_schema(), ['x0', 'v0'], [2_int64, 3_int64], .true., alone, file, error)
     values = reshape([(real(modulo(i, 6), wp), i=1, 12)], [6, 2])
     do tile = 1, 4
       if (.not. allocated(error)) call file%write_tile(tile, values, error)
@@ -155,12 +155,13 @@ contains
 
   function small_schema() result(schema)
     type(schema_t) :: schema
+    integer :: i
     call schema%add_attribute('', 'format', 'separatrix')
     call schema%add_attribute('provenance', 'case_identity', 'basin 0123456789abcdef')
     call schema%add_text('provenance', 'case_text', base_case)
     call schema%add_dimension('x0', 8_int64)
     call schema%add_dimension('v0', 6_int64)
-    call schema%add_variable('x0', type_float32, ['x0'], units='m', data=[0._wp, .1_wp, .2_wp, .3_wp, .4_wp, .5_wp, .6_wp, 1._wp])
+    call schema%add_variable('x0', type_float32, ['x0'], units='m', data=[(0.1_wp*i, i=0, 7)])
     call schema%add_variable('regime', type_int8, ['x0', 'v0'], units='1', flag_values=[0, 1], flag_meanings='a b', tiled=.true.)
     call schema%add_variable('x_max', type_float32, ['x0', 'v0'], units='m', tiled=.true.)
   end function small_schema
@@ -174,16 +175,5 @@ contains
       text(i:i) = bytes(i)
     end do
   end function text_of
-
-  function path_text(path) result(text)
-    character(kind=c_char), intent(in) :: path(*)
-    character(len=:), allocatable :: text
-    integer :: length
-    length = 0
-    do while (path(length + 1) /= c_null_char)
-      length = length + 1
-    end do
-    text = text_of(path(:length))
-  end function path_text
 
 end module fuzz_targets

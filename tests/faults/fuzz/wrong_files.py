@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Result files that HDF5 reads well and that are wrong all the same: objects missing, of another type or length."""
+"""Result files that HDF5 reads well and that are wrong all the same: objects missing, of another type."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -17,7 +17,9 @@ def wrong_files(files: list[Path], folder: Path) -> Iterator[Path]:
         with h5py.File(path) as file:
             names: list[str] = []
             file.visit(names.append)
-            attributes = [(name, key) for name in ["/", *names] for key in file[name].attrs if key.isidentifier()]
+            attributes = [
+                (name, key) for name in ["/", *names] for key in file[name].attrs if key.isidentifier()
+            ]
         number = 0
         for name in names:
             for change in [*OBJECT_CHANGES, *map(unsealed, OBJECT_CHANGES)]:
@@ -62,7 +64,9 @@ def remove(file: h5py.File, name: str) -> None:
 
 def replace(file: h5py.File, name: str, **how: object) -> None:
     """Another dataset has its name, with the same attributes."""
-    attributes = {key: value for key, value in file[name].attrs.items() if key in ("checksum", "units", "flag_values")}
+    attributes = {
+        key: value for key, value in file[name].attrs.items() if key in ("checksum", "units", "flag_values")
+    }
     del file[name]
     new = file.create_dataset(name, **how)
     for key, value in attributes.items():
