@@ -11,7 +11,7 @@ module h5_trap
   public :: trap
 
   !> Seconds of the processor that no reading of names, types and strings takes.
-  integer, parameter :: most_seconds = 30
+  integer, parameter :: most_seconds = 5
 
 contains
 

@@ -24,13 +24,17 @@ def test_the_log_has_what_stdout_says_and_more(mpi_separatrix, tmp_path, ranks):
     outcome = succeed(mpi_separatrix, *COMMAND, folder=tmp_path, ranks=ranks)
     lines = events(tmp_path)
     messages = [line["message"] for line in lines]
-    assert [message for message in messages if message in outcome.out.splitlines()] == outcome.out.splitlines()
+    assert [
+        message for message in messages if message in outcome.out.splitlines()
+    ] == outcome.out.splitlines()
     named = {line["event"]: line for line in lines}
     assert named["binding"]["ranks"] == max(1, ranks)
     assert named["binding"]["rank_cores"].count(":") == max(1, ranks)
     balance = named["balance"]
     assert len(balance["busy_percent"]) == max(1, ranks)
-    assert 0 <= balance["busy_percent_min"] <= balance["busy_percent_mean"] <= balance["busy_percent_max"] <= 100
+    assert (
+        0 <= balance["busy_percent_min"] <= balance["busy_percent_mean"] <= balance["busy_percent_max"] <= 100
+    )
     # 48 bytes a point.
     assert balance["written_bytes"] == 19 * 31 * 48
     assert balance["resident_bytes_max"] > 1e6
