@@ -4,7 +4,7 @@
 !> File operations that Fortran lacks. Errors name the file and the system's reason.
 module files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_error_text, c_file_exists, c_is_special, c_folder_status, c_free_bytes, &
+  use bindings, only: c_error_text, c_file_exists, c_guard_begin, c_guard_end, c_is_special, c_folder_status, c_free_bytes, &
     c_publish_file, c_remove_file, c_reserve_file
   use errors, only: error_t, fail
   use kinds, only: int64
@@ -13,7 +13,8 @@ module files
   implicit none
   private
 
-  public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file
+  public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
+    guard_begin, guard_end
 
 contains
 
@@ -62,6 +63,17 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call test(c_remove_file(path//c_null_char), exit_io, 'cannot remove', path, error)
   end subroutine remove_file
+
+  !> From now on a crash in a library is reported as damage of the file `path` with code 74.
+  subroutine guard_begin(path)
+    character(len=*), intent(in) :: path
+    call c_guard_begin(path//c_null_char)
+  end subroutine guard_begin
+
+  !> Crashes are crashes again.
+  subroutine guard_end()
+    call c_guard_end()
+  end subroutine guard_end
 
   subroutine test(number, code, action, path, error)
     integer(c_int), intent(in) :: number

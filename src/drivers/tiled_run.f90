@@ -12,6 +12,7 @@ module tiled_run
   use map_final, only: finalise
   use map_schema, only: schema_t
   use parallel, only: make_scheduler
+  use resumption, only: inspect_interrupted
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use status, only: exit_resumable
@@ -60,7 +61,7 @@ contains
   subroutine open_tiles(session, path, schema, grid, tile_shape, file)
     type(session_t), intent(inout) :: session
     character(len=*), intent(in) :: path
-    type(schema_t), intent(in) :: schema
+    type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: grid(:)
     integer, intent(in) :: tile_shape(:)
     type(map_file_t), intent(out) :: file
@@ -71,6 +72,8 @@ contains
     if (file_exists(working_path(path))) found = 1
     call session%team%broadcast(found)
     if (session%command%resume .and. found == 1) then
+      call inspect_interrupted(session, path, schema, error)
+      call session%stop_if(error)
       call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
     else
       call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
@@ -109,6 +112,7 @@ contains
       if (.not. whole) exit
       computed = computed + 1
     end do
+    if (scheduler%stop_requested()) call session%say_how_to_go_on(working_path(file%path))
     call scheduler%finish()
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)

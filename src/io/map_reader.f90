@@ -11,7 +11,7 @@ module map_reader
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
   use status, only: exit_io, exit_no_input
-  use files, only: file_exists
+  use files, only: file_exists, guard_begin, guard_end
   use output_check, only: is_folder
   use value_types, only: bytes_of, from_bytes, type_names, type_string
   implicit none
@@ -59,6 +59,7 @@ contains
       call fail(error, exit_no_input, ''''//path//''' is a folder')
     end if
     if (allocated(error)) return
+    call guard_begin(path)
     call h5_open(path, reader%file, error)
     if (allocated(error)) return
     format = ''
@@ -259,6 +260,7 @@ contains
     class(reader_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
     call h5_close(self%file, error)
+    call guard_end()
   end subroutine close_reader
 
 end module map_reader
