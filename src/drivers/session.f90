@@ -19,13 +19,16 @@ module session
   use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, termination_asked
   use status, only: exit_cannot_create, exit_io
-  use system, only: exit_program
+  use system, only: exit_program, sleep_microseconds
   use team, only: team_t
   use text, only: to_text
   implicit none
   private
 
   public :: open_session, describe_file
+
+  !> A signal to all ranks reaches them within this time, in microseconds.
+  integer, parameter :: signal_spread_us = 20000
 
   type, public :: session_t
     type(command_t) :: command
@@ -150,12 +153,13 @@ contains
   subroutine say_how_to_go_on(self, path)
     class(session_t), intent(inout) :: self
     character(len=*), intent(in) :: path
+    type(journal_t) :: own
     logical :: asked
+    if (self%team%size() == 1 .or. self%team%rank() > 1) return
+    call sleep_microseconds(signal_spread_us)
     asked = termination_asked()
-    if (self%team%size() == 1 .or. self%team%rank() > 1 .or. .not. asked) return
-    self%journal%active = .true.
-    call self%journal%error('rank '//to_text(self%team%rank())//' was told to end (SIGTERM); the tiles done are kept in '// &
-                            path//'; the same command with --resume (without --force) goes on')
+    if (asked) call own%error('rank '//to_text(self%team%rank())//' was told to end (SIGTERM); the tiles done are kept in '// &
+                              path//'; the same command with --resume (without --force) goes on')
   end subroutine say_how_to_go_on
 
   !> Ends the program at once because of an error of this rank alone.

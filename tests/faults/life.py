@@ -20,7 +20,7 @@ NAME = "map.h5"
 # Small and cheap, but many tiles.
 SETTINGS = [
     *("--set", "grid.tile=[8, 8]", "--set", "axis[1].count=44", "--set", "axis[2].count=52"),
-    *("--set", 'run.stop="duration"', "--set", "run.duration=12", "--set", "attractors.sample=16"),
+    *("--set", 'run.stop="duration"', "--set", "run.duration=30", "--set", "attractors.sample=16"),
 ]
 RUN = ["basin", "case.toml", *SETTINGS, "-o", NAME]
 TILES = 6 * 7
