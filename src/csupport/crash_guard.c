@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: The Separatrix developers */
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 
-/* HDF5 1.10 itself breaks on some damaged files, in texts that it keeps without a checksum. While a file is read that may
-   be damaged, such an end becomes a message and exit code 74. */
+/* HDF5 1.10 itself breaks on some damaged files, in texts that it keeps without a checksum. While a file is
+   read that may be damaged, such an end becomes a message and exit code 74. */
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -27,7 +27,8 @@ static void report(int number) {
 /* Until `separatrix_guard_end`, for the file `path`. */
 void separatrix_guard_begin(const char *path) {
   struct sigaction action = {0};
-  snprintf(message, sizeof message - 1, "separatrix: '%.400s' is damaged: reading it broke the HDF5 library", path);
+  snprintf(message, sizeof message - 1, "separatrix: '%.400s' is damaged: reading it broke the HDF5 library",
+           path);
   strcat(message, "\n");
   message_length = strlen(message);
   if (active)
@@ -47,8 +48,8 @@ void separatrix_guard_end(void) {
     sigaction(guarded[i], &before[i], NULL);
 }
 
-/* A copy of this process, which says nothing when it crashes: 0 in the copy, its number in this one, -1 if there can be
-   none. */
+/* A copy of this process, which says nothing when it crashes: 0 in the copy, its number in this one, -1 if
+   there can be none. */
 int separatrix_fork(void) {
   const int process = (int)fork();
   for (int i = 0; process == 0 && i < guarded_signals; i++)

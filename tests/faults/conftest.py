@@ -30,7 +30,9 @@ mpi_separatrix = _fixtures.mpi_separatrix
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The form, and where the figures go."""
     parser.addoption("--long", action="store_true", help="the long form of the fault tests")
-    parser.addoption("--figures", type=Path, help="JSON file to which the figures of the fault tests are added")
+    parser.addoption(
+        "--figures", type=Path, help="JSON file to which the figures of the fault tests are added"
+    )
 
 
 @pytest.fixture(scope="session")

@@ -1,10 +1,11 @@
 /* SPDX-FileCopyrightText: The Separatrix developers */
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 
-/* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the call number
-   $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a write, and a number is the
-   errno that this and all later writes give. $FAULT_RANK: only on this rank of an MPI run. Without $FAULT_AT the number
-   of calls is added as a line to the file $FAULT_COUNT when the process ends. */
+/* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
+   call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
+   write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
+   MPI run. Without $FAULT_AT the number of calls is added as a line to the file $FAULT_COUNT when the process
+   ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -26,7 +27,8 @@ static atomic_long calls;
 #define REAL(function) ((__typeof__(&function))dlsym(RTLD_NEXT, #function))
 
 __attribute__((constructor)) static void read_settings(void) {
-  const char *rank = getenv("FAULT_RANK"), *own = getenv("OMPI_COMM_WORLD_RANK"), *number = getenv("FAULT_AT");
+  const char *rank = getenv("FAULT_RANK"), *own = getenv("OMPI_COMM_WORLD_RANK"),
+             *number = getenv("FAULT_AT");
   if (rank != NULL && own != NULL && strcmp(rank, own) != 0)
     return;
   name = getenv("FAULT_NAME");
@@ -72,10 +74,10 @@ static int fault_of(int descriptor, int writes) {
   return fault(path, writes);
 }
 
-#define GUARD(number)                                                                                                  \
-  if ((number) > 0) {                                                                                                  \
-    errno = (number);                                                                                                  \
-    return -1;                                                                                                         \
+#define GUARD(number)                                                                                        \
+  if ((number) > 0) {                                                                                        \
+    errno = (number);                                                                                        \
+    return -1;                                                                                               \
   }
 
 ssize_t write(int descriptor, const void *data, size_t size) {

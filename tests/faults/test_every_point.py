@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every point of a map has a label or a reason, also where the machine is as unkind as it is allowed to be."""
+"""Every point of a map has a label or a reason, also where the machine is as unkind as may be."""
 
 from collections import Counter
 
@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 from program import CASE
 
-MAP = ["--set", "axis[1].count=13", "--set", "axis[2].count=11", "--set", "run.duration=20", "--set", "attractors.sample=12"]
+MAP = [
+    "--set",
+    "axis[1].count=13",
+    "--set",
+    "axis[2].count=11",
+    "--set",
+    "run.duration=20",
+    "--set",
+    "attractors.sample=12",
+]
 FRICTIONLESS = "friction={law='none'}"
 HARMONIC = "drive={law='harmonic', ratio=%s, amplitude=%s}"
 CASES = {
@@ -23,9 +32,19 @@ CASES = {
     "resonance without friction or barrier": [FRICTIONLESS, "contact={law='none'}", HARMONIC % (1, 0.1)],
     "leaves the domain": [FRICTIONLESS, "contact={law='none'}", HARMONIC % (1, 0.1), "run.domain=1.2"],
     "barrier at the rest position": ["contact.upper=0.4", "restoring.free_length=0.4", "axis[1].to=0.4"],
-    "barriers close together": ["contact.upper=1.1", "contact.lower=1.099", "axis[1].from=1.099", "start.x0=1.0995"],
-    "barriers at one place": ["contact.upper=0.5", "contact.lower=0.5", "axis[1]={name='v0', from=-6, to=6, count=13}",
-                              "axis[2]={name='crank_angle', from=0, to=6, count=11}", "start.x0=0.5"],
+    "barriers close together": [
+        "contact.upper=1.1",
+        "contact.lower=1.099",
+        "axis[1].from=1.099",
+        "start.x0=1.0995",
+    ],
+    "barriers at one place": [
+        "contact.upper=0.5",
+        "contact.lower=0.5",
+        "axis[1]={name='v0', from=-6, to=6, count=13}",
+        "axis[2]={name='crank_angle', from=0, to=6, count=11}",
+        "start.x0=0.5",
+    ],
     "huge stiffness": ["restoring.stiffness=1e12", "run.duration=2e-4"],
     "tiny stiffness": ["restoring.stiffness=1e-6", "run.duration=6e4"],
     "tiny event budget": ["integrator.event_budget=1"],
@@ -39,19 +58,33 @@ CASES = {
     "huge speeds": ["axis[2].from=-1e9", "axis[2].to=1e9"],
     "adaptive, restitution 0": ["integrator.flight='adaptive'", "contact.restitution=0"],
     "adaptive, coarse": ["integrator.flight='adaptive'", "integrator.tolerance=1e-3"],
-    "adaptive, huge speeds": ["integrator.flight='adaptive'", "axis[2].from=-1e9", "axis[2].to=1e9", "integrator.event_budget=1000"],
+    "adaptive, huge speeds": [
+        "integrator.flight='adaptive'",
+        "axis[2].from=-1e9",
+        "axis[2].to=1e9",
+        "integrator.event_budget=1000",
+    ],
     "stribeck, narrow layer": [
-        "friction={law='coulomb_stribeck', kinetic_coefficient=0.2, static_coefficient=0.4, stribeck_velocity=1e-9}"
+        "friction={law='coulomb_stribeck', kinetic_coefficient=0.2, static_coefficient=0.4,"
+        " stribeck_velocity=1e-9}"
     ],
     "stribeck, steep": [
-        "friction={law='coulomb_stribeck', kinetic_coefficient=0.1, static_coefficient=5, stribeck_velocity=0.1,"
-        " stribeck_exponent=4}"
+        "friction={law='coulomb_stribeck', kinetic_coefficient=0.1, static_coefficient=5,"
+        " stribeck_velocity=0.1, stribeck_exponent=4}"
     ],
     "no extension": ["run.extension=1", "attractors.sample=1"],
     "a window as short as it can be": ["run.window=1e-9"],
 }
 # The short form; the long one takes all.
-FEW = ["restitution 0", "restitution 1", "leaves the domain", "barriers at one place", "huge stiffness", "tiny event budget", "huge speeds"]
+FEW = [
+    "restitution 0",
+    "restitution 1",
+    "leaves the domain",
+    "barriers at one place",
+    "huge stiffness",
+    "tiny event budget",
+    "huge speeds",
+]
 SETTLED, TIME_OVER, UNRESOLVED = 1, 2, 0
 ENDED = (SETTLED, TIME_OVER)
 
@@ -63,11 +96,14 @@ def test_codes_add_up(separatrix, tmp_path, figures, long_form, name):
     # Without [sweep], whose bounds would have to follow.
     life.write_case(tmp_path, CASE[: CASE.index("[sweep]")])
     settings = [word for setting in CASES[name] for word in ("--set", setting)]
-    outcome = life.run(separatrix, "basin", "case.toml", *MAP, *settings, "-o", life.NAME, folder=tmp_path, timeout=20)
+    command = ["basin", "case.toml", *MAP, *settings, "-o", life.NAME]
+    outcome = life.run(separatrix, *command, folder=tmp_path, timeout=20)
     assert outcome.code == 0, outcome
     with h5py.File(tmp_path / life.NAME) as file:
         reason, regime, attractor = (file[key][()].ravel() for key in ("reason", "regime", "attractor"))
-        reasons = dict(zip(file["reason"].attrs["flag_values"], file["reason"].attrs["flag_meanings"].split(), strict=True))
+        codes, meanings = (file["reason"].attrs[key] for key in ("flag_values", "flag_meanings"))
+        codes, meanings = (file["reason"].attrs[key] for key in ("flag_values", "flag_meanings"))
+        reasons = dict(zip(codes, meanings.split(), strict=True))
         regimes = set(file["regime"].attrs["flag_values"])
         # A map without attractors has no catalogue.
         known = set(file["catalogue/attractor"][()]) if "catalogue" in file else set()

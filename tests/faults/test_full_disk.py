@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Without space a run ends at once with code 74 (73 before it has begun), and goes on when there is space again."""
+"""Without space a run ends at once with code 74 (73 before it has begun), and goes on when there is space."""
 
 import errno
 import os
@@ -37,11 +37,15 @@ def test_every_write_can_fail(separatrix, faulty_calls, tmp_path, reference, amo
     life.write_case(tmp_path)
     count = tmp_path / "count"
     variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": life.NAME}
-    assert life.launch(separatrix, tmp_path, 0, variables={**variables, "FAULT_COUNT": str(count)}).wait(60) == 0
+    assert (
+        life.launch(separatrix, tmp_path, 0, variables={**variables, "FAULT_COUNT": str(count)}).wait(60) == 0
+    )
     calls = int(count.read_text())
     chance = random.Random(f"{SEED} {number}")
     codes, stages = Counter(), Counter()
-    moments = chance.sample(range(1, calls - 20), amount(2, 30)) + chance.sample(range(calls - 20, calls), amount(1, 10))
+    moments = chance.sample(range(1, calls - 20), amount(2, 20)) + chance.sample(
+        range(calls - 20, calls), amount(1, 6)
+    )
     longest = 0.0
     for moment in moments:
         clean(tmp_path)
@@ -51,14 +55,24 @@ def test_every_write_can_fail(separatrix, faulty_calls, tmp_path, reference, amo
         longest = max(longest, time.monotonic() - started)
         stage = life.stage(tmp_path)
         # After the last write only sync, rename and remove are left.
-        assert code == (73 if stage == "start" else 0 if stage == "done" else 74), (moment, (tmp_path / "log").read_text())
+        assert code == (73 if stage == "start" else 0 if stage == "done" else 74), (
+            moment,
+            (tmp_path / "log").read_text(),
+        )
         codes[code] += 1
         stages[stage] += 1
         if code:
             assert "separatrix: " in (tmp_path / "log").read_text()
             goes_on(separatrix, tmp_path, reference, chance.choice([0, 2]))
     assert codes[74]
-    figures.update(seed=SEED, calls=calls, moments=len(moments), codes=codes, stages=stages, longest_run=round(longest, 1))
+    figures.update(
+        seed=SEED,
+        calls=calls,
+        moments=len(moments),
+        codes=codes,
+        stages=stages,
+        longest_run=round(longest, 1),
+    )
 
 
 @pytest.mark.parametrize("layer", LAYERS)
@@ -108,7 +122,9 @@ def small_disk(tmp_path):
     def mount(size: int):
         folder = tmp_path / f"disk_{size}"
         folder.mkdir()
-        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True)
+        done = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True
+        )
         if done.returncode:
             pytest.skip("a file system can be mounted by root only")
         mounted.append(folder)
@@ -132,14 +148,16 @@ def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, f
     both = needed + reference.stat().st_size
     codes = Counter()
     longest = 0.0
-    sizes = amount(4, 20)
+    sizes = amount(3, 12)
     for point in range(1, sizes + 1):
         folder = small_disk(int(1.2 * both * point / sizes) // 4096 * 4096)
         life.write_case(folder)
         ranks = 1 + point % 3
         started = time.monotonic()
         outcome = life.run(
-            *("env", f"OMPI_MCA_io={layer}", "mpirun", "-n", str(ranks), mpi_separatrix, *life.RUN), folder=folder, timeout=AT_ONCE + 5
+            *("env", f"OMPI_MCA_io={layer}", "mpirun", "-n", str(ranks), mpi_separatrix, *life.RUN),
+            folder=folder,
+            timeout=AT_ONCE + 5,
         )
         longest = max(longest, time.monotonic() - started)
         codes[outcome.code] += 1
@@ -159,10 +177,20 @@ def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, f
 def test_a_trajectory_beyond_the_limit(separatrix, faulty_calls, tmp_path):
     life.write_case(tmp_path)
     for name, number in [("t.h5", errno.ENOSPC), ("t.csv", errno.ENOSPC)]:
-        fault = {**os.environ, "LD_PRELOAD": str(faulty_calls), "FAULT_NAME": name, "FAULT_AT": "1", "FAULT_DO": str(number)}
+        fault = {
+            **os.environ,
+            "LD_PRELOAD": str(faulty_calls),
+            "FAULT_NAME": name,
+            "FAULT_AT": "1",
+            "FAULT_DO": str(number),
+        }
         ended = subprocess.run(
             [separatrix, "trajectory", "case.toml", "-o", "t.h5", "--csv", "t.csv", "--force"],
-            cwd=tmp_path, env=fault, capture_output=True, text=True, timeout=60,
+            cwd=tmp_path,
+            env=fault,
+            capture_output=True,
+            text=True,
+            timeout=60,
         )
         assert ended.returncode in (73, 74), (name, ended)
         assert f"{name}" in ended.stderr

@@ -27,7 +27,7 @@ def assert_kept(program, folder, ranks_so_far, reference):
 
 def test_random_kills(mpi_separatrix, tmp_path, reference, amount, figures):
     chance = random.Random(SEED)
-    wanted = amount(12, 240)
+    wanted = amount(6, 210)
     stages, victims_of = Counter(), Counter()
     kills = lives = 0
     longest = most_lost = 0.0
@@ -40,7 +40,9 @@ def test_random_kills(mpi_separatrix, tmp_path, reference, amount, figures):
         done, ranks_so_far = 0, 0
         for _ in range(chance.randint(1, 6)):
             ranks = chance.choice([0, 1, 2, 3, 4])
-            process = life.launch(mpi_separatrix, folder, ranks, *(["--resume"] if done or ranks_so_far else []))
+            process = life.launch(
+                mpi_separatrix, folder, ranks, *(["--resume"] if done or ranks_so_far else [])
+            )
             wait_for(process, folder, chance)
             victims = life.ranks_of(process, ranks)
             everybody = chance.random() < 0.5
@@ -83,7 +85,9 @@ def wait_for(process, folder, chance):
 
 @pytest.mark.parametrize("action", ["kill", "tear"])
 @pytest.mark.parametrize("ranks", [0, 2])
-def test_a_kill_at_any_call(mpi_separatrix, faulty_calls, tmp_path, reference, amount, figures, action, ranks):
+def test_a_kill_at_any_call(
+    mpi_separatrix, faulty_calls, tmp_path, reference, amount, figures, action, ranks
+):
     folder, count = tmp_path, tmp_path / "count"
     life.write_case(folder)
     variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": life.NAME, "FAULT_RANK": "0"}
@@ -93,14 +97,19 @@ def test_a_kill_at_any_call(mpi_separatrix, faulty_calls, tmp_path, reference, a
     assert calls > 100
     chance = random.Random(f"{SEED} {action} {ranks}")
     # The last calls are those of the final file and its renaming.
-    moments = sorted(chance.sample(range(1, calls - 12), amount(3, 60)) + list(range(calls - 12, calls + 1, amount(4, 1))))
+    moments = sorted(
+        chance.sample(range(1, calls - 12), amount(2, 24)) + list(range(calls - 12, calls + 1, amount(4, 1)))
+    )
     stages = Counter()
     kills = 0
     for moment in moments:
         for path in folder.glob(f"{life.NAME}*"):
             path.unlink()
         process = life.launch(
-            mpi_separatrix, folder, ranks, variables={**variables, "FAULT_AT": str(moment), "FAULT_DO": action}
+            mpi_separatrix,
+            folder,
+            ranks,
+            variables={**variables, "FAULT_AT": str(moment), "FAULT_DO": action},
         )
         code = process.wait(60)
         if code == 0:

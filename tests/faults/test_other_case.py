@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A run goes on only with its own case: every other key is refused by its name, what does not matter is allowed."""
+"""A run goes on only with its own case: another key is refused by name, what does not matter is allowed."""
 
 import re
 import shutil
@@ -91,7 +91,13 @@ def test_every_key(separatrix, folder, figures):
         outcome = life.run(separatrix, *command, folder=folder)
         assert outcome.code == 76, (key, value, outcome)
         # The tiles are not part of the case, but of the layout.
-        named = "tile_shape" if key == "grid.tile" else key.split(".")[0] if ".law" in key or ".name" in key else key
+        named = (
+            "tile_shape"
+            if key == "grid.tile"
+            else key.split(".")[0]
+            if ".law" in key or ".name" in key
+            else key
+        )
         assert named in outcome.messages[0], (key, outcome.messages)
         assert (folder / PART).read_bytes() == before
         refused.append(key)
