@@ -14,7 +14,8 @@ module text_table
 
   type, public :: table_t
     character(len=:), allocatable, private :: path
-    integer, private :: unit = 0, status = 0
+    integer, private :: unit = 0
+    logical, private :: failed = .false.
     integer(int64), private :: bytes = 0
     character(len=256), private :: message = ''
   contains
@@ -29,16 +30,20 @@ contains
   subroutine create(self, path)
     class(table_t), intent(out) :: self
     character(len=*), intent(in) :: path
+    integer :: status
     self%path = path
-    open (newunit=self%unit, file=path, status='replace', action='write', iostat=self%status, iomsg=self%message)
+    open (newunit=self%unit, file=path, status='replace', action='write', iostat=status, iomsg=self%message)
+    self%failed = status /= 0
   end subroutine create
 
   !> Adds a line.
   subroutine line(self, text)
     class(table_t), intent(inout) :: self
     character(len=*), intent(in) :: text
-    if (self%status /= 0) return
-    write (self%unit, '(a)', iostat=self%status, iomsg=self%message) text
+    integer :: status
+    if (self%failed) return
+    write (self%unit, '(a)', iostat=status, iomsg=self%message) text
+    self%failed = status /= 0
     self%bytes = self%bytes + len(text) + 1
   end subroutine line
 
@@ -47,8 +52,12 @@ contains
     class(table_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: found
-    if (self%status == 0) close (self%unit, iostat=self%status, iomsg=self%message)
-    if (self%status /= 0) then
+    integer :: status
+    if (.not. self%failed) then
+      close (self%unit, iostat=status, iomsg=self%message)
+      self%failed = status /= 0
+    end if
+    if (self%failed) then
       call fail(error, exit_io, "'"//self%path//"': "//trim(self%message))
       return
     end if
