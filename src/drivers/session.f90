@@ -18,7 +18,7 @@ module session
   use provenance, only: provenance_t, start_provenance
   use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, termination_asked
-  use status, only: exit_cannot_create, exit_io
+  use status, only: exit_cannot_create, exit_done, exit_io
   use system, only: exit_program, sleep_microseconds
   use team, only: team_t
   use text, only: to_text
@@ -29,6 +29,8 @@ module session
 
   !> A signal to all ranks reaches them within this time, in microseconds.
   integer, parameter :: signal_spread_us = 20000
+  !> Time for the other ranks to end.
+  integer, parameter :: farewell_us = 200000
 
   type, public :: session_t
     type(command_t) :: command
@@ -125,11 +127,17 @@ contains
     call schema%add_text('provenance', 'resolved_case', session%the_case%resolved_text)
   end subroutine describe_file
 
-  !> Ends the program on all ranks alike.
+  !> Ends the program on all ranks. Rank 0 returns the code, and as the last: mpirun ends the other processes by force as soon
+  !> as one has returned another code than 0.
   subroutine end_with(self, code)
     class(session_t), intent(inout) :: self
     integer, intent(in) :: code
+    logical :: first, others
+    first = self%team%is_root()
+    others = self%team%size() > 1
     call self%team%close()
+    if (.not. first) call exit_program(exit_done)
+    if (others .and. code /= exit_done) call sleep_microseconds(farewell_us)
     call exit_program(code)
   end subroutine end_with
 

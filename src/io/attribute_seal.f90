@@ -20,8 +20,8 @@ module attribute_seal
   public :: seal_attributes, verify_attributes
 
   character(len=*), parameter :: place = '/provenance', seal_name = 'attributes_checksum'
-  !> The seal itself, and what the dimension scales consist of.
-  character(len=*), parameter :: left_out(5) = [character(len=19) :: seal_name, 'CLASS', 'NAME', 'DIMENSION_LIST', &
+  !> The seals, and what the dimension scales consist of.
+  character(len=*), parameter :: left_out(6) = [character(len=19) :: seal_name, 'checksum', 'CLASS', 'NAME', 'DIMENSION_LIST', &
     'REFERENCE_LIST']
   integer, parameter :: longest_name = 128
 

@@ -4,6 +4,7 @@
 
 import contextlib
 import hashlib
+import math
 import os
 import signal
 import subprocess
@@ -62,12 +63,20 @@ def is_program(process: str) -> bool:
 
 
 def kill(process: subprocess.Popen, victims: list[int]) -> float:
-    """SIGKILL to the victims, or to mpirun if it has none yet; the seconds until all is over."""
+    """SIGKILL to the victims, or to mpirun if it has none yet; the seconds until all is over.
+
+    mpirun 4.1 itself may hang when a rank dies while it connects to it. Then it is killed, and the answer is infinity.
+    """
     started = time.monotonic()
     for victim in victims or [process.pid]:
         with contextlib.suppress(ProcessLookupError):
             os.kill(victim, signal.SIGKILL)
-    process.wait(30)
+    try:
+        process.wait(20)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait(10)
+        return math.inf
     return time.monotonic() - started
 
 

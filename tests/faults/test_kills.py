@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A kill at any moment costs at most the tiles in flight, and a final file is always complete."""
 
+import math
 import random
 import time
 from collections import Counter
@@ -28,7 +29,7 @@ def assert_kept(program, folder, ranks_so_far, reference):
 def test_random_kills(mpi_separatrix, tmp_path, reference, amount, figures):
     chance = random.Random(SEED)
     wanted = amount(6, 210)
-    stages, victims_of = Counter(), Counter()
+    stages, victims_of, hung = Counter(), Counter(), Counter()
     kills = lives = 0
     longest = most_lost = 0.0
     expected = life.content_hash(reference)
@@ -50,7 +51,11 @@ def test_random_kills(mpi_separatrix, tmp_path, reference, amount, figures):
                 victims = [chance.choice(victims)]
             if process.poll() is not None:
                 break
-            longest = max(longest, life.kill(process, victims))
+            seconds = life.kill(process, victims)
+            if math.isinf(seconds):
+                hung[life.stage(folder)] += 1
+            else:
+                longest = max(longest, seconds)
             ranks_so_far += max(ranks, 1)
             stage, kept, lost = assert_kept(mpi_separatrix, folder, ranks_so_far, reference)
             assert kept >= done or stage in ("renamed", "done"), "tiles that were done are gone"
@@ -68,7 +73,10 @@ def test_random_kills(mpi_separatrix, tmp_path, reference, amount, figures):
         assert life.content_hash(folder / life.NAME) == expected
         assert life.stage(folder) == "done"
     assert longest < 10
-    figures.update(seed=SEED, kills=kills, lives=lives, stages=stages, victims=victims_of)
+    # Only while ranks and mpirun connect, before there is a working file.
+    assert hung.keys() <= {"start", "create"}
+    assert hung.total() <= 0.02 * kills
+    figures.update(seed=SEED, kills=kills, lives=lives, stages=stages, victims=victims_of, mpirun_hung=hung.total())
     figures.update(longest_end=round(longest, 2), content=expected)
 
 
