@@ -76,8 +76,8 @@ def test_random_kills(mpi_separatrix, tmp_path, reference, amount, figures):
     # Only while ranks and mpirun connect, before there is a working file.
     assert hung.keys() <= {"start", "create"}
     assert hung.total() <= 0.02 * kills
-    figures.update(seed=SEED, kills=kills, lives=lives, stages=stages, victims=victims_of, mpirun_hung=hung.total())
-    figures.update(longest_end=round(longest, 2), content=expected)
+    figures.update(seed=SEED, kills=kills, lives=lives, stages=stages, victims=victims_of)
+    figures.update(mpirun_hung=hung.total(), longest_end=round(longest, 2), content=expected)
 
 
 def wait_for(process, folder, chance):
