@@ -65,7 +65,7 @@ def is_program(process: str) -> bool:
 def kill(process: subprocess.Popen, victims: list[int]) -> float:
     """SIGKILL to the victims, or to mpirun if it has none yet; the seconds until all is over.
 
-    mpirun 4.1 itself may hang when a rank dies while it connects. Then it is killed, and the answer is infinity.
+    mpirun 4.1 itself may hang when a rank dies while it connects: then it is killed, the answer is infinity.
     """
     started = time.monotonic()
     for victim in victims or [process.pid]:
