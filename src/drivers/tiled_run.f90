@@ -67,6 +67,9 @@ contains
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable :: error
     integer :: found
+    ! A rank that dies takes the others with it, perhaps before they can say this.
+    if (session%team%size() > 1) call session%journal%line('kept', 'the tiles done are kept in '//working_path(path)// &
+      '; after an interruption the same command with --resume (without --force) goes on')
     ! Rank 0 decides, before it creates what the others would see.
     found = 0
     if (file_exists(working_path(path))) found = 1
@@ -99,9 +102,6 @@ contains
     before = note_earlier(session, file, work)
     if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(unfinished))// &
       ' of '//to_text(file%tile_count())//' tiles were done before')
-    ! A rank that dies takes the others with it, perhaps before they can say this.
-    if (session%team%size() > 1) call session%journal%line('kept', 'the tiles done are kept in '//working_path(file%path)// &
-      '; after an interruption the same command with --resume (without --force) goes on')
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node), &
                         scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)

@@ -47,6 +47,17 @@ def amount(long_form: bool) -> Callable[[int, int], int]:
     return lambda short, long: long if long_form else short
 
 
+@pytest.fixture(scope="session")
+def long_if(long_form: bool) -> Callable[[bool], None]:
+    """Skip a test in the short form if a condition holds."""
+
+    def skip(condition: bool) -> None:
+        if condition and not long_form:
+            pytest.skip("in the long form")
+
+    return skip
+
+
 @pytest.fixture
 def figures(request: pytest.FixtureRequest) -> Iterator[dict[str, object]]:
     """What a test counted; kept under the name of the test if it passed."""

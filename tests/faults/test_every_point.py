@@ -90,9 +90,8 @@ ENDED = (SETTLED, TIME_OVER)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_codes_add_up(separatrix, tmp_path, figures, long_form, name):
-    if not long_form and name not in FEW:
-        pytest.skip("in the long form")
+def test_codes_add_up(separatrix, tmp_path, figures, long_if, name):
+    long_if(name not in FEW)
     # Without [sweep], whose bounds would have to follow.
     life.write_case(tmp_path, CASE[: CASE.index("[sweep]")])
     settings = [word for setting in CASES[name] for word in ("--set", setting)]

@@ -33,7 +33,10 @@ def clean(folder):
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
-def test_every_write_can_fail(separatrix, faulty_calls, tmp_path, reference, amount, figures, number):
+def test_every_write_can_fail(
+    separatrix, faulty_calls, tmp_path, reference, amount, figures, long_if, number
+):
+    long_if(number != errno.ENOSPC)
     life.write_case(tmp_path)
     count = tmp_path / "count"
     variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": life.NAME}
@@ -82,7 +85,7 @@ def test_a_file_size_limit(mpi_separatrix, tmp_path, reference, amount, figures,
     chance = random.Random(f"{SEED} {layer}")
     codes, stages = Counter(), Counter()
     longest = 0.0
-    points = amount(3, 20)
+    points = amount(2, 20)
     for point in range(points):
         clean(tmp_path)
         ranks = 1 + point % 3
@@ -136,8 +139,9 @@ def small_disk(tmp_path):
 
 
 @pytest.mark.parametrize("layer", LAYERS)
-def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, figures, layer):
+def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, figures, long_if, layer):
     """The disk is too small for the working file, for the final file beside it, or fills up meanwhile."""
+    long_if(layer == "romio321")
     life.write_case(tmp_path)
     process = life.launch(mpi_separatrix, tmp_path, 0)
     part = tmp_path / f"{life.NAME}.part"
@@ -148,7 +152,7 @@ def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, f
     both = needed + reference.stat().st_size
     codes = Counter()
     longest = 0.0
-    sizes = amount(3, 12)
+    sizes = amount(2, 12)
     for point in range(1, sizes + 1):
         folder = small_disk(int(1.2 * both * point / sizes) // 4096 * 4096)
         life.write_case(folder)

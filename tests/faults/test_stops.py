@@ -68,7 +68,8 @@ def check_stopped(program, folder, code, reference, chance):
 
 
 @pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGUSR2, signal.SIGTERM])
-def test_a_signal_stops_soon(mpi_separatrix, tmp_path, reference, amount, figures, number):
+def test_a_signal_stops_soon(mpi_separatrix, tmp_path, reference, amount, figures, long_if, number):
+    long_if(number == signal.SIGUSR2)
     chance = random.Random(f"{SEED} {number}")
     codes = Counter()
     longest = returned = 0.0
@@ -90,8 +91,9 @@ def test_a_signal_stops_soon(mpi_separatrix, tmp_path, reference, amount, figure
     )
 
 
-def test_sigterm_to_all_ranks_stops_soon(mpi_separatrix, tmp_path, reference, amount, figures):
+def test_sigterm_to_all_ranks_stops_soon(mpi_separatrix, tmp_path, reference, amount, figures, long_if):
     """As srun and batch systems send it: to the ranks, not to mpirun."""
+    long_if(True)
     chance = random.Random(SEED)
     codes = Counter()
     longest = returned = 0.0
@@ -159,8 +161,9 @@ def test_the_time_limit_is_kept(mpi_separatrix, tmp_path, reference, amount, fig
 
 @pytest.mark.parametrize("dead", [0, 1, 2])
 def test_a_dead_rank_ends_the_job_and_the_others_say_how_to_go_on(
-    mpi_separatrix, tmp_path, amount, figures, dead
+    mpi_separatrix, tmp_path, amount, figures, long_if, dead
 ):
+    long_if(dead > 0)
     chance = random.Random(f"{SEED} {dead}")
     longest = 0.0
     deaths, told = amount(1, 5), 0
@@ -170,6 +173,8 @@ def test_a_dead_rank_ends_the_job_and_the_others_say_how_to_go_on(
         process = start_and_wait(mpi_separatrix, folder, 3, chance, *SLOW)
         ranks = life.ranks_of(process, 3)
         assert len(ranks) == 3
+        # mpirun passes on what was said.
+        time.sleep(0.2)
         longest = max(longest, life.kill(process, [ranks[dead]]))
         assert process.returncode == 137
         log = (folder / "log").read_text()

@@ -10,7 +10,9 @@ import pytest
 
 
 @pytest.mark.parametrize("transport", ["sm", "pt2pt,sm", "ucx,sm"])
-def test_balance(mpi_separatrix, build_dir, figures, transport):
+def test_balance(mpi_separatrix, build_dir, figures, long_if, transport):
+    # The suite itself runs with the default, which is sm.
+    long_if(transport != "ucx,sm")
     suite = build_dir / "bin" / "tests" / "test_load_balance"
     if not suite.is_file():
         pytest.skip(f"{suite} has not been built")
