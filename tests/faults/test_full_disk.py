@@ -152,7 +152,7 @@ def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, f
     both = needed + reference.stat().st_size
     codes = Counter()
     longest = 0.0
-    sizes = amount(2, 12)
+    sizes = amount(3, 12)
     for point in range(1, sizes + 1):
         folder = small_disk(int(1.2 * both * point / sizes) // 4096 * 4096)
         life.write_case(folder)
