@@ -22,3 +22,9 @@ target_compile_options(separatrix_strict INTERFACE
   "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2018;-fimplicit-none;-Wall;-Wextra;-Wno-compare-reals;-Wno-maybe-uninitialized;-Wno-uninitialized;-Werror=implicit-interface;-ffree-line-length-132>"
   "$<$<COMPILE_LANGUAGE:C>:-Wall;-Wextra>"
   "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all,no-array-temps;-fbacktrace>")
+
+# Where the processor can, GCC 12 makes a fused multiply-add of a complex product in straight-line code, in spite of
+# -ffp-contract=off; results would depend on the processor that the build is for.
+if(CMAKE_Fortran_FLAGS MATCHES "-m(arch|tune|fma|avx|cpu)")
+  target_compile_options(separatrix_strict INTERFACE "$<$<COMPILE_LANGUAGE:Fortran>:-fno-tree-slp-vectorize>")
+endif()

@@ -11,7 +11,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-static const int guarded[] = {SIGPROF, SIGSEGV, SIGBUS, SIGABRT};
+static const int guarded[] = {SIGPROF, SIGSEGV, SIGBUS, SIGFPE, SIGABRT};
 enum { guarded_count = sizeof guarded / sizeof *guarded };
 
 static struct sigaction before[guarded_count];

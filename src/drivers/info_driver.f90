@@ -9,6 +9,7 @@ module info_driver
   use journal, only: json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
+  use map_verify, only: probe_file
   use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
   use text, only: join, to_text
@@ -38,7 +39,8 @@ contains
     type(reader_t) :: reader
     type(variable_info_t), allocatable :: variables(:)
     character(len=:), allocatable :: body
-    call open_final(path, reader, error)
+    call probe_file(path, error)
+    if (.not. allocated(error)) call open_final(path, reader, error)
     if (allocated(error)) return
     call reader%variables(variables, error)
     if (allocated(error)) return

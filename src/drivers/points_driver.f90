@@ -7,7 +7,7 @@ module points_driver
   use checksum, only: crc32
   use case_setup, only: grid_of, output_path, span_of
   use command_line, only: command_t
-  use errors, only: error_t, fail
+  use errors, only: error_t
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
   use kinds, only: int64, int8, wp
@@ -18,8 +18,9 @@ module points_driver
   use point_list, only: point_list_t, read_point_list
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
-  use status, only: last_reason, exit_done, exit_io, reason_names
+  use status, only: last_reason, exit_done, reason_names
   use text, only: to_text
+  use text_table, only: table_t
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -182,8 +183,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(reader_t) :: reader
     real(wp), allocatable :: x(:), v(:), impacts(:), speed(:), reason(:)
-    integer :: unit, i, status
-    character(len=256) :: message
+    type(table_t) :: table
+    integer :: i
     call open_final(path, reader, error)
     if (.not. allocated(error)) call reader%read_values('/x', x, error)
     if (.not. allocated(error)) call reader%read_values('/v', v, error)
@@ -192,16 +193,14 @@ contains
     if (.not. allocated(error)) call reader%read_values('/reason', reason, error)
     if (.not. allocated(error)) call reader%close(error)
     if (allocated(error)) return
-    open (newunit=unit, file=csv, status='replace', action='write', iostat=status, iomsg=message)
-    if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) 'x0,v0,ratio,x,v,impacts,last_impact_speed,reason'
+    call table%create(csv)
+    call table%line('x0,v0,ratio,x,v,impacts,last_impact_speed,reason')
     do i = 1, size(x)
-      if (status /= 0) exit
-      write (unit, '(a)', iostat=status, iomsg=message) to_text(list%x0(i))//','//to_text(list%v0(i))//','// &
-        to_text(list%ratio(i))//','//to_text(x(i))//','//to_text(v(i))//','//to_text(nint(impacts(i)))//','// &
-        to_text(speed(i))//','//trim(reason_names(nint(reason(i))))
+      call table%line(to_text(list%x0(i))//','//to_text(list%v0(i))//','//to_text(list%ratio(i))//','//to_text(x(i))//','// &
+                      to_text(v(i))//','//to_text(nint(impacts(i)))//','//to_text(speed(i))//','// &
+                      trim(reason_names(nint(reason(i)))))
     end do
-    if (status == 0) close (unit, iostat=status, iomsg=message)
-    if (status /= 0) call fail(error, exit_io, "'"//csv//"': "//trim(message))
+    call table%close(error)
   end subroutine write_csv
 
 end module points_driver

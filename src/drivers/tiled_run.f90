@@ -3,6 +3,7 @@
 
 !> Computes a grid tile by tile on a team: working file, resumption, hand-out, progress, clean stop, final file.
 module tiled_run
+  use balance, only: report_balance
   use command_line, only: command_t
   use errors, only: error_t
   use files, only: file_exists
@@ -12,7 +13,7 @@ module tiled_run
   use map_final, only: finalise
   use map_schema, only: schema_t
   use parallel, only: make_scheduler
-  use balance, only: report_balance
+  use resumption, only: inspect_interrupted
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use shard, only: in_shard
@@ -64,17 +65,22 @@ contains
   subroutine open_tiles(session, path, schema, grid, tile_shape, file)
     type(session_t), intent(inout) :: session
     character(len=*), intent(in) :: path
-    type(schema_t), intent(in) :: schema
+    type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: grid(:)
     integer, intent(in) :: tile_shape(:)
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable :: error
     integer :: found
+    ! A rank that dies takes the others with it, perhaps before they can say this.
+    if (session%team%size() > 1) call session%journal%line('kept', 'the tiles done are kept in '//working_path(path)// &
+      '; after an interruption the same command with --resume (without --force) goes on')
     ! Rank 0 decides, before it creates what the others would see.
     found = 0
     if (file_exists(working_path(path))) found = 1
     call session%team%broadcast(found)
     if (session%command%resume .and. found == 1) then
+      call inspect_interrupted(session, path, schema, error)
+      call session%stop_if(error)
       call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
     else
       call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
@@ -121,6 +127,7 @@ contains
       if (.not. whole) exit
       computed = computed + 1
     end do
+    if (scheduler%stop_requested()) call session%say_how_to_go_on(working_path(file%path))
     begun = scheduler%started
     call scheduler%finish()
     call report_balance(session%team, session%journal, busy, monotonic_seconds() - begun)

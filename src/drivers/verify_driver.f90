@@ -20,7 +20,7 @@ module verify_driver
   use kinds, only: int64, real32, wp
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
-  use map_verify, only: verify_file
+  use map_verify, only: probe_file, verify_file
   use motion, only: motion_t
   use random, only: uniform
   use reference, only: run_reference
@@ -61,7 +61,8 @@ contains
     integer :: datasets
     integer(int64) :: points
     call journal%open(.not. command%json, .false., command%quiet)
-    call open_final(command%path, reader, error)
+    call probe_file(command%path, error)
+    if (.not. allocated(error)) call open_final(command%path, reader, error)
     if (allocated(error)) return
     call verify_file(command%path, error, datasets)
     if (.not. allocated(error)) call reader%text_attribute('/', 'kind', kind, error)

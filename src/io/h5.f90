@@ -18,7 +18,8 @@ module h5
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
     H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
     h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
-    h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_shuffle_f, H5S_SCALAR_F, &
+    h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
+    h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
     h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F32LE, &
     H5T_IEEE_F64LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U32LE, &
@@ -57,6 +58,9 @@ module h5
     logical :: compressed = .false.
     logical :: fixed = .false.
   end type h5_storage_t
+
+  !> Space that is taken at once for what describes the data, and for small data, when a file is opened for writing.
+  integer(hsize_t), parameter :: front_bytes = 2**18
 
 contains
 
@@ -147,6 +151,8 @@ contains
     if (present(writable)) flags = merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable)
     call h5pcreate_f(H5P_FILE_ACCESS_F, access, status)
     if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
+    if (status >= 0) call h5pset_meta_block_size_f(access, front_bytes, status)
+    if (status >= 0) call h5pset_small_data_block_size_f(access, front_bytes, status)
     if (present(team) .and. status >= 0) then
       if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
     end if

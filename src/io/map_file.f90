@@ -112,6 +112,7 @@ contains
     integer(int64), intent(in) :: tile_shape(:)
     type(map_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names
     integer :: i
     file%path = path
     file%schema = schema
@@ -127,6 +128,13 @@ contains
         return
       end associate
     end do
+    names = ''
+    do i = 1, size(file%tiled)
+      associate (variable => schema%variables(file%tiled(i)))
+        names = trim(names//' '//path_of(variable%group, variable%name))
+      end associate
+    end do
+    call file%schema%add_attribute('tiles', 'variables', trim(adjustl(names)))
     associate (tiles => file%tiling)
       call file%schema%add_dimension('axis', size(grid, kind=int64))
       call file%schema%add_dimension('tile', int(tiles%count(), int64))

@@ -4,11 +4,13 @@
 !> Reading a file of Separatrix.
 module map_reader
   use errors, only: error_t, fail
+  use guard, only: end_guard
   use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
     h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
   use h5_stored, only: h5_check_stored
   use h5_list, only: h5_children
+  use h5_trap, only: trap
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
   use status, only: exit_io, exit_no_input
@@ -298,7 +300,9 @@ contains
   subroutine close_reader(self, error)
     class(reader_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
+    call trap('its end', self%path, endless=.true.)
     call h5_close(self%file, error)
+    call end_guard()
   end subroutine close_reader
 
 end module map_reader
