@@ -9,9 +9,11 @@ program separatrix
   use info_driver, only: run_info
   use launcher, only: launched_rank
   use laws_driver, only: run_laws
+  use merge_driver, only: run_merge
   use points_driver, only: run_points
   use sweep_driver, only: run_sweep
-  use system, only: exit_program, sleep_microseconds
+  use status, only: exit_io
+  use system, only: exit_at_once, exit_program, sleep_microseconds
   use trajectory_driver, only: run_trajectory_command
   use verify_driver, only: run_verify
   use version_text, only: print_version
@@ -40,6 +42,8 @@ program separatrix
         call run_trajectory_command(command)
       case ('points')
         call run_points(command)
+      case ('merge')
+        if (first) call run_merge(command)
       case ('laws')
         if (first) call run_laws(command%json)
       case ('info')
@@ -56,6 +60,8 @@ program separatrix
       ! mpirun ends the others with the first that fails: let it be the one that speaks.
       call sleep_microseconds(500000)
     end if
+    ! HDF5 cannot be shut down after it has failed on a damaged file.
+    if (error%code == exit_io) call exit_at_once(error%code)
     call exit_program(error%code)
   end if
 end program separatrix

@@ -21,7 +21,7 @@ cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=ON
 cmake --build build -j "$jobs"
 
 echo "test: running the tests of the MPI build"
-ctest --test-dir build -E '^python$' -j "$jobs" --output-on-failure --no-tests=error \
+ctest --test-dir build -E '^(python|faults)$' -j "$jobs" --output-on-failure --no-tests=error \
   --output-junit ctest.xml || status=1
 
 echo "test: building without MPI in build-serial/"
@@ -31,7 +31,7 @@ ctest --test-dir build-serial -L "$serial_layers" -j "$jobs" --output-on-failure
   --output-junit ctest.xml || status=1
 
 echo "test: running the Python tests"
-SEPARATRIX_BUILD=$PWD/build .venv/bin/python -m pytest -q -ra tests/python \
+SEPARATRIX_BUILD=$PWD/build .venv/bin/python -m pytest -q -ra tests/python tests/faults \
   --junit-xml=build/pytest.xml || status=1
 
 .venv/bin/python scripts/count_tests.py build/ctest.xml build-serial/ctest.xml build/pytest.xml || status=1

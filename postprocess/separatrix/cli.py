@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from separatrix import basin, points, style, sweep, trajectory
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.labels import plain
-from separatrix.open import open_result
+from separatrix.open import open_result, reading
 from separatrix.save import FORMATS, save
 from separatrix.version import __version__
 
@@ -43,12 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make(path: Path, options: argparse.Namespace) -> list[Path]:
     """Write the figures of one file; return their paths."""
-    try:
+    with reading(path):
         return _make(path, options)
-    except KeyError as error:
-        raise SeparatrixError(f"{path}: lacks what the figure needs ({error.args[0]})") from error
-    except OSError as error:
-        raise SeparatrixError(f"{path}: is damaged ({str(error).splitlines()[0]})") from error
 
 
 def _make(path: Path, options: argparse.Namespace) -> list[Path]:

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Open a result file: HDF5 -> xarray, codes -> text."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -26,13 +28,42 @@ def open_result(path: str | Path) -> xr.Dataset:
     the texts and attributes of `/provenance` are attributes (`resolved_case`, `provenance_version`, ...).
     Raises SeparatrixError for a missing, foreign, incomplete or too new file.
     """
-    attributes, texts, groups = _read_header(Path(path))
-    parts = [xr.open_dataset(path, engine="h5netcdf", decode_times=False)]
-    parts += [_open_table(path, name) for name in groups]
-    result = xr.merge(parts, join="exact", compat="no_conflicts")
+    with reading(path):
+        attributes, texts, groups = _read_header(Path(path))
+    parts: list[xr.Dataset] = []
+    with reading(path):
+        try:
+            parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
+            parts += [_open_table(path, name) for name in groups]
+            result = xr.merge(parts, join="exact", compat="no_conflicts")
+        except Exception:
+            _close(parts)
+            raise
     result.attrs = attributes | texts
     result.set_close(lambda: _close(parts))
     return result
+
+
+@contextmanager
+def reading(path: str | Path) -> Iterator[None]:
+    """Turn what the libraries raise for a damaged file into a SeparatrixError."""
+    try:
+        yield
+    except SeparatrixError:
+        raise
+    except KeyError as error:
+        raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        MemoryError,
+        OSError,
+        RuntimeError,
+        TypeError,
+        ValueError,
+    ) as error:
+        raise SeparatrixError(f"{path}: is damaged ({_first_line(error)})") from error
 
 
 def table(result: xr.Dataset, name: str) -> xr.Dataset:
@@ -46,16 +77,20 @@ def table(result: xr.Dataset, name: str) -> xr.Dataset:
 def flag_names(variable: xr.DataArray) -> dict[int, str]:
     """Return the meaning of each code of a coded variable."""
     values = np.atleast_1d(variable.attrs.get("flag_values", []))
-    return dict(
-        zip((int(v) for v in values), _text(variable.attrs.get("flag_meanings", "")).split(), strict=True)
-    )
+    names = _text(variable.attrs.get("flag_meanings", "")).split()
+    try:
+        return dict(zip((int(value) for value in values), names, strict=True))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SeparatrixError(
+            f"variable {variable.name}: flag_values and flag_meanings do not belong together", BAD_DATA
+        ) from error
 
 
 def decode_flags(variable: xr.DataArray) -> xr.DataArray:
     """Return a coded variable as text: `regime` 1 -> 'non_impact'. Unknown codes are shown as numbers."""
     names = flag_names(variable)
     codes, where = np.unique(variable.values, return_inverse=True)
-    texts = np.array([names.get(int(code), str(code)) for code in codes], dtype=object)
+    texts = np.array([names.get(code, str(code)) for code in codes.tolist()], dtype=object)
     return variable.copy(data=texts[where].reshape(variable.shape))
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 option(SEPARATRIX_MPI "Build with MPI and parallel HDF5 (OFF: one process, serial HDF5)" ON)
 option(SEPARATRIX_TESTS "Build the tests" ON)
+option(SEPARATRIX_FUZZ "Build the fuzzer of the readers (GCC)" OFF)
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
@@ -22,4 +23,10 @@ target_compile_options(separatrix_strict INTERFACE
   "$<$<COMPILE_LANGUAGE:C,CXX>:-Wall;-Wextra>"
   # Vectors are passed between functions that are always inlined.
   "$<$<COMPILE_LANGUAGE:CXX>:-Wno-psabi>"
-  "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all;-fbacktrace>")
+  "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all,no-array-temps;-fbacktrace>")
+
+# Where the processor can, GCC 12 makes a fused multiply-add of a complex product in straight-line code, in spite of
+# -ffp-contract=off; results would depend on the processor that the build is for.
+if(CMAKE_Fortran_FLAGS MATCHES "-m(arch|tune|fma|avx|cpu)")
+  target_compile_options(separatrix_strict INTERFACE "$<$<COMPILE_LANGUAGE:Fortran>:-fno-tree-slp-vectorize>")
+endif()

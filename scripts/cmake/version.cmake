@@ -5,6 +5,8 @@
 # asked for at every build; the module is rewritten, and compiled again, only when something changed.
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 string(STRIP "${CMAKE_Fortran_FLAGS} ${CMAKE_Fortran_FLAGS_${build_type}} -ffp-contract=off" build_flags)
+string(STRIP "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_${build_type}} -ffp-contract=off" build_c_flags)
+string(STRIP "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type}} -ffp-contract=off" build_cxx_flags)
 set(build_mpi "none")
 set(build_hdf5 "${HDF5_VERSION} (serial)")
 if(SEPARATRIX_MPI)
@@ -18,7 +20,7 @@ add_custom_target(separatrix_build_info_source
           "-DTEMPLATE=${CMAKE_CURRENT_LIST_DIR}/build_info.f90.in" "-DOUTPUT=${build_info}"
           "-DSOURCE_DIR=${PROJECT_SOURCE_DIR}" "-DVERSION=${PROJECT_VERSION}"
           "-DCOMPILER=Fortran ${CMAKE_Fortran_COMPILER_ID} ${CMAKE_Fortran_COMPILER_VERSION}, C ${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}, C++ ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}"
-          "-DFLAGS=${build_flags}" "-DMPI=${build_mpi}" "-DHDF5=${build_hdf5}"
+          "-DFLAGS=${build_flags}" "-DC_FLAGS=C ${build_c_flags}, C++ ${build_cxx_flags}" "-DMPI=${build_mpi}" "-DHDF5=${build_hdf5}"
           -P "${CMAKE_CURRENT_LIST_DIR}/write_build_info.cmake"
   BYPRODUCTS "${build_info}"
   COMMENT "Asking for the commit" VERBATIM)

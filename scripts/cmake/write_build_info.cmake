@@ -11,7 +11,7 @@ if(NOT status EQUAL 0 OR COMMIT STREQUAL "")
 endif()
 
 # A Fortran literal, in pieces because a line holds 132 characters.
-foreach(name IN ITEMS VERSION COMMIT COMPILER FLAGS MPI HDF5)
+foreach(name IN ITEMS VERSION COMMIT COMPILER FLAGS C_FLAGS MPI HDF5)
   set(rest "${${name}}")
   set(literal "")
   while(TRUE)

@@ -26,21 +26,24 @@ contains
     character(len=:), allocatable :: text
     text = '# The resolved case: SI units, defaults filled in.'//newline
     if (len(the_case%title) > 0) text = text//'title = '//quoted(the_case%title)//newline
-    text = text//deciding_text(the_case)
+    text = text//deciding_text(the_case, '')
     if (size(the_case%axes) > 0) then
       text = text//newline//'[grid]'//newline//'tile = '//integers(the_case%tile)//newline
     end if
   end function echo_case
 
-  !> Checksum of what decides the results: everything but the title and the shape of the tiles.
-  pure function case_identity(the_case) result(identity)
+  !> Checksum of what decides the results: everything but the title, the shape of the tiles, and what the command
+  !> `kind` ('' = any) does not read.
+  pure function case_identity(the_case, kind) result(identity)
     type(case_t), intent(in) :: the_case
+    character(len=*), intent(in) :: kind
     character(len=16) :: identity
-    identity = hash_text(deciding_text(the_case))
+    identity = hash_text(deciding_text(the_case, kind))
   end function case_identity
 
-  pure function deciding_text(the_case) result(text)
+  pure function deciding_text(the_case, kind) result(text)
     type(case_t), intent(in) :: the_case
+    character(len=*), intent(in) :: kind
     character(len=:), allocatable :: text
     integer :: i
     text = ''
@@ -48,12 +51,15 @@ contains
       text = text//law_text(the_case%laws(i))
     end do
     text = text//settings_text(the_case)
+    if (kind == '' .or. kind == 'trajectory') text = text//newline//'[trajectory]'//newline// &
+      line('samples_per_period', to_text(the_case%trajectory%samples_per_period))
     do i = 1, size(the_case%axes)
+      if (kind /= '' .and. kind /= 'basin') exit
       text = text//newline//'[[axis]]'//newline//line('name', quoted(trim(the_case%axes(i)%name)))// &
              values_text(the_case%axes(i)%values)
     end do
     if (the_case%refine%active) text = text//refine_text(the_case%refine)
-    if (the_case%sweep%present) text = text//sweep_text(the_case%sweep)
+    if (the_case%sweep%present .and. (kind == '' .or. kind == 'sweep')) text = text//sweep_text(the_case%sweep)
   end function deciding_text
 
   !> One table of a law; a barrier that is not there (at the largest number) is left out.
@@ -98,9 +104,7 @@ contains
              newline//'[attractors]'//newline// &
              line('sample', to_text(attractors%sample))// &
              line('seed', to_text(attractors%seed))// &
-             line('max_period', to_text(attractors%max_period))// &
-             newline//'[trajectory]'//newline// &
-             line('samples_per_period', to_text(the_case%trajectory%samples_per_period))
+             line('max_period', to_text(attractors%max_period))
     end associate
   end function settings_text
 

@@ -8,12 +8,14 @@ module bindings
   implicit none
   private
 
-  public :: c_signals_install, c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
+  public :: c_crashed, c_fork, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
+    c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
-    c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_file_exists, &
+    c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, &
     c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
-    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special
+    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
+    c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment
 
   interface
     integer(c_int) function c_is_special(path) bind(c, name='separatrix_is_special')
@@ -31,6 +33,23 @@ module bindings
     integer(c_int) function c_signals_install() bind(c, name='separatrix_signals_install')
       import :: c_int
     end function c_signals_install
+
+    integer(c_int) function c_fork() bind(c, name='separatrix_fork')
+      import :: c_int
+    end function c_fork
+
+    integer(c_int) function c_crashed(process) bind(c, name='separatrix_crashed')
+      import :: c_int
+      integer(c_int), value :: process
+    end function c_crashed
+
+    integer(c_int) function c_signals_ignore_file_limit() bind(c, name='separatrix_signals_ignore_file_limit')
+      import :: c_int
+    end function c_signals_ignore_file_limit
+
+    integer(c_int) function c_signals_terminated() bind(c, name='separatrix_signals_terminated')
+      import :: c_int
+    end function c_signals_terminated
 
     integer(c_int) function c_signals_received() bind(c, name='separatrix_signals_received')
       import :: c_int
@@ -83,6 +102,33 @@ module bindings
       integer(c_int), value :: size
     end function c_host_name
 
+    integer(c_int) function c_core_list(text, size) bind(c, name='separatrix_core_list')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end function c_core_list
+
+    integer(c_int) function c_may_use_core(core) bind(c, name='separatrix_may_use_core')
+      import :: c_int
+      integer(c_int), value :: core
+    end function c_may_use_core
+
+    integer(c_int) function c_online_cores() bind(c, name='separatrix_online_cores')
+      import :: c_int
+    end function c_online_cores
+
+    integer(c_int) function c_cpu_name(text, size) bind(c, name='separatrix_cpu_name')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end function c_cpu_name
+
+    subroutine c_environment(text, size) bind(c, name='separatrix_environment')
+      import :: c_char, c_int
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: size
+    end subroutine c_environment
+
     integer(c_int) function c_stderr_is_terminal() bind(c, name='separatrix_stderr_is_terminal')
       import :: c_int
     end function c_stderr_is_terminal
@@ -101,6 +147,11 @@ module bindings
       import :: c_int
       integer(c_int), value :: code
     end subroutine c_exit
+
+    subroutine c_exit_now(code) bind(c, name='separatrix_exit_now')
+      import :: c_int
+      integer(c_int), value :: code
+    end subroutine c_exit_now
 
     integer(c_int) function c_file_exists(path) bind(c, name='separatrix_file_exists')
       import :: c_char, c_int

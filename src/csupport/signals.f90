@@ -1,15 +1,16 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Stop signals: SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted, SIGXFSZ is ignored.
+!> Stop signals: SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted, SIGXFSZ can be ignored.
 module signals
-  use bindings, only: c_signals_clear, c_signals_install, c_signals_raise, c_signals_received
+  use bindings, only: c_signals_clear, c_signals_ignore_file_limit, c_signals_install, c_signals_raise, &
+    c_signals_received, c_signals_terminated
   use errors, only: error_t, fail
   use status, only: exit_internal
   implicit none
   private
 
-  public :: install_signals, signal_count, clear_signals, raise_signal
+  public :: install_signals, ignore_file_limit, signal_count, termination_asked, clear_signals, raise_signal
 
   !> Linux signal numbers.
   integer, parameter, public :: sig_usr1 = 10, sig_usr2 = 12, sig_term = 15, sig_xfsz = 25
@@ -21,6 +22,17 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (c_signals_install() /= 0) call fail(error, exit_internal, 'cannot install the signal handlers')
   end subroutine install_signals
+
+  !> Makes a write beyond the file size limit an error instead of the end of the process; code 70 if the system refuses.
+  subroutine ignore_file_limit(error)
+    type(error_t), allocatable, intent(out) :: error
+    if (c_signals_ignore_file_limit() /= 0) call fail(error, exit_internal, 'cannot ignore the file size signal')
+  end subroutine ignore_file_limit
+
+  !> Whether SIGTERM came since the start or the last `clear_signals`.
+  logical function termination_asked()
+    termination_asked = c_signals_terminated() == 1
+  end function termination_asked
 
   !> Stop signals received since the start or the last `clear_signals`.
   integer function signal_count()

@@ -4,14 +4,16 @@
 !> Clock, host, memory and environment of this process.
 module system
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_default_environment, c_exit, c_host_name, c_monotonic_seconds, &
-    c_resident_bytes, c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
+  use bindings, only: c_core_list, c_cpu_name, c_crashed, c_default_environment, c_environment, c_exit, c_exit_now, c_fork, &
+    c_host_name, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_sleep_microseconds, &
+    c_stderr_is_terminal, c_utc_now
   use kinds, only: int64, real64
   implicit none
   private
 
   public :: monotonic_seconds, utc_now, resident_bytes, host_name, stderr_is_terminal, &
-    default_environment, sleep_microseconds, exit_program, from_c
+    default_environment, sleep_microseconds, exit_program, exit_at_once, fork_process, has_crashed, from_c, core_list, &
+    may_use_core, online_cores, cpu_name, environment_text
 
 contains
 
@@ -47,6 +49,41 @@ contains
     end if
   end function host_name
 
+  !> The cores that this process may run on, as '0-3,8'; 'unknown' if the system does not tell.
+  function core_list() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(128)
+    text = 'unknown'
+    if (c_core_list(buffer, int(size(buffer), c_int)) > 0) text = from_c(buffer)
+  end function core_list
+
+  !> Whether this process may run on a core (from 0).
+  logical function may_use_core(core)
+    integer, intent(in) :: core
+    may_use_core = c_may_use_core(int(core, c_int)) == 1
+  end function may_use_core
+
+  !> Cores of this host.
+  integer function online_cores()
+    online_cores = int(c_online_cores())
+  end function online_cores
+
+  !> The name of the processor; 'unknown' if the system does not tell.
+  function cpu_name() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(256)
+    text = 'unknown'
+    if (c_cpu_name(buffer, int(size(buffer), c_int)) == 0) text = from_c(buffer)
+  end function cpu_name
+
+  !> The variables that decide how MPI, HDF5 and the batch system work, as 'NAME=VALUE NAME=VALUE'.
+  function environment_text() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: buffer(8192)
+    call c_environment(buffer, int(size(buffer), c_int))
+    text = from_c(buffer)
+  end function environment_text
+
   !> Whether stderr is a terminal.
   logical function stderr_is_terminal()
     stderr_is_terminal = c_stderr_is_terminal() == 1
@@ -70,6 +107,24 @@ contains
     integer, intent(in) :: code
     call c_exit(int(code, c_int))
   end subroutine exit_program
+
+  !> Ends the program with this exit code, without the clean-up of the libraries in use.
+  subroutine exit_at_once(code)
+    integer, intent(in) :: code
+    call c_exit_now(int(code, c_int))
+  end subroutine exit_at_once
+
+  !> A copy of this process that says nothing, for a trial that may crash: 0 in the copy, its number in this one, -1 if
+  !> there can be none.
+  integer function fork_process()
+    fork_process = c_fork()
+  end function fork_process
+
+  !> Waits for the copy; whether it crashed, or ended with another code than 0.
+  logical function has_crashed(process)
+    integer, intent(in) :: process
+    has_crashed = c_crashed(int(process, c_int)) == 1
+  end function has_crashed
 
   !> The characters before the first null.
   pure function from_c(buffer) result(text)

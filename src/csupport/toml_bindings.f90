@@ -12,7 +12,7 @@ module toml_bindings
   implicit none
   private
 
-  public :: read_toml, read_text_file, hash_text
+  public :: read_toml, read_text_file, first_bad_byte, hash_text
 
   !> Kinds of an entry.
   integer, parameter, public :: toml_integer = 1, toml_float = 2, toml_string = 3, &
@@ -93,6 +93,13 @@ module toml_bindings
       integer(c_int64_t), value :: capacity
       integer(c_int64_t) :: c_text
     end function c_text
+
+    pure function c_first_bad_byte(text, length) bind(c, name='separatrix_first_bad_byte')
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_int64_t), value :: length
+      integer(c_int64_t) :: c_first_bad_byte
+    end function c_first_bad_byte
 
     pure function c_fnv1a(text, length) bind(c, name='separatrix_fnv1a')
       import :: c_char, c_int64_t
@@ -200,6 +207,13 @@ contains
       text = text//letters(i)
     end do
   end function terminated
+
+  !> Where (from 1) the first byte of a text is that is not UTF-8, or a control character other than the ends of lines and
+  !> tabs; 0 if nowhere.
+  pure integer(int64) function first_bad_byte(text)
+    character(len=*), intent(in) :: text
+    first_bad_byte = c_first_bad_byte(text, len(text, int64)) + 1
+  end function first_bad_byte
 
   !> 64-bit FNV-1a hash of a text as 16 hexadecimal digits.
   pure function hash_text(text) result(digits)

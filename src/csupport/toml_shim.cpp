@@ -197,8 +197,6 @@ void explain(const std::string &report, const std::string &text, Document &docum
     reason = "'=' is missing after the key" + tail;
   } else if (has(summary, "invalid line format")) {
     reason = "only a comment may follow on this line (a text needs quotes)" + tail;
-  } else if (has(summary, "utf8")) {
-    reason = "the text is not valid UTF-8";
   } else if (has(summary, "is not a valid") && has(summary, "string")) {
     reason = "not a text that ends with the quote it begins with" + tail;
   } else if (has(summary, "invalid key") || has(summary, "empty key")) {
@@ -233,7 +231,48 @@ bool nested_too_deep(const std::string &text) {
   return false;
 }
 
+// Length of the UTF-8 sequence at `at`, 0 if there is none.
+std::size_t sequence_at(const std::string &text, std::size_t at) {
+  const auto byte = [&text](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
+  };
+  const unsigned first = byte(at);
+  if (first < 0x80)
+    return 1;
+  const std::size_t length = first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(at + i) & 0xC0) != 0x80)
+      return 0;
+  // Overlong forms, surrogates, and what is beyond the last code point.
+  const unsigned second = byte(at + 1);
+  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+      (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F))
+    return 0;
+  return length;
+}
+
+// toml11 3.7.1 reads beyond its buffer when it reports bytes that are not UTF-8, so it never sees any.
+bool refuse_bad_bytes(const std::string &text, Document &document) {
+  int line = 1;
+  std::size_t line_begin = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = sequence_at(text, at);
+    if (length == 0) {
+      document.fail("the text is not valid UTF-8", line, static_cast<int>(at - line_begin) + 1);
+      return true;
+    }
+    if (text[at] == '\n') {
+      ++line;
+      line_begin = at + 1;
+    }
+    at += length;
+  }
+  return false;
+}
+
 void parse(const std::string &text, Document &document) {
+  if (refuse_bad_bytes(text, document))
+    return;
   if (nested_too_deep(text)) {
     document.fail("lists or tables are nested too deep", 1, 1);
     return;
@@ -330,6 +369,23 @@ void separatrix_toml_value(const void *document, int entry, int *kind, int *line
 int64_t separatrix_toml_text(const void *document, int entry, int field, char *buffer, int64_t capacity) {
   const Entry &found = document_at(document).entries[static_cast<std::size_t>(entry)];
   return copy_into(field == SEPARATRIX_TOML_PATH ? found.path : found.text, buffer, capacity);
+}
+
+int64_t separatrix_first_bad_byte(const char *text, int64_t length) {
+  try {
+    const std::string all(text, static_cast<std::size_t>(length));
+    for (std::size_t at = 0; at < all.size();) {
+      const std::size_t step = sequence_at(all, at);
+      const bool control =
+          static_cast<unsigned char>(all[at]) < 0x20 && std::strchr("\t\r\n", all[at]) == nullptr;
+      if (step == 0 || control || all[at] == '\0')
+        return static_cast<int64_t>(at);
+      at += step;
+    }
+    return -1;
+  } catch (...) {
+    return 0;
+  }
 }
 
 uint64_t separatrix_fnv1a(const char *text, int64_t length) {

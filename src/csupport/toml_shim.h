@@ -42,6 +42,10 @@ void separatrix_toml_value(const void *document, int entry, int *kind, int *line
 /* Copies at most `capacity` bytes of a text field without a terminator; returns its length. */
 int64_t separatrix_toml_text(const void *document, int entry, int field, char *buffer, int64_t capacity);
 
+/* Where the first byte is that is not UTF-8, or a control character other than the ends of lines and tabs; -1
+ * if nowhere. */
+int64_t separatrix_first_bad_byte(const char *text, int64_t length);
+
 /* 64-bit FNV-1a hash of `length` bytes. */
 uint64_t separatrix_fnv1a(const char *text, int64_t length);
 

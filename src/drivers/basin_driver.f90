@@ -22,6 +22,7 @@ module basin_driver
   use refinement_report, only: add_refinement, report_refinement
   use refined_tile, only: layers_of, pilot_share
   use session, only: describe_file, open_session, session_t
+  use shard, only: describe_shard, finish_shard, shard_path
   use status, only: last_reason, exit_done, reason_names, reason_settled
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
@@ -30,7 +31,7 @@ module basin_driver
   implicit none
   private
 
-  public :: run_basin
+  public :: run_basin, prepare_basin, prepare_counts, describe_basin, end_basin
 
   !> Bytes of a point in the working file.
   integer, parameter, public :: bytes_per_point = 1 + 4 + 1 + 2 + 8 + 8*4
@@ -68,7 +69,7 @@ contains
     type(session_t) :: session
     type(basin_work_t) :: work
     type(map_file_t) :: file
-    type(schema_t) :: schema, extra
+    type(schema_t) :: schema
     type(error_t), allocatable :: error
     character(len=name_length), allocatable :: dimensions(:)
     character(len=:), allocatable :: path
@@ -77,18 +78,13 @@ contains
     call open_session(command, session)
     call require_axes(session%the_case, error)
     call session%stop_if(error)
-    work%variables = basin_variables
-    work%grid = grid_of(session%the_case, session%the_case%axes)
-    work%span = span_of(session%the_case)
-    work%max_period = session%the_case%attractors%max_period
-    call prepare_refinement(session%the_case, work)
-    tile = automatic_tile(work%grid, session%the_case%tile)
-    if (work%refine%active) tile = tile_of_blocks(work%grid, work%refine, session%the_case%tile)
+    call prepare_basin(session%the_case, work, tile)
     if (command%validate) then
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
     end if
     path = output_path(command%output, command%path)
+    if (command%shard > 0) path = shard_path(path, command%shard, command%shard_count)
     if (.not. command%dry_run) call session%begin(path, tiled=.true.)
     if (command%dry_run .and. work%grid%slices > most_dry_slices) then
       ! Too many catalogues for a dry run: every point discovers its own attractor instead, which takes longer.
@@ -104,6 +100,34 @@ contains
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)
     call report_catalogue(session, work)
+    call describe_basin(session, work, schema, dimensions)
+    if (command%shard > 0) call describe_shard(work%catalogues, command%shard, command%shard_count, schema)
+    call open_tiles(session, path, schema, dimensions, tile, file)
+    call run_tiles(session, file, work, complete)
+    if (command%shard > 0 .and. complete) call finish_shard(session, file)
+    call end_basin(session, work, file, complete)
+  end subroutine run_basin
+
+  !> Grid, span and tiles of a case.
+  subroutine prepare_basin(the_case, work, tile)
+    type(case_t), intent(in) :: the_case
+    type(basin_work_t), intent(inout) :: work
+    integer, allocatable, intent(out) :: tile(:)
+    work%variables = basin_variables
+    work%grid = grid_of(the_case, the_case%axes)
+    work%span = span_of(the_case)
+    work%max_period = the_case%attractors%max_period
+    call prepare_refinement(the_case, work)
+    tile = automatic_tile(work%grid, the_case%tile)
+    if (work%refine%active) tile = tile_of_blocks(work%grid, work%refine, the_case%tile)
+  end subroutine prepare_basin
+
+  !> Attributes, axes and variables of the file; returns the names of its dimensions.
+  subroutine describe_basin(session, work, schema, dimensions)
+    type(session_t), intent(in) :: session
+    type(basin_work_t), intent(in) :: work
+    type(schema_t), intent(inout) :: schema
+    character(len=name_length), allocatable, intent(out) :: dimensions(:)
     call describe_file(session, 'basin', schema)
     call add_axes(schema, work%grid%axes, dimensions)
     if (work%refine%active) then
@@ -111,8 +135,15 @@ contains
     else
       call add_map_variables(schema, '', dimensions)
     end if
-    call open_tiles(session, path, schema, dimensions, tile, file)
-    call run_tiles(session, file, work, complete)
+  end subroutine describe_basin
+
+  !> The final file with its catalogue, the shares of the regimes, and the end of the program.
+  subroutine end_basin(session, work, file, complete)
+    type(session_t), intent(inout) :: session
+    type(basin_work_t), intent(inout) :: work
+    type(map_file_t), intent(inout) :: file
+    logical, intent(in) :: complete
+    type(schema_t) :: extra
     call sum_counts(session, work)
     call add_catalogue(extra, work%catalogues, work%captured)
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
@@ -120,7 +151,7 @@ contains
     call report_shares(session, work)
     if (work%refine%active) call report_refinement(session, work, work%grid%shape, work%origins)
     call session%end_with(exit_done)
-  end subroutine run_basin
+  end subroutine end_basin
 
   !> The first slice's machine tells how many points are worth computing at a time.
   subroutine choose_block(work, error)
@@ -142,6 +173,7 @@ contains
     work%marks = marks_of_attractor
   end subroutine prepare_refinement
 
+  !> Counts per entry of the catalogue, all 0.
   subroutine prepare_counts(work)
     type(basin_work_t), intent(inout) :: work
     integer :: i

@@ -22,7 +22,7 @@ module catalogue_search
   implicit none
   private
 
-  public :: search_catalogues
+  public :: search_catalogues, pack_catalogues, unpack_catalogues
 
 contains
 
@@ -140,42 +140,53 @@ contains
     end do
   end function attractors_of
 
-  !> Every rank gets the catalogues of the slices that the others searched: slice, number of attractors, and these.
+  !> Every rank gets the catalogues of the slices that the others searched.
   subroutine exchange(team, searched, catalogues)
     class(team_t), intent(in) :: team
     logical, intent(in) :: searched(:)
     type(catalogue_t), intent(inout) :: catalogues(:)
-    real(wp), allocatable :: mine(:), all_values(:)
-    integer :: slice, i, position, count
-    count = 0
-    do slice = 1, size(catalogues)
-      if (.not. searched(slice)) cycle
-      count = count + 2 + packed_size*size(catalogues(slice)%attractors)
-    end do
-    allocate (mine(count))
+    real(wp), allocatable :: all_values(:)
+    call team%allgather(pack_catalogues(catalogues, searched), all_values)
+    call unpack_catalogues(all_values, catalogues)
+  end subroutine exchange
+
+  !> The catalogues of the slices that were `searched`, as numbers: slice, number of attractors, and these.
+  pure function pack_catalogues(catalogues, searched) result(packed)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    logical, intent(in) :: searched(:)
+    real(wp), allocatable :: packed(:)
+    integer :: slice, i, position
+    allocate (packed(sum([(merge(2 + packed_size*size(catalogues(slice)%attractors), 0, searched(slice)), &
+                           slice=1, size(catalogues))])))
     position = 0
     do slice = 1, size(catalogues)
       if (.not. searched(slice)) cycle
-      mine(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
+      packed(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
       position = position + 2
       do i = 1, size(catalogues(slice)%attractors)
-        mine(position + 1:position + packed_size) = pack_attractor(catalogues(slice)%attractors(i))
+        packed(position + 1:position + packed_size) = pack_attractor(catalogues(slice)%attractors(i))
         position = position + packed_size
       end do
     end do
-    call team%allgather(mine, all_values)
+  end function pack_catalogues
+
+  !> What `pack_catalogues` packed, into the slices that it names.
+  pure subroutine unpack_catalogues(packed, catalogues)
+    real(wp), intent(in) :: packed(:)
+    type(catalogue_t), intent(inout) :: catalogues(:)
+    integer :: slice, i, position, count
     position = 0
-    do while (position < size(all_values))
-      slice = nint(all_values(position + 1))
-      count = nint(all_values(position + 2))
+    do while (position < size(packed))
+      slice = nint(packed(position + 1))
+      count = nint(packed(position + 2))
       position = position + 2
       if (allocated(catalogues(slice)%attractors)) deallocate (catalogues(slice)%attractors)
       allocate (catalogues(slice)%attractors(count))
       do i = 1, count
-        catalogues(slice)%attractors(i) = unpack_attractor(all_values(position + 1:position + packed_size))
+        catalogues(slice)%attractors(i) = unpack_attractor(packed(position + 1:position + packed_size))
         position = position + packed_size
       end do
     end do
-  end subroutine exchange
+  end subroutine unpack_catalogues
 
 end module catalogue_search

@@ -14,17 +14,21 @@ module command_line
 
   integer, parameter :: longest_argument = 4096
 
-  character(len=*), parameter, public :: commands(7) = [character(len=10) :: 'basin', 'sweep', &
-    'trajectory', 'points', 'laws', 'info', 'verify']
+  character(len=*), parameter, public :: commands(8) = [character(len=10) :: 'basin', 'sweep', &
+    'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
 
   !> The commands that keep what is done when they are stopped.
   character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
 
   type, public :: command_t
     character(len=:), allocatable :: name
-    !> The case, or the file of `info` and `verify`.
+    !> The case, the file of `info` and `verify`, or the output of `merge`.
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: output, list, csv, tile_times
+    !> The files that `merge` reads.
+    character(len=longest_argument), allocatable :: shards(:)
+    !> Which share of the tiles to compute, and of how many; 0 = all.
+    integer :: shard = 0, shard_count = 0
+    character(len=:), allocatable :: output, list, csv, log, tile_times
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -42,6 +46,7 @@ contains
     type(command_t), intent(out) :: command
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: argument
+    character(len=longest_argument) :: padded
     integer :: position
     command%name = ''
     command%path = ''
@@ -49,7 +54,8 @@ contains
     command%list = ''
     command%csv = ''
     command%tile_times = ''
-    allocate (command%overrides(0))
+    command%log = ''
+    allocate (command%overrides(0), command%shards(0))
     position = 0
     do while (position < command_argument_count())
       position = position + 1
@@ -62,6 +68,9 @@ contains
           "'; the commands are "//join(commands, ', '))
       else if (len(command%path) == 0) then
         command%path = argument
+      else if (command%name == 'merge') then
+        padded = argument
+        command%shards = [command%shards, padded]
       else
         call fail(error, exit_usage, "unexpected argument '"//argument//"' after '"//command%path//"'")
       end if
@@ -82,6 +91,10 @@ contains
                 ' --help)')
     else if (len(command%path) > 0 .and. command%name == 'laws') then
       call fail(error, exit_usage, "laws takes no file; found '"//command%path//"'")
+    else if (command%name == 'merge' .and. size(command%shards) == 0) then
+      call fail(error, exit_usage, 'merge: the shards are missing (see separatrix merge --help)')
+    else if (command%shard > 0 .and. command%name /= 'basin') then
+      call fail(error, exit_usage, '--shard belongs to the command basin')
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
@@ -107,6 +120,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (len(command%output) > 0 .and. (command%output == command%path .or. command%output == command%list)) then
       call fail(error, exit_usage, "-o '"//command%output//"' would replace what is read")
+    else if (len(command%log) > 0 .and. any(command%name == [character(len=10) :: 'laws', 'info', 'verify'])) then
+      call fail(error, exit_usage, '--log belongs to the commands that compute')
+    else if (len(command%log) > 0 .and. (command%log == command%path .or. command%log == command%list .or. &
+                                         command%log == command%output .or. command%log == command%csv)) then
+      call fail(error, exit_usage, "--log '"//command%log//"' is the name of another file of the run")
     else if (len(command%csv) > 0 .and. (command%csv == command%path .or. command%csv == command%list)) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
     else if (len(command%csv) > 0 .and. command%csv == command%output) then
@@ -145,8 +163,8 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--tile-times', '--time-limit', '--ranks-per-node', &
-          '--sample', '--seed')
+    case ('-o', '--output', '--set', '--list', '--csv', '--log', '--tile-times', '--shard', '--time-limit', &
+          '--ranks-per-node', '--sample', '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -171,11 +189,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv', '--tile-times')
+    case ('-o', '--output', '--list', '--csv', '--log', '--tile-times')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
       command%overrides = [command%overrides, padded]
+    case ('--shard')
+      call read_shard(value, command, error)
     case ('--time-limit')
       call read_number(name, value, command%time_limit, error)
     case ('--ranks-per-node')
@@ -186,6 +206,20 @@ contains
       call read_integer(name, value, 0, command%seed, error)
     end select
   end subroutine take_value
+
+  !> 'I/N', share I of N.
+  subroutine read_shard(value, command, error)
+    character(len=*), intent(in) :: value
+    type(command_t), intent(inout) :: command
+    type(error_t), allocatable, intent(out) :: error
+    integer :: slash
+    slash = index(value, '/')
+    if (slash > 0) call read_integer('--shard', value(:slash - 1), 1, command%shard, error)
+    if (slash > 0 .and. .not. allocated(error)) call read_integer('--shard', value(slash + 1:), 1, command%shard_count, error)
+    if (slash == 0 .or. allocated(error) .or. command%shard > command%shard_count) then
+      call fail(error, exit_usage, "--shard: found '"//value//"', allowed is I/N with whole numbers from 1/1 to N/N")
+    end if
+  end subroutine read_shard
 
   subroutine take_path(name, value, command, error)
     character(len=*), intent(in) :: name, value
@@ -199,6 +233,8 @@ contains
       command%tile_times = value
     case ('--csv')
       command%csv = value
+    case ('--log')
+      command%log = value
     case default
       command%output = value
     end select
@@ -262,6 +298,12 @@ contains
       lines = 'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
         '  --list FILE     table with the columns x0,v0 and optionally ratio; replaces the grid of the case'//nl// &
         '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl
+    case ('merge')
+      lines = 'separatrix merge OUT SHARD...: one result file from the files that basin --shard I/N has written'//nl// &
+        '  The shards must be all of one case: N files, each share once. They are kept.'//nl// &
+        '  --force         replaces an existing OUT'//nl// &
+        '  --json, --quiet, --log FILE  as for the other commands'//nl
+      return
     case ('laws')
       lines = 'separatrix laws [--json]: every law with parameters, units, bounds and source'//nl
       return
@@ -281,6 +323,7 @@ contains
         '  sweep CASE       amplitude-frequency and bifurcation diagram, run up, run down and from many starts'//nl// &
         '  trajectory CASE  one motion with all its events'//nl// &
         '  points CASE      a list of starts'//nl// &
+        '  merge OUT SHARD  one file from the shares of a map'//nl// &
         '  laws             every law with parameters, units, bounds and source'//nl// &
         '  info FILE        what a file holds'//nl// &
         '  verify FILE      checks a file and reruns a sample of it at higher precision'//nl//nl// &
@@ -293,10 +336,12 @@ contains
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &
       '  --force            replaces an existing output'//nl// &
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
+      '  --shard I/N        basin: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &
       '  --json             log as JSON lines'//nl// &
+      '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'//nl// &
       '  -q, --quiet        errors only'//nl// &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &
       'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &

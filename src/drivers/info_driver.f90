@@ -4,13 +4,14 @@
 !> `separatrix info`: what is in a file.
 module info_driver
   use attractors, only: regime_names
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use event_words, only: word_text
   use journal, only: json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
+  use map_verify, only: probe_file
   use slabs, only: slab, slab_count
-  use status, only: reason_names
+  use status, only: exit_io, reason_names
   use text, only: join, to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
@@ -20,8 +21,11 @@ module info_driver
 
   character(len=*), parameter :: root_texts(6) = [character(len=14) :: 'kind', 'title', 'source', 'date_created', &
     'format_version', 'complete']
-  character(len=*), parameter :: provenance_texts(8) = [character(len=12) :: 'commit', 'compiler', 'mpi', 'hdf5', &
-    'hosts', 'started', 'finished', 'command_line']
+  character(len=*), parameter :: provenance_texts(17) = [character(len=13) :: 'version', 'commit', 'compiler', 'flags', &
+    'c_flags', 'mpi', 'hdf5', 'ranks', 'host_count', 'hosts', 'processor', 'environment', 'started', 'finished', &
+    'wall_seconds', 'case_identity', 'command_line']
+  character(len=*), parameter :: numeric(5) = [character(len=14) :: 'format_version', 'complete', 'ranks', 'host_count', &
+    'wall_seconds']
   character(len=*), parameter :: catalogue_columns(8) = [character(len=18) :: 'attractor', 'slice', 'regime', &
     'period', 'event_word', 'amplitude', 'impacts_per_period', 'count']
 
@@ -35,12 +39,14 @@ contains
     type(reader_t) :: reader
     type(variable_info_t), allocatable :: variables(:)
     character(len=:), allocatable :: body
-    call open_final(path, reader, error)
+    call probe_file(path, error)
+    if (.not. allocated(error)) call open_final(path, reader, error)
     if (allocated(error)) return
     call reader%variables(variables, error)
     if (allocated(error)) return
     body = ''
     call add_attributes(reader, json, body, error)
+    if (.not. allocated(error)) call add_tiles(reader, json, body, error)
     if (.not. allocated(error)) call add_variables(variables, json, body)
     if (.not. allocated(error)) call add_codes(reader, json, 'regime', regime_names, body, error)
     if (.not. allocated(error)) call add_codes(reader, json, 'reason', reason_names, body, error)
@@ -79,9 +85,11 @@ contains
       character(len=:), allocatable :: text
       real(wp) :: number
       if (.not. reader%has_attribute(object, name)) return
-      if (name == 'format_version' .or. name == 'complete') then
+      if (any(numeric == name)) then
         call reader%number_attribute(object, name, number, error)
-        if (.not. allocated(error)) text = to_text(nint(number))
+        if (allocated(error)) return
+        text = to_text(number)
+        if (abs(number) < 1e15_wp .and. abs(number - anint(number)) <= 0) text = to_text(nint(number, int64))
       else
         call reader%text_attribute(object, name, text, error)
         if (.not. allocated(error) .and. json) text = json_text(text)
@@ -95,6 +103,25 @@ contains
     end subroutine add_one
 
   end subroutine add_attributes
+
+  !> How many tiles of a file are done.
+  subroutine add_tiles(reader, json, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: states(:)
+    integer :: done
+    if (.not. reader%has('/tiles/state')) return
+    call reader%read_values('/tiles/state', states, error)
+    if (allocated(error)) return
+    done = count(abs(states - 1) <= 0)
+    if (json) then
+      body = body//', "tiles_done": '//to_text(done)//', "tiles": '//to_text(size(states))
+    else
+      body = body//new_line('a')//'  tiles: '//to_text(done)//' of '//to_text(size(states))//' done'
+    end if
+  end subroutine add_tiles
 
   subroutine add_variables(variables, json, body)
     type(variable_info_t), intent(in) :: variables(:)
@@ -176,7 +203,7 @@ contains
       call reader%read_block(path, lower, extent, values, error)
       if (allocated(error)) return
       do i = 0, ubound(counts, 1)
-        counts(i) = counts(i) + count(nint(values) == i)
+        counts(i) = counts(i) + count(abs(values - i) < 0.5_wp)
       end do
     end do
   end subroutine count_codes
@@ -230,16 +257,12 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: column(:), table(:, :)
+    real(wp), allocatable :: table(:, :)
     character(len=:), allocatable :: line
     integer :: i, k
     if (.not. reader%has('/catalogue/attractor')) return
-    do k = 1, size(catalogue_columns)
-      call reader%read_values('/catalogue/'//trim(catalogue_columns(k)), column, error)
-      if (allocated(error)) return
-      if (k == 1) allocate (table(size(column), size(catalogue_columns)))
-      table(:, k) = column
-    end do
+    call reader%read_columns([('/catalogue/'//catalogue_columns(k), k=1, size(catalogue_columns))], table, error)
+    if (allocated(error)) return
     if (json) body = body//', "catalogue": ['
     if (.not. json) body = body//new_line('a')//'  catalogue (R, L: impact at upper, lower barrier; S: stick; '// &
       'C, D: chatter; . : end of a period):'
@@ -251,13 +274,13 @@ contains
         if (.not. json) line = line//trim(catalogue_columns(k))//' '
         select case (catalogue_columns(k))
         case ('regime')
-          line = line//quoted(trim(regime_names(nint(table(i, k)))))
+          line = line//quoted(code_name(table(i, k)))
         case ('event_word')
-          line = line//quoted(word_text(nint(table(i, k), int64)))
+          line = line//quoted(word_text(whole(table(i, k))))
         case ('amplitude', 'impacts_per_period')
           line = line//to_text(table(i, k), 6)
         case default
-          line = line//to_text(nint(table(i, k), int64))
+          line = line//to_text(whole(table(i, k)))
         end select
       end do
       if (json) body = body//trim(merge(', ', '  ', i > 1))//'{'//line//'}'
@@ -266,6 +289,24 @@ contains
     if (json) body = body//']'
 
   contains
+
+    !> The name of a regime, or what stands in its place in a file that is not sound.
+    function code_name(code) result(name)
+      real(wp), intent(in) :: code
+      character(len=:), allocatable :: name
+      if (code >= lbound(regime_names, 1) .and. code <= ubound(regime_names, 1)) then
+        name = trim(regime_names(nint(code)))
+      else
+        name = 'unknown'
+      end if
+    end function code_name
+
+    !> The nearest integer; 0 for what has none.
+    pure integer(int64) function whole(value)
+      real(wp), intent(in) :: value
+      whole = 0
+      if (abs(value) < 2.0_wp**62) whole = nint(value, int64)
+    end function whole
 
     function quoted(text)
       character(len=*), intent(in) :: text
@@ -282,21 +323,24 @@ contains
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: names(:)
-    real(wp), allocatable :: lower(:), upper(:)
+    real(wp), allocatable :: ends(:, :)
     integer :: i
     if (.not. reader%has('/limits/name')) return
     call reader%read_strings('/limits/name', names, error)
-    if (.not. allocated(error)) call reader%read_values('/limits/lower', lower, error)
-    if (.not. allocated(error)) call reader%read_values('/limits/upper', upper, error)
+    if (.not. allocated(error)) call reader%read_columns(['/limits/lower', '/limits/upper'], ends, error)
     if (allocated(error)) return
+    if (size(ends, 1) /= size(names)) then
+      call fail(error, exit_io, "the columns of '/limits' in '"//reader%path//"' differ in length")
+      return
+    end if
     if (json) body = body//', "limits": ['
     if (.not. json) body = body//new_line('a')//'  limits:'
     do i = 1, size(names)
       if (json) then
         body = body//trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))//', "lower": '// &
-          to_text(lower(i))//', "upper": '//to_text(upper(i))//'}'
+          to_text(ends(i, 1))//', "upper": '//to_text(ends(i, 2))//'}'
       else
-        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(lower(i), 6)//' .. '//to_text(upper(i), 6)
+        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(ends(i, 1), 6)//' .. '//to_text(ends(i, 2), 6)
       end if
     end do
     if (json) body = body//']'

@@ -2,10 +2,13 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> What a run says while it works: lines on stdout (plain or JSON, rank 0 only) and progress with rate and
-!> ETA on stderr: one line that is rewritten on a terminal, sparse lines in a log.
+!> ETA on stderr: one line that is rewritten on a terminal, sparse lines in a log. All of it also goes to a file as JSON
+!> lines if one is asked for.
 module journal
+  use errors, only: error_t, fail
   use kinds, only: int64, wp
-  use system, only: monotonic_seconds, resident_bytes, stderr_is_terminal
+  use status, only: exit_cannot_create
+  use system, only: monotonic_seconds, resident_bytes, stderr_is_terminal, utc_now
   use text, only: replace_all, to_text
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   implicit none
@@ -21,12 +24,17 @@ module journal
     real(wp) :: started = 0
     real(wp) :: next_progress = 0, interval = first_interval
     logical :: terminal = .false., line_open = .false.
+    !> The unit of the file of JSON lines; 0 = none.
+    integer :: copy = 0
+    !> Bytes of results that this rank has written.
+    integer(int64) :: written = 0
     !> The stretch of work under way.
     character(len=:), allocatable :: things
     integer(int64) :: total = 0, before = 0
     real(wp) :: stretch_started = 0
   contains
     procedure :: open => open_journal
+    procedure :: open_copy
     procedure :: line
     procedure :: begin
     procedure :: progress
@@ -48,24 +56,66 @@ contains
     self%next_progress = self%started + self%interval
   end subroutine open_journal
 
-  !> One line of the log. `fields`: further members of the JSON object, '"name": value, ...'.
-  subroutine line(self, event, message, fields)
+  !> Also writes every line, and errors, to the file `path` as JSON, behind what is in it. Code 73.
+  subroutine open_copy(self, path, error)
+    class(journal_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    character(len=256) :: message
+    integer :: status
+    if (.not. self%active .or. len(path) == 0) return
+    open (newunit=self%copy, file=path, status='unknown', position='append', action='write', iostat=status, iomsg=message)
+    if (status == 0) return
+    self%copy = 0
+    call fail(error, exit_cannot_create, "cannot write the log '"//path//"': "//trim(message))
+  end subroutine open_copy
+
+  !> One line of the log. `fields`: further members of the JSON object, '"name": value, ...'. `plain` = .false.: left out
+  !> of a log in plain text.
+  subroutine line(self, event, message, fields, plain)
     class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: event, message
     character(len=*), intent(in), optional :: fields
+    logical, intent(in), optional :: plain
     character(len=:), allocatable :: more
-    if (.not. self%active .or. self%quiet) return
+    logical :: shown
+    if (.not. self%active) return
+    shown = .true.
+    if (present(plain)) shown = plain .or. self%json
+    more = ''
+    if (present(fields)) more = ', '//fields
+    call write_copy(self, event, message, more)
+    if (self%quiet .or. .not. shown) return
     call close_line(self)
     if (self%json) then
-      more = ''
-      if (present(fields)) more = ', '//fields
-      write (output_unit, '(a)') '{"event": '//json_text(event)//', "seconds": '// &
-        to_text(monotonic_seconds() - self%started, 6)//', "message": '//json_text(message)//more//'}'
+      write (output_unit, '(a)') json_line(self, event, message, more)
     else
       write (output_unit, '(a)') message
     end if
     flush (output_unit)
   end subroutine line
+
+  !> A log that cannot be written does not end the work: it is said once.
+  subroutine write_copy(self, event, message, more)
+    class(journal_t), intent(inout) :: self
+    character(len=*), intent(in) :: event, message, more
+    character(len=256) :: reason
+    integer :: status
+    if (self%copy == 0) return
+    write (self%copy, '(a)', iostat=status, iomsg=reason) json_line(self, event, message, more)
+    if (status == 0) flush (self%copy, iostat=status, iomsg=reason)
+    if (status == 0) return
+    self%copy = 0
+    write (error_unit, '(a)') 'separatrix: the log cannot be written any more: '//trim(reason)
+  end subroutine write_copy
+
+  function json_line(self, event, message, more) result(line)
+    class(journal_t), intent(in) :: self
+    character(len=*), intent(in) :: event, message, more
+    character(len=:), allocatable :: line
+    line = '{"event": '//json_text(event)//', "time": '//json_text(utc_now())//', "seconds": '// &
+           to_text(monotonic_seconds() - self%started, 6)//', "message": '//json_text(message)//more//'}'
+  end function json_line
 
   !> Begins a stretch of work: `total` things named `things`, of which `before` were done earlier.
   subroutine begin(self, things, total, before)
@@ -83,8 +133,8 @@ contains
     class(journal_t), intent(inout) :: self
     integer(int64), intent(in) :: done
     real(wp) :: now, rate
-    character(len=:), allocatable :: message
-    if (.not. self%active .or. self%quiet) return
+    character(len=:), allocatable :: message, fields
+    if (.not. self%active .or. (self%quiet .and. self%copy == 0)) return
     now = monotonic_seconds()
     if (now < self%next_progress .or. done <= self%before) return
     if (.not. self%terminal) self%interval = min(2*self%interval, longest_interval)
@@ -93,10 +143,16 @@ contains
     message = to_text(done)//' of '//to_text(self%total)//' '//self%things//', '//to_text(nint(100*real(done, wp) &
       /real(max(self%total, 1_int64), wp)))//' %, '//to_text(rate, 3)//' '//self%things//'/s, ETA '// &
       duration_text(real(self%total - done, wp)/rate)
+    fields = ', "done": '//to_text(done)//', "total": '//to_text(self%total)//', "of": '//json_text(self%things)// &
+             ', "per_second": '//to_text(rate, 6)//', "resident_bytes": '//to_text(resident_bytes())// &
+             ', "written_bytes": '//to_text(self%written)
     if (self%json) then
-      call self%line('progress', message, '"done": '//to_text(done)//', "total": '//to_text(self%total)// &
-        ', "of": '//json_text(self%things)//', "per_second": '//to_text(rate, 6)//', "resident_bytes": '//to_text(resident_bytes()))
-    else if (self%terminal) then
+      call self%line('progress', message, fields(3:))
+      return
+    end if
+    call write_copy(self, 'progress', message, fields)
+    if (self%quiet) return
+    if (self%terminal) then
       write (error_unit, '(a)', advance='no') achar(13)//'  '//message//'    '
       flush (error_unit)
       self%line_open = .true.
@@ -116,6 +172,7 @@ contains
     class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: message
     if (.not. self%active) return
+    call write_copy(self, 'error', message, '')
     call close_line(self)
     write (error_unit, '(a)') 'separatrix: '//message
     flush (error_unit)

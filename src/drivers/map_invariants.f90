@@ -49,15 +49,15 @@ contains
     integer :: known
     integer(int64), allocatable :: lengths(:), lower(:), extent(:)
     real(wp), allocatable :: column(:), block(:, :)
-    real(wp), allocatable :: labels(:), regimes(:)
+    real(wp), allocatable :: catalogue(:, :)
     integer(int64) :: k
     integer :: i
     call reader%lengths('/'//prefix//'regime', lengths, error)
     if (reader%has('/catalogue/attractor')) then
-      if (.not. allocated(error)) call reader%read_values('/catalogue/attractor', labels, error)
-      if (.not. allocated(error)) call reader%read_values('/catalogue/regime', regimes, error)
+      if (.not. allocated(error)) call reader%read_columns([character(len=20) :: '/catalogue/attractor', &
+                                                                '/catalogue/regime'], catalogue, error)
     else
-      allocate (labels(0), regimes(0))
+      allocate (catalogue(0, 2))
     end if
     if (allocated(error)) return
     allocate (lower(size(lengths)), extent(size(lengths)))
@@ -75,7 +75,7 @@ contains
       do i = 1, size(block, 1)
         call check_point(reader%path, points + i - 1, block(i, :), error)
         if (.not. allocated(error)) call check_label(reader%path, points + i - 1, nint(block(i, 1)), nint(block(i, 3)), &
-                                                     labels, regimes, error)
+                                                     catalogue, error)
         if (allocated(error)) return
       end do
       points = points + size(block, 1)
@@ -83,14 +83,14 @@ contains
   end subroutine check_map
 
   !> A labelled point has the regime of its branch in the catalogue.
-  subroutine check_label(path, number, regime, label, labels, regimes, error)
+  subroutine check_label(path, number, regime, label, catalogue, error)
     character(len=*), intent(in) :: path
     integer(int64), intent(in) :: number
     integer, intent(in) :: regime, label
-    real(wp), intent(in) :: labels(:), regimes(:)
+    real(wp), intent(in) :: catalogue(:, :)
     type(error_t), allocatable, intent(out) :: error
-    if (label == 0 .or. size(labels) == 0) return
-    if (any(nint(labels) == label .and. nint(regimes) == regime)) return
+    if (label == 0 .or. size(catalogue, 1) == 0) return
+    if (any(nint(catalogue(:, 1)) == label .and. nint(catalogue(:, 2)) == regime)) return
     call fail(error, exit_io, "'"//path//"', point "//to_text(number)//': regime '//trim(regime_names(regime))// &
               ' with the label of attractor '//to_text(label)//', which has no such regime in the catalogue')
   end subroutine check_label
@@ -163,21 +163,19 @@ contains
     type(reader_t), intent(in) :: reader
     integer(int64), intent(out) :: points
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: kinds_of_event(:), time(:), before(:), after(:)
+    real(wp), allocatable :: events(:, :)
     integer :: i
     points = 0
-    call reader%read_values('/event_kind', kinds_of_event, error)
-    if (.not. allocated(error)) call reader%read_values('/event_time', time, error)
-    if (.not. allocated(error)) call reader%read_values('/event_v_before', before, error)
-    if (.not. allocated(error)) call reader%read_values('/event_v_after', after, error)
+    call reader%read_columns([character(len=15) :: '/event_kind', '/event_time', '/event_v_before', '/event_v_after'], &
+                             events, error)
     if (allocated(error)) return
-    points = size(time)
-    do i = 1, size(time)
+    points = size(events, 1)
+    do i = 1, size(events, 1)
       if (i > 1) then
-        if (time(i) < time(i - 1)) call fail(error, exit_io, "'"//reader%path//"': event "//to_text(i - 1)// &
+        if (events(i, 2) < events(i - 1, 2)) call fail(error, exit_io, "'"//reader%path//"': event "//to_text(i - 1)// &
                                              ' comes before the one before it')
       end if
-      if (nint(kinds_of_event(i)) <= 2 .and. (before(i)*after(i) > 0 .or. abs(after(i)) > abs(before(i)))) then
+      if (nint(events(i, 1)) <= 2 .and. (events(i, 3)*events(i, 4) > 0 .or. abs(events(i, 4)) > abs(events(i, 3)))) then
         call fail(error, exit_io, "'"//reader%path//"': impact "//to_text(i - 1)//' does not reverse the velocity')
       end if
       if (allocated(error)) return
@@ -188,21 +186,21 @@ contains
     type(reader_t), intent(in) :: reader
     integer(int64), intent(out) :: points
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: reason(:), impacts(:), speed(:)
+    real(wp), allocatable :: table(:, :)
     integer :: i
     points = 0
-    call reader%read_values('/reason', reason, error)
-    if (.not. allocated(error)) call reader%read_values('/impacts', impacts, error)
-    if (.not. allocated(error)) call reader%read_values('/last_impact_speed', speed, error)
+    call reader%read_columns([character(len=18) :: '/reason', '/impacts', '/last_impact_speed'], table, error)
     if (allocated(error)) return
-    points = size(reason)
-    do i = 1, size(reason)
-      if (nint(reason(i)) <= reason_not_run .or. nint(reason(i)) > last_reason) then
-        call fail(error, exit_io, "'"//reader%path//"', point "//to_text(i - 1)//': reason code '//to_text(nint(reason(i))))
-      end if
-      if (.not. allocated(error) .and. (speed(i) < 0 .or. (speed(i) > 0 .and. impacts(i) < 1))) call fail(error, exit_io, &
-        "'"//reader%path//"', point "//to_text(i - 1)//': '//to_text(nint(impacts(i)))//' impacts, last at '// &
-        to_text(speed(i))//' m/s')
+    points = size(table, 1)
+    do i = 1, size(table, 1)
+      associate (reason => nint(table(i, 1)), impacts => table(i, 2), speed => table(i, 3))
+        if (reason <= reason_not_run .or. reason > last_reason) then
+          call fail(error, exit_io, "'"//reader%path//"', point "//to_text(i - 1)//': reason code '//to_text(reason))
+        else if (speed < 0 .or. (speed > 0 .and. impacts < 1)) then
+          call fail(error, exit_io, "'"//reader%path//"', point "//to_text(i - 1)//': '//to_text(nint(impacts))// &
+                    ' impacts, last at '//to_text(speed)//' m/s')
+        end if
+      end associate
       if (allocated(error)) return
     end do
   end subroutine check_points

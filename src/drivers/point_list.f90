@@ -9,7 +9,7 @@ module point_list
   use output_check, only: is_folder
   use status, only: exit_bad_case, exit_no_input
   use text, only: number_length, replace_all, starts_with, to_text
-  use toml_bindings, only: read_text_file
+  use toml_bindings, only: first_bad_byte, read_text_file
   implicit none
   private
 
@@ -48,6 +48,12 @@ contains
       error%message = 'list of points '//error%message
       return
     end if
+    from = first_bad_byte(text)
+    if (from > 0) then
+      call fail(error, exit_bad_case, path//':'//to_text(1 + count_lines(text(:from - 1)))// &
+                ': found a byte that is no text, allowed is UTF-8')
+      return
+    end if
     number = 0
     columns = -1
     from = 1
@@ -74,6 +80,16 @@ contains
     list%v0 = list%v0(:list%points)
     list%ratio = list%ratio(:list%points)
   end subroutine read_point_list
+
+  !> Number of line feeds.
+  pure integer function count_lines(text)
+    character(len=*), intent(in) :: text
+    integer(int64) :: i
+    count_lines = 0
+    do i = 1, len(text, int64)
+      if (text(i:i) == new_line('a')) count_lines = count_lines + 1
+    end do
+  end function count_lines
 
   !> Positions of x0, v0, ratio in the header; 0 for an absent ratio.
   subroutine read_header(path, number, line, columns, width, error)

@@ -8,7 +8,7 @@ module points_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use errors, only: error_t, fail
+  use errors, only: error_t
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
   use kinds, only: int64, int8, wp
@@ -18,8 +18,10 @@ module points_driver
   use map_schema, only: schema_t, type_float64, type_int32
   use point_list, only: point_list_t, read_point_list
   use session, only: describe_file, open_session, session_t
-  use status, only: last_reason, exit_done, exit_io, reason_names
+  use span_check, only: check_periods
+  use status, only: last_reason, exit_done, reason_names
   use text, only: to_text
+  use text_table, only: table_t
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectories, only: block_size, describe_regime, journey_t, run_trajectories
   use trajectory, only: outcome_t
@@ -67,6 +69,7 @@ contains
     if (.not. allocated(error)) work%ratio = work%journey%moving%machine%drive%ratio
     if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%journey%moving%machine%contact, &
                                                      work%list, error)
+    if (.not. allocated(error)) call check_periods(work%journey%span, shortest_period(work), error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate) then
@@ -110,6 +113,12 @@ contains
     journey%span%extension = 1
     journey%describe = describe_regime
   end subroutine open_list_journey
+  !> The drive period of the fastest point.
+  pure real(wp) function shortest_period(work)
+    type(list_work_t), intent(in) :: work
+    shortest_period = work%journey%moving%machine%period
+    if (work%ratio > 0) shortest_period = shortest_period*work%ratio/maxval(work%list%ratio)
+  end function shortest_period
 
   !> Checksum of the starts.
   function list_identity(list) result(identity)
@@ -211,8 +220,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(reader_t) :: reader
     real(wp), allocatable :: x(:), v(:), impacts(:), speed(:), reason(:)
-    integer :: unit, i, status
-    character(len=256) :: message
+    type(table_t) :: table
+    integer :: i
     call open_final(path, reader, error)
     if (.not. allocated(error)) call reader%read_values('/x', x, error)
     if (.not. allocated(error)) call reader%read_values('/v', v, error)
@@ -221,16 +230,14 @@ contains
     if (.not. allocated(error)) call reader%read_values('/reason', reason, error)
     if (.not. allocated(error)) call reader%close(error)
     if (allocated(error)) return
-    open (newunit=unit, file=csv, status='replace', action='write', iostat=status, iomsg=message)
-    if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) 'x0,v0,ratio,x,v,impacts,last_impact_speed,reason'
+    call table%create(csv)
+    call table%line('x0,v0,ratio,x,v,impacts,last_impact_speed,reason')
     do i = 1, size(x)
-      if (status /= 0) exit
-      write (unit, '(a)', iostat=status, iomsg=message) to_text(list%x0(i))//','//to_text(list%v0(i))//','// &
-        to_text(list%ratio(i))//','//to_text(x(i))//','//to_text(v(i))//','//to_text(nint(impacts(i)))//','// &
-        to_text(speed(i))//','//trim(reason_names(nint(reason(i))))
+      call table%line(to_text(list%x0(i))//','//to_text(list%v0(i))//','//to_text(list%ratio(i))//','//to_text(x(i))//','// &
+                      to_text(v(i))//','//to_text(nint(impacts(i)))//','//to_text(speed(i))//','// &
+                      trim(reason_names(nint(reason(i)))))
     end do
-    if (status == 0) close (unit, iostat=status, iomsg=message)
-    if (status /= 0) call fail(error, exit_io, "'"//csv//"': "//trim(message))
+    call table%close(error)
   end subroutine write_csv
 
 end module points_driver

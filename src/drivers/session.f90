@@ -3,8 +3,9 @@
 
 !> What every command that computes shares: the case, the team, the log, the provenance.
 module session
-  use build_info, only: build_commit => commit, build_compiler => compiler, build_flags => flags, &
-    build_mpi => mpi, build_version => version
+  use binding, only: report_binding
+  use build_info, only: build_c_flags => c_flags, build_commit => commit, build_compiler => compiler, &
+    build_flags => flags, build_mpi => mpi, build_version => version
   use case_echo, only: case_identity
   use case_reader, only: load_case
   use case_type, only: case_t
@@ -17,13 +18,20 @@ module session
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
   use serial_team, only: serial_team_t
-  use signals, only: install_signals
-  use system, only: exit_program
+  use signals, only: ignore_file_limit, install_signals, termination_asked
+  use status, only: exit_cannot_create, exit_done, exit_io
+  use system, only: exit_program, sleep_microseconds
   use team, only: team_t
+  use text, only: to_text
   implicit none
   private
 
   public :: open_session, describe_file
+
+  !> A signal to all ranks reaches them within this time, in microseconds.
+  integer, parameter :: signal_spread_us = 20000
+  !> Time for the other ranks to end.
+  integer, parameter :: farewell_us = 200000
 
   type, public :: session_t
     type(command_t) :: command
@@ -33,11 +41,14 @@ module session
     type(provenance_t) :: provenance
     !> A process without others, for which MPI is started only when work begins.
     logical :: alone = .true.
+    !> Files are being written.
+    logical :: writing = .false.
   contains
     procedure :: begin
     procedure :: end_with
     procedure :: stop_if
     procedure :: abort_if
+    procedure :: say_how_to_go_on
   end type session_t
 
 contains
@@ -55,8 +66,11 @@ contains
       call start_team(session%team)
     end if
     call session%journal%open(session%team%is_root(), command%json, command%quiet)
+    call session%journal%open_copy(command%log, error)
+    call session%stop_if(error)
     ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
     if (command%name /= 'trajectory') call install_signals(error)
+    if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error)
     call session%stop_if(error)
   end subroutine open_session
@@ -71,14 +85,17 @@ contains
     if (self%team%is_root()) call check_outputs(self%command, path, tiled, error)
     call self%stop_if(error)
     if (self%alone) call start_team(self%team)
+    self%writing = .true.
     associate (record => self%provenance)
       record%version = build_version
       record%commit = build_commit
       record%compiler = build_compiler
       record%flags = build_flags
+      record%c_flags = build_c_flags
       record%mpi = build_mpi
       call start_provenance(self%team, record)
     end associate
+    call report_binding(self%team, self%journal)
   end subroutine begin
 
   subroutine check_outputs(command, path, tiled, error)
@@ -110,18 +127,24 @@ contains
     call schema%add_attribute('', 'kind', kind)
     call schema%add_attribute('', 'title', session%the_case%title)
     call schema%add_attribute('', 'references', 'docs/theory.md of Separatrix lists equations and sources')
-    identity = kind//' '//case_identity(session%the_case)
+    identity = kind//' '//case_identity(session%the_case, kind)
     if (present(inputs)) identity = identity//' '//inputs
     call schema%add_attribute('provenance', 'case_identity', identity)
     call schema%add_text('provenance', 'case_text', session%the_case%raw_text)
     call schema%add_text('provenance', 'resolved_case', session%the_case%resolved_text)
   end subroutine describe_file
 
-  !> Ends the program on all ranks alike.
+  !> Ends the program on all ranks. Rank 0 returns the code, and as the last: mpirun ends the other processes by force as soon
+  !> as one has returned another code than 0.
   subroutine end_with(self, code)
     class(session_t), intent(inout) :: self
     integer, intent(in) :: code
+    logical :: first, others
+    first = self%team%is_root()
+    others = self%team%size() > 1
     call self%team%close()
+    if (.not. first) call exit_program(exit_done)
+    if (others .and. code /= exit_done) call sleep_microseconds(farewell_us)
     call exit_program(code)
   end subroutine end_with
 
@@ -132,8 +155,30 @@ contains
     call self%team%agree(error)
     if (.not. allocated(error)) return
     call self%journal%error(error%message)
+    if (self%writing .and. (error%code == exit_io .or. error%code == exit_cannot_create)) then
+      ! HDF5 cannot be shut down after a write of its own has failed. The barrier lets rank 0 speak first.
+      call self%team%barrier()
+      call self%team%abort(error%code)
+    end if
     call self%end_with(error%code)
   end subroutine stop_if
+
+  !> After SIGTERM says how to go on with the run kept in `path`: mpirun ends its processes so when one of them has died,
+  !> and leaves them no time for more. Two ranks speak, because either may be the dead one.
+  subroutine say_how_to_go_on(self, path)
+    class(session_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(journal_t) :: own
+    logical :: asked
+    if (self%team%size() == 1 .or. self%team%rank() > 1) return
+    call sleep_microseconds(signal_spread_us)
+    asked = termination_asked()
+    if (.not. asked) return
+    own = self%journal
+    own%active = .true.
+    call own%error('rank '//to_text(self%team%rank())//' was told to end (SIGTERM); the tiles done are kept in '// &
+                   path//'; the same command with --resume (without --force) goes on')
+  end subroutine say_how_to_go_on
 
   !> Ends the program at once because of an error of this rank alone.
   subroutine abort_if(self, error)

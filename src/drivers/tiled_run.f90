@@ -3,6 +3,7 @@
 
 !> Computes a grid tile by tile on a team: working file, resumption, hand-out, progress, clean stop, final file.
 module tiled_run
+  use balance, only: report_balance
   use command_line, only: command_t
   use errors, only: error_t
   use files, only: file_exists
@@ -14,8 +15,10 @@ module tiled_run
   use parallel, only: make_scheduler
   use point_work, only: compute_list, point_work_t, watch_t
   use refined_tile, only: refine_tile
+  use resumption, only: inspect_interrupted
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
+  use shard, only: in_shard
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -25,7 +28,7 @@ module tiled_run
   private
 
   public :: point_work_t
-  public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds
+  public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds, index_in_block
 
   !> Points of the small sample from which a dry run estimates the time.
   integer, parameter :: pilot_points = 64
@@ -48,21 +51,26 @@ contains
   subroutine open_tiles(session, path, schema, grid, tile_shape, file)
     type(session_t), intent(inout) :: session
     character(len=*), intent(in) :: path
-    type(schema_t), intent(in) :: schema
+    type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: grid(:)
     integer, intent(in) :: tile_shape(:)
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable :: error
     integer :: found
+    ! A rank that dies takes the others with it, perhaps before they can say this.
+    if (session%team%size() > 1) call session%journal%line('kept', 'the tiles done are kept in '//working_path(path)// &
+      '; after an interruption the same command with --resume (without --force) goes on')
     ! Rank 0 decides, before it creates what the others would see.
     found = 0
     if (file_exists(working_path(path))) found = 1
     call session%team%broadcast(found)
     if (session%command%resume .and. found == 1) then
+      call inspect_interrupted(session, path, schema, error)
+      call session%stop_if(error)
       call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
     else
       call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
-                          error)
+                          error, shares=max(1, session%command%shard_count))
     end if
     call session%stop_if(error)
   end subroutine open_tiles
@@ -76,16 +84,21 @@ contains
     class(scheduler_t), allocatable, target :: scheduler
     type(tile_watch_t) :: watch
     type(error_t), allocatable :: error
-    integer, allocatable :: unfinished(:)
+    integer, allocatable :: mine(:), unfinished(:)
     integer(int64) :: computed(1)
+    real(wp) :: busy, begun
     integer :: tile, position
     logical :: whole
-    unfinished = pack([(tile, tile=1, file%tile_count())], [(.not. file%tile_done(tile), tile=1, file%tile_count())])
-    watch%total = product(file%tiling%lengths)
+    associate (command => session%command)
+      mine = pack([(tile, tile=1, file%tile_count())], &
+                  [(in_shard(tile, command%shard, command%shard_count), tile=1, file%tile_count())])
+    end associate
+    unfinished = pack(mine, [(.not. file%tile_done(mine(tile)), tile=1, size(mine))])
+    watch%total = sum([(file%tiling%points(mine(tile)), tile=1, size(mine))])
     watch%before = note_earlier(session, file, work)
     watch%unfinished = size(unfinished)
-    if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(unfinished))// &
-      ' of '//to_text(file%tile_count())//' tiles were done before')
+    if (session%command%resume) call session%journal%line('resumed', to_text(size(mine) - size(unfinished))// &
+      ' of '//to_text(size(mine))//' tiles were done before')
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
@@ -93,16 +106,22 @@ contains
     watch%scheduler => scheduler
     watch%session => session
     computed = 0
+    busy = 0
     call session%journal%begin('points', watch%total, watch%before)
     do
       call scheduler%next(position)
       if (position == 0) exit
+      begun = monotonic_seconds()
       call run_tile(session, file, work, unfinished(position), watch, whole)
+      busy = busy + (monotonic_seconds() - begun)
       if (.not. whole) exit
       computed = computed + 1
     end do
+    if (scheduler%stop_requested()) call session%say_how_to_go_on(working_path(file%path))
+    begun = scheduler%started
     call scheduler%finish()
     call write_tile_times(session, scheduler, unfinished)
+    call report_balance(session%team, session%journal, busy, monotonic_seconds() - begun)
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles
@@ -144,6 +163,7 @@ contains
     if (.not. whole) return
     call file%write_tile(tile, values, error)
     call session%abort_if(error)
+    session%journal%written = session%journal%written + file%tile_bytes(tile)
     do point = 1, points
       call work%note(index(:, point), values(point, :))
     end do

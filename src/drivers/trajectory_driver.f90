@@ -9,7 +9,7 @@ module trajectory_driver
   use case_type, only: case_t
   use command_line, only: command_t
   use drive_law, only: foot_motion
-  use errors, only: error_t, fail
+  use errors, only: error_t
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
   use journal, only: duration_text
@@ -19,8 +19,10 @@ module trajectory_driver
   use motion, only: motion_t
   use motion_state, only: event_names, log_t, open_log
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_done, exit_io, reason_name, reason_time_over
+  use span_check, only: check_periods
+  use status, only: exit_done, reason_name, reason_time_over
   use text, only: to_text
+  use text_table, only: table_t
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
   private
@@ -50,6 +52,7 @@ contains
     span%extension = 1
     span%stop_when_captured = .false.
     call slice_motion(grid, 0_int64, moving, error)
+    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate .or. command%dry_run) then
@@ -134,18 +137,15 @@ contains
     character(len=*), intent(in) :: path
     type(log_t), intent(in) :: log
     type(error_t), allocatable, intent(out) :: error
-    integer :: unit, i, status
-    character(len=256) :: message
-    open (newunit=unit, file=path, status='replace', action='write', iostat=status, iomsg=message)
-    if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) 'kind,time,x,v_before,v_after'
+    type(table_t) :: table
+    integer :: i
+    call table%create(path)
+    call table%line('kind,time,x,v_before,v_after')
     do i = 1, log%events
-      if (status /= 0) exit
-      write (unit, '(a)', iostat=status, iomsg=message) trim(event_names(log%event_kind(i)))//','// &
-        to_text(log%event_data(1, i))//','//to_text(log%event_data(2, i))//','// &
-        to_text(log%event_data(3, i))//','//to_text(log%event_data(4, i))
+      call table%line(trim(event_names(log%event_kind(i)))//','//to_text(log%event_data(1, i))//','// &
+                      to_text(log%event_data(2, i))//','//to_text(log%event_data(3, i))//','//to_text(log%event_data(4, i)))
     end do
-    if (status == 0) close (unit, iostat=status, iomsg=message)
-    if (status /= 0) call fail(error, exit_io, "'"//path//"': "//trim(message))
+    call table%close(error)
   end subroutine write_events
 
   subroutine report(session, moving, outcome, log, path)

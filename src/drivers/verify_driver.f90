@@ -20,12 +20,13 @@ module verify_driver
   use kinds, only: int64, real32, wp
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
-  use map_verify, only: verify_file
+  use map_verify, only: probe_file, verify_file
   use points_driver, only: open_list_journey
   use random, only: uniform
   use reference, only: run_reference
   use refinement, only: origin_contradicted
   use serial_team, only: serial_team_t
+  use span_check, only: check_periods
   use statistics, only: share_upper_limit
   use status, only: exit_io, reason_settled
   use sweep_driver, only: sweep_axes
@@ -64,7 +65,8 @@ contains
     integer :: datasets
     integer(int64) :: points
     call journal%open(.not. command%json, .false., command%quiet)
-    call open_final(command%path, reader, error)
+    call probe_file(command%path, error)
+    if (.not. allocated(error)) call open_final(command%path, reader, error)
     if (allocated(error)) return
     call verify_file(command%path, error, datasets)
     if (.not. allocated(error)) call reader%text_attribute('/', 'kind', kind, error)
@@ -112,6 +114,7 @@ contains
     call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
                            error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
+    if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
     allocate (index(size(axes)), place(size(lengths)))
     call journal%begin('points run again', int(sample, int64), 0_int64)
@@ -136,6 +139,22 @@ contains
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
+
+  !> A map has the lengths of the axes of its case; the starts of a sweep are one dimension of the file.
+  subroutine check_lengths(path, lengths, shape, error)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: lengths(:)
+    integer, intent(in) :: shape(:)
+    type(error_t), allocatable, intent(out) :: error
+    logical :: agree
+    agree = size(lengths) == size(shape)
+    if (agree) then
+      agree = all(lengths == shape)
+    else if (size(lengths) == 2 .and. size(shape) == 3) then
+      agree = all(lengths == [shape(1), shape(2)*shape(3)])
+    end if
+    if (.not. agree) call fail(error, exit_io, "'"//path//"' has not the points that its case asks for")
+  end subroutine check_lengths
 
   !> Every variable must be what the file holds.
   subroutine compare_with_file(reader, prefix, place, values, audit, error)
@@ -239,24 +258,29 @@ contains
     type(journey_t) :: journey
     type(catalogue_t) :: none
     type(outcome_t) :: outcomes(1)
-    real(wp), allocatable :: column(:), table(:, :)
+    real(wp), allocatable :: table(:, :)
     real(wp) :: random_numbers(1), results(6, 1), start(3, 1)
     character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
-    integer :: i, k, point
-    do k = 1, size(names)
-      call reader%read_values('/'//trim(names(k)), column, error)
-      if (allocated(error)) return
-      if (k == 1) allocate (table(size(column), size(names)))
-      table(:, k) = column
-    end do
+    integer :: i, point
+    call reader%read_columns('/'//names, table, error)
+    if (allocated(error)) return
     allocate (none%attractors(0))
     do i = 1, min(sample, size(table, 1))
       call uniform(int(seed, int64), int(i, int64), random_numbers)
       point = 1 + int(random_numbers(1)*size(table, 1))
+      if (.not. all(abs(table(point, :3)) <= huge(1.0_wp))) then
+        call fail(error, exit_io, "'"//reader%path//"', point "//to_text(point - 1)//': the start is not finite')
+        return
+      end if
       axes(1) = axis_t('drive.ratio', '1', [table(point, 3)])
       grid = grid_of(the_case, axes(:merge(1, 0, table(point, 3) > 0)))
       call open_list_journey(grid, the_case, journey, error)
-      if (allocated(error)) return
+      if (.not. allocated(error)) call check_periods(journey%span, journey%moving%machine%period, error)
+      if (allocated(error)) then
+        error%code = exit_io
+        error%message = "'"//reader%path//"', point "//to_text(point - 1)//': '//error%message
+        return
+      end if
       start(:, 1) = [table(point, 1), table(point, 2), grid%start(3)]
       call run_trajectories(journey, none%attractors, start, outcomes)
       associate (outcome => outcomes(1))

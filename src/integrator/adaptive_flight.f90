@@ -63,7 +63,7 @@ contains
       if (.not. h > 2*spacing(state%time + tiny(h))) exit
       call try_step(machine, slip, options%tolerance, state%time, y, h, slopes, next, error)
       if (.not. error <= 1) then
-        h = h*max(0.2_wp, 0.9_wp*error**(-0.125_wp))
+        h = h*max(0.2_wp, 0.9_wp/eighth_root(error))
         if (error /= error) h = h*0.2_wp
         cycle
       end if
@@ -74,7 +74,7 @@ contains
         state%time = merge(time_end, state%time + h, last)
         y = next
         slopes(:, 1) = slopes(:, 13)
-        h = h*min(5.0_wp, 0.9_wp*max(error, 1e-10_wp)**(-0.125_wp))
+        h = h*min(5.0_wp, 0.9_wp/eighth_root(max(error, 1e-10_wp)))
         cycle
       end if
       call land(machine, slip, options%tolerance, outcome, state%time, y, h, fraction, slopes, next)
@@ -128,8 +128,14 @@ contains
     h = 1e-3_wp*machine%period
     if (d0 > 0 .and. d1 > 0) h = min(h, 0.01_wp*d0/d1)
     d2 = norm2((slope(machine, slip, time + h, y + h*f) - f)/weight)/h
-    h = min(100*h, (0.01_wp/max(d1, d2, tiny(d1)))**0.125_wp)
+    h = min(100*h, eighth_root(0.01_wp/max(d1, d2, tiny(d1))))
   end function first_step
+
+  !> By square roots, which every processor rounds alike; powers depend on the mathematical library.
+  pure elemental real(wp) function eighth_root(x)
+    real(wp), intent(in) :: x
+    eighth_root = sqrt(sqrt(sqrt(x)))
+  end function eighth_root
 
   !> One step of order 8 and its error relative to the tolerance; slope 13 is that at the end.
   pure subroutine try_step(machine, slip, tolerance, time, y, h, slopes, next, error)

@@ -5,7 +5,7 @@
 !> level), how long friction or a barrier holds it, and how a sequence of ever smaller impacts ends.
 module rest
   use certified_step, only: departure_step, positive_step
-  use friction_law, only: friction_t
+  use friction_law, only: friction_t, power
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
     mode_upper_barrier, state_t
@@ -155,7 +155,7 @@ contains
     real(wp), intent(in) :: speed
     layer_change = 0
     if (law%excess > 0) layer_change = &
-      law%excess*min(1.0_wp, (speed/law%stribeck_velocity)**min(law%stribeck_exponent, 1.0_wp))
+      law%excess*min(1.0_wp, power(speed/law%stribeck_velocity, min(law%stribeck_exponent, 1.0_wp)))
   end function layer_change
 
 end module rest

@@ -7,7 +7,9 @@ module h5
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use errors, only: error_t, fail
   use files, only: free_bytes
+  use guard, only: end_guard
   use h5_access, only: set_parallel_access
+  use h5_trap, only: trap
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
     h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
@@ -16,7 +18,8 @@ module h5
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
     H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
     h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
-    h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_shuffle_f, H5S_SCALAR_F, &
+    h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
+    h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
     h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F32LE, &
     H5T_IEEE_F64LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U32LE, &
@@ -55,6 +58,9 @@ module h5
     logical :: compressed = .false.
     logical :: fixed = .false.
   end type h5_storage_t
+
+  !> Space that is taken at once for what describes the data, and for small data, when a file is opened for writing.
+  integer(hsize_t), parameter :: front_bytes = 2**18
 
 contains
 
@@ -145,10 +151,14 @@ contains
     if (present(writable)) flags = merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable)
     call h5pcreate_f(H5P_FILE_ACCESS_F, access, status)
     if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
+    if (status >= 0) call h5pset_meta_block_size_f(access, front_bytes, status)
+    if (status >= 0) call h5pset_small_data_block_size_f(access, front_bytes, status)
     if (present(team) .and. status >= 0) then
       if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
     end if
+    call trap('its beginning', path, endless=.true.)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
+    call end_guard()
     if (h5_failed(status, 'open', '', path, error)) return
     call h5pclose_f(access, ignored)
   end subroutine h5_open
@@ -180,8 +190,10 @@ contains
     integer :: status, slash
     h5_exists = .true.
     slash = index(name, '/', back=.true.)
+    call trap(name, file%path, endless=.true.)
     if (slash > 1) call h5lexists_f(file%id, name(:slash - 1), h5_exists, status)
     if (h5_exists) call h5lexists_f(file%id, name, h5_exists, status)
+    call end_guard()
   end function h5_exists
 
   !> Creates a group unless it exists.
@@ -290,9 +302,11 @@ contains
     integer :: status, rank
     dataset%name = name
     dataset%path = file%path
+    call trap(name, file%path, endless=.true.)
     call h5dopen_f(file%id, name, dataset%id, status)
     if (status >= 0) call h5dget_space_f(dataset%id, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
+    call end_guard()
     if (h5_failed(status, 'open', name, file%path, error)) return
     allocate (sizes(rank), most(rank))
     if (rank > 0) call h5sget_simple_extent_dims_f(space, sizes, most, status)
@@ -359,7 +373,9 @@ contains
     if (size(bytes) == 0) return
     address = c_loc(bytes)
     call select_block(dataset, memory, space, status, lower, extent)
+    call trap(dataset%name, dataset%path, endless=.false.)
     if (status >= 0) call h5dread_f(dataset%id, h5_type(dataset%type), address, status, memory, space)
+    call end_guard()
     if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return
     call h5sclose_f(memory, ignored)
     call h5sclose_f(space, ignored)

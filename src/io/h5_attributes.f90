@@ -7,7 +7,10 @@ module h5_attributes
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr
   use bindings, only: c_string_length
   use errors, only: error_t
+  use guard, only: end_guard
   use h5, only: h5_dataset_t, h5_failed, h5_file_t, h5_string_type, h5_type
+  use h5_stored, only: h5_check_stored
+  use h5_trap, only: trap
   use h5ds, only: h5dsattach_scale_f, h5dsset_scale_f
   use hdf5, only: &
     h5aclose_f, h5acreate_by_name_f, h5adelete_by_name_f, h5aexists_by_name_f, h5aget_space_f, &
@@ -29,7 +32,9 @@ contains
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: object, name
     integer :: status
+    call trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aexists_by_name_f(file%id, object, name, h5_has_attribute, status)
+    call end_guard()
     if (status < 0) h5_has_attribute = .false.
   end function h5_has_attribute
 
@@ -105,15 +110,20 @@ contains
     type(c_ptr), target :: pointers(1)
     type(c_ptr) :: address
     integer(hid_t) :: attribute, type_id, space
+    integer(hsize_t) :: count
     integer :: status, ignored
     pointers = c_null_ptr
     address = c_loc(pointers)
+    call trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aopen_by_name_f(file%id, object, name, attribute, status)
+    if (status >= 0) call h5aget_space_f(attribute, space, status)
+    if (status >= 0) call h5sget_simple_extent_npoints_f(space, count, status)
+    if (status >= 0 .and. count > 1) status = -1
     if (status >= 0) call h5_string_type(type_id, status)
     if (status >= 0) call h5aread_f(attribute, type_id, address, status)
+    call end_guard()
     if (h5_failed(status, 'read attribute '''//name//''' of', object, file%path, error)) return
     call copy_string(pointers(1), text)
-    call h5aget_space_f(attribute, space, ignored)
     call h5dvlen_reclaim_f(type_id, space, H5P_DEFAULT_F, address, ignored)
     call h5sclose_f(space, ignored)
     call h5tclose_f(type_id, ignored)
@@ -131,9 +141,11 @@ contains
     integer(hid_t) :: attribute, space
     integer(hsize_t) :: count
     integer :: status, ignored
+    call trap('attribute '//name//' of '//object, file%path, endless=.true.)
     call h5aopen_by_name_f(file%id, object, name, attribute, status)
     if (status >= 0) call h5aget_space_f(attribute, space, status)
     if (status >= 0) call h5sget_simple_extent_npoints_f(space, count, status)
+    call end_guard()
     if (h5_failed(status, 'read attribute '''//name//''' of', object, file%path, error)) return
     allocate (bytes(count*bytes_of(type_float64)), values(count))
     address = c_loc(bytes)
@@ -179,13 +191,17 @@ contains
     type(c_ptr) :: address
     integer(hid_t) :: type_id, space
     integer :: status, i, ignored, longest
+    call h5_check_stored(dataset, error)
+    if (allocated(error)) return
     allocate (pointers(product(dataset%lengths)))
     pointers = c_null_ptr
     longest = 0
     if (size(pointers) > 0) then
       address = c_loc(pointers)
       call h5_string_type(type_id, status)
+      call trap(dataset%name, dataset%path, endless=.true.)
       if (status >= 0) call h5dread_f(dataset%id, type_id, address, status)
+      call end_guard()
       if (h5_failed(status, 'read', dataset%name, dataset%path, error)) return
       do i = 1, size(pointers)
         if (c_associated(pointers(i))) longest = max(longest, int(c_string_length(pointers(i))))

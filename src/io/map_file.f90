@@ -40,6 +40,7 @@ module map_file
   contains
     procedure :: tile_count
     procedure :: tile_done
+    procedure :: tile_bytes
     procedure :: write_tile
     procedure :: read_tile
     procedure :: recheck
@@ -51,8 +52,9 @@ contains
 
   !> Creates and opens the working file. Collective. `grid`: names of the dimensions that are cut into
   !> tiles of `tile_shape`. Code 73 if the final or the working file exists and `force` is false, the
-  !> folder is missing or not writable, or the space is too small.
-  subroutine create_working(path, schema, grid, tile_shape, force, team, file, error)
+  !> folder is missing or not writable, or the space is too small. `shares`: only one of so many shares of the tiles
+  !> will be written, so that the file stays sparse (default 1).
+  subroutine create_working(path, schema, grid, tile_shape, force, team, file, error, shares)
     character(len=*), intent(in) :: path
     type(schema_t), intent(in) :: schema
     character(len=*), intent(in) :: grid(:)
@@ -61,12 +63,16 @@ contains
     class(team_t), intent(in) :: team
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: shares
+    integer :: parts
+    parts = 1
+    if (present(shares)) parts = shares
     call prepare(path, schema, grid, tile_shape, file, error)
     if (allocated(error)) return
     if (team%is_root()) then
       call check_create(path, force, error)
-      if (.not. allocated(error)) call check_space(file, error)
-      if (.not. allocated(error)) call build(file, error)
+      if (.not. allocated(error)) call check_space(file, parts, error)
+      if (.not. allocated(error)) call build(file, parts == 1, error)
     end if
     call team%agree(error)
     if (allocated(error)) return
@@ -106,6 +112,7 @@ contains
     integer(int64), intent(in) :: tile_shape(:)
     type(map_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names
     integer :: i
     file%path = path
     file%schema = schema
@@ -121,6 +128,13 @@ contains
         return
       end associate
     end do
+    names = ''
+    do i = 1, size(file%tiled)
+      associate (variable => schema%variables(file%tiled(i)))
+        names = trim(names//' '//path_of(variable%group, variable%name))
+      end associate
+    end do
+    call file%schema%add_attribute('tiles', 'variables', trim(adjustl(names)))
     associate (tiles => file%tiling)
       call file%schema%add_dimension('axis', size(grid, kind=int64))
       call file%schema%add_dimension('tile', int(tiles%count(), int64))
@@ -134,8 +148,9 @@ contains
     allocate (file%done(file%tiling%count()), source=.false.)
   end subroutine prepare
 
-  subroutine check_space(file, error)
+  subroutine check_space(file, shares, error)
     type(map_file_t), intent(in) :: file
+    integer, intent(in) :: shares
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: needed, free
     integer :: i
@@ -143,6 +158,7 @@ contains
     do i = 1, size(file%tiled)
       needed = needed + product(file%tiling%lengths)*bytes_of(file%schema%variables(file%tiled(i))%type)
     end do
+    needed = needed/shares
     free = free_bytes(file%path)
     if (free >= 0 .and. free < needed) then
       call fail(error, exit_cannot_create, ''''//file%path//''' needs '//to_text(needed)//' bytes, '// &
@@ -150,9 +166,10 @@ contains
     end if
   end subroutine check_space
 
-  !> Under its own name the working file exists only whole.
-  subroutine build(file, error)
+  !> Under its own name the working file exists only whole. `reserve`: takes the space of all tiles at once.
+  subroutine build(file, reserve, error)
     type(map_file_t), intent(in) :: file
+    logical, intent(in) :: reserve
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: ignored
     type(h5_file_t) :: new
@@ -170,7 +187,7 @@ contains
     else
       call h5_close(new, error)
     end if
-    if (.not. allocated(error)) call reserve_file(name, error)
+    if (.not. allocated(error) .and. reserve) call reserve_file(name, error)
     if (.not. allocated(error)) call publish_file(name, working_path(file%path), error)
     if (allocated(error)) then
       error%code = exit_cannot_create
@@ -228,6 +245,14 @@ contains
     integer, intent(in) :: tile
     tile_done = self%done(tile)
   end function tile_done
+
+  !> Bytes of the results of a tile.
+  pure integer(int64) function tile_bytes(self, tile)
+    class(map_file_t), intent(in) :: self
+    integer, intent(in) :: tile
+    integer :: i
+    tile_bytes = self%tiling%points(tile)*sum([(bytes_of(self%schema%variables(self%tiled(i))%type), i=1, size(self%tiled))])
+  end function tile_bytes
 
   !> Writes a tile and marks it done. `values`: (points of the tile in its C order, tiled variables in
   !> the order of the schema). On an error (code 74) the caller ends all ranks.

@@ -4,6 +4,7 @@
 !> The final file: compressed, with a checksum per dataset, independent of tiles and ranks. Under
 !> its own name it exists only complete and verified.
 module map_final
+  use attribute_seal, only: seal_attributes
   use errors, only: error_t, fail
   use files, only: publish_file, remove_file
   use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read, h5_write
@@ -106,6 +107,7 @@ contains
     if (.not. allocated(error)) call create_objects(new, schema, error)
     if (.not. allocated(error)) call fill(new, schema, error, part, copied)
     if (.not. allocated(error)) call h5_put_numbers(new, '/', 'complete', type_int64, [1.0_real64], error)
+    if (.not. allocated(error)) call seal_attributes(new, error)
     if (allocated(error)) then
       call h5_close(new, ignored)
     else
@@ -127,7 +129,8 @@ contains
     if (present(copied)) from_part = copied
     do i = 1, size(schema%variables)
       associate (variable => schema%variables(i))
-        if (i <= from_part) then
+        ! What the case alone decides is not taken from a file that may be damaged.
+        if (i <= from_part .and. (variable%tiled .or. variable%group == 'tiles')) then
           call copy(part, new, path_of(variable%group, variable%name), error)
         else
           call write_data(new, schema, variable, error)

@@ -35,15 +35,44 @@ contains
   end function path_of
 
   !> Creates groups, dimensions, variables, attributes and texts. With a tile shape the file is a
-  !> working file: tiled variables have tiles as chunks and all space is allocated. Otherwise it is
-  !> a final file: compressed.
+  !> working file: tiled variables have tiles as chunks, all space is allocated, and theirs is the last, so that a tail
+  !> that is cut off costs tiles only. Otherwise it is a final file: compressed.
   subroutine create_objects(file, schema, error, tile_shape)
     type(h5_file_t), intent(in) :: file
     type(schema_t), intent(in) :: schema
     type(error_t), allocatable, intent(out) :: error
     integer(int64), intent(in), optional :: tile_shape(:)
     integer :: i
+    logical :: working
+    working = present(tile_shape)
+    call create_variables(file, schema, .not. schema%variables%tiled .or. .not. working, error, tile_shape)
+    if (allocated(error)) return
+    do i = 1, size(schema%dimensions)
+      call create_dimension(file, schema, i, error)
+      if (allocated(error)) return
+    end do
+    if (working) then
+      call write_attributes_and_texts(file, schema, error)
+      if (allocated(error)) return
+      call create_variables(file, schema, schema%variables%tiled, error, tile_shape)
+      if (allocated(error)) return
+    end if
     do i = 1, size(schema%variables)
+      call attach_dimensions(file, schema, schema%variables(i), error)
+      if (allocated(error)) return
+    end do
+    if (.not. working) call write_attributes_and_texts(file, schema, error)
+  end subroutine create_objects
+
+  subroutine create_variables(file, schema, chosen, error, tile_shape)
+    type(h5_file_t), intent(in) :: file
+    type(schema_t), intent(in) :: schema
+    logical, intent(in) :: chosen(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), intent(in), optional :: tile_shape(:)
+    integer :: i
+    do i = 1, size(schema%variables)
+      if (.not. chosen(i)) cycle
       associate (variable => schema%variables(i))
         if (variable%group /= '') call h5_create_group(file, '/'//variable%group, error)
         if (allocated(error)) return
@@ -51,18 +80,15 @@ contains
         if (allocated(error)) return
       end associate
     end do
-    do i = 1, size(schema%dimensions)
-      call create_dimension(file, schema, i, error)
-      if (allocated(error)) return
-    end do
-    do i = 1, size(schema%variables)
-      call attach_dimensions(file, schema, schema%variables(i), error)
-      if (allocated(error)) return
-    end do
+  end subroutine create_variables
+
+  subroutine write_attributes_and_texts(file, schema, error)
+    type(h5_file_t), intent(in) :: file
+    type(schema_t), intent(in) :: schema
+    type(error_t), allocatable, intent(out) :: error
     call write_attributes(file, schema, error)
-    if (allocated(error)) return
-    call write_texts(file, schema, error)
-  end subroutine create_objects
+    if (.not. allocated(error)) call write_texts(file, schema, error)
+  end subroutine write_attributes_and_texts
 
   subroutine create_variable(file, schema, variable, error, tile_shape)
     type(h5_file_t), intent(in) :: file

@@ -4,15 +4,19 @@
 !> Reading a file of Separatrix.
 module map_reader
   use errors, only: error_t, fail
+  use guard, only: end_guard
   use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
     h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
+  use h5_stored, only: h5_check_stored
   use h5_list, only: h5_children
+  use h5_trap, only: trap
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
   use status, only: exit_io, exit_no_input
   use files, only: file_exists
   use output_check, only: is_folder
+  use text, only: to_text
   use value_types, only: bytes_of, from_bytes, type_names, type_string
   implicit none
   private
@@ -34,6 +38,7 @@ module map_reader
     procedure :: has
     procedure :: lengths
     procedure :: read_values
+    procedure :: read_columns
     procedure :: read_block
     procedure :: read_strings
     procedure :: read_text
@@ -169,6 +174,8 @@ contains
       call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not numeric')
       return
     end if
+    call h5_check_stored(dataset, error)
+    if (allocated(error)) return
     allocate (values(product(dataset%lengths)))
     allocate (bytes(size(values, kind=int64)*bytes_of(dataset%type)))
     call h5_read(dataset, bytes, error)
@@ -176,6 +183,27 @@ contains
     call from_bytes(dataset%type, bytes, values)
     call h5_close_dataset(dataset, error)
   end subroutine read_values
+
+  !> Numeric variables of one length as the columns of a table; code 74 if they differ in length.
+  subroutine read_columns(self, paths, columns, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: paths(:)
+    real(real64), allocatable, intent(out) :: columns(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: values(:)
+    integer :: k
+    do k = 1, size(paths)
+      call self%read_values(trim(paths(k)), values, error)
+      if (allocated(error)) return
+      if (k == 1) allocate (columns(size(values), size(paths)))
+      if (size(values) /= size(columns, 1)) then
+        call fail(error, exit_io, ''''//trim(paths(k))//''' of '''//self%path//''' has '//to_text(size(values))// &
+                  ' values, '''//trim(paths(1))//''' has '//to_text(size(columns, 1)))
+        return
+      end if
+      columns(:, k) = values
+    end do
+  end subroutine read_columns
 
   !> The values of a block of a numeric variable in C order; `lower` from 0.
   subroutine read_block(self, path, lower, extent, values, error)
@@ -187,6 +215,12 @@ contains
     type(h5_dataset_t) :: dataset
     integer(int8), allocatable :: bytes(:)
     call h5_open_dataset(self%file, path, dataset, error)
+    if (allocated(error)) return
+    if (dataset%type == type_string .or. size(dataset%lengths) /= size(extent)) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not numeric, or has other dimensions')
+      return
+    end if
+    call h5_check_stored(dataset, error)
     if (allocated(error)) return
     allocate (values(product(extent)), bytes(product(extent)*bytes_of(dataset%type)))
     call h5_read(dataset, bytes, error, lower, extent)
@@ -222,6 +256,10 @@ contains
     character(len=:), allocatable :: strings(:)
     call self%read_strings(path, strings, error)
     if (allocated(error)) return
+    if (size(strings) /= 1) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not one text')
+      return
+    end if
     text = strings(1)
   end subroutine read_text
 
@@ -251,6 +289,10 @@ contains
     value = 0
     call h5_get_numbers(self%file, object, name, values, error)
     if (allocated(error)) return
+    if (size(values) /= 1) then
+      call fail(error, exit_io, 'attribute '''//name//''' of '''//object//''' in '''//self%path//''' is not one number')
+      return
+    end if
     value = values(1)
   end subroutine number_attribute
 
@@ -258,7 +300,9 @@ contains
   subroutine close_reader(self, error)
     class(reader_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
+    call trap('its end', self%path, endless=.true.)
     call h5_close(self%file, error)
+    call end_guard()
   end subroutine close_reader
 
 end module map_reader

@@ -6,7 +6,7 @@ module provenance
   use h5, only: h5_version
   use kinds, only: real64
   use map_schema, only: schema_t
-  use system, only: host_name, monotonic_seconds, utc_now
+  use system, only: cpu_name, environment_text, host_name, monotonic_seconds, utc_now
   use team, only: host_length, team_t
   use text, only: join
   implicit none
@@ -16,10 +16,10 @@ module provenance
 
   type, public :: provenance_t
     !> Set by the program.
-    character(len=:), allocatable :: version, commit, compiler, flags, mpi
+    character(len=:), allocatable :: version, commit, compiler, flags, c_flags, mpi
     !> Set by `start_provenance`.
     character(len=:), allocatable :: command, hosts, started
-    integer :: ranks = 1
+    integer :: ranks = 1, host_count = 1
     real(real64) :: start_seconds = 0
   contains
     procedure :: describe
@@ -35,6 +35,7 @@ contains
     character(len=host_length), allocatable :: names(:)
     call team%hosts(host_name(), names)
     record%hosts = join(names, ' ')
+    record%host_count = size(names)
     record%ranks = team%size()
     record%command = command_line()
     record%started = utc_now()
@@ -65,11 +66,15 @@ contains
     call schema%add_attribute('provenance', 'commit', self%commit)
     call schema%add_attribute('provenance', 'compiler', self%compiler)
     call schema%add_attribute('provenance', 'flags', self%flags)
+    call schema%add_attribute('provenance', 'c_flags', self%c_flags)
     call schema%add_attribute('provenance', 'mpi', self%mpi)
     call schema%add_attribute('provenance', 'hdf5', h5_version())
     call schema%add_attribute('provenance', 'command_line', self%command)
     call schema%add_attribute('provenance', 'ranks', self%ranks)
     call schema%add_attribute('provenance', 'hosts', self%hosts)
+    call schema%add_attribute('provenance', 'host_count', self%host_count)
+    call schema%add_attribute('provenance', 'processor', cpu_name())
+    call schema%add_attribute('provenance', 'environment', environment_text())
     call schema%add_attribute('provenance', 'started', self%started)
   end subroutine describe
 

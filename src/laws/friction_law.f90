@@ -11,7 +11,7 @@ module friction_law
   implicit none
   private
 
-  public :: friction_of, sliding_friction, stribeck_excess
+  public :: friction_of, sliding_friction, stribeck_excess, power
 
   !> Exponent at which the Stribeck excess is below the rounding of the sliding friction.
   real(wp), parameter :: negligible_exponent = -log(0.01_wp*epsilon(1.0_wp))

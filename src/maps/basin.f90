@@ -11,6 +11,7 @@ module basin
   use match, only: carry_labels, number_new, remember
   use lanes, only: prepare_lanes
   use motion, only: motion_t
+  use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
   use trajectories, only: describe_all, journey_t, run_trajectories
@@ -39,8 +40,8 @@ module basin
 
 contains
 
-  !> The machine of a slice. Code 65 if a trajectory would not last one drive period: what it shows would be
-  !> a piece of its beginning.
+  !> The machine of a slice. Code 65 if a trajectory would not last one drive period (what it shows would
+  !> be a piece of its beginning), or more of them than can be run.
   subroutine open_slice(grid, span, slice, moving, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
@@ -51,6 +52,7 @@ contains
     if (allocated(error)) return
     if (span%duration < moving%machine%period) call fail(error, exit_bad_case, "key 'run.duration': found "// &
       to_text(span%duration)//' s, allowed at least one drive period, '//to_text(moving%machine%period, 6)//' s')
+    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
   end subroutine open_slice
 
   !> The machine of a slice, ready for whole trajectories.

@@ -11,6 +11,7 @@ module sweep
   use kinds, only: int64, wp
   use motion, only: advance_period, motion_t, start_state
   use motion_state, only: reset_tally, state_t, tally_t
+  use span_check, only: check_periods
   use status, only: reason_time_over
   use trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -49,6 +50,7 @@ contains
     type(tally_t) :: tally
     integer :: periods, in_window, i
     call machine_with(grid, path, value, moving, error)
+    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
     if (allocated(error)) return
     in_window = max(1, ceiling(span%window/moving%machine%period))
     periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)

@@ -4,7 +4,7 @@
 !> A team of one process without MPI.
 module serial_team
   use kinds, only: int64, real64
-  use system, only: exit_program
+  use system, only: exit_at_once
   use team, only: team_t
   implicit none
   private
@@ -57,13 +57,13 @@ contains
     end associate
   end subroutine barrier
 
-  !> Ends the program with this exit code.
+  !> Ends the program at once with this exit code.
   subroutine abort_with(self, code)
     class(serial_team_t), intent(in) :: self
     integer, intent(in) :: code
     associate (unused => self)
     end associate
-    call exit_program(code)
+    call exit_at_once(code)
   end subroutine abort_with
 
   !> The text stays as it is.

@@ -108,7 +108,13 @@ def run(program: Path, *arguments: object, folder: Path, ranks: int = 0, timeout
     if ranks:
         command = ["mpirun", "-n", str(ranks), *command]
     ended = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, timeout=timeout, stdin=subprocess.DEVNULL
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=timeout,
+        stdin=subprocess.DEVNULL,
     )
     return Outcome(ended.returncode, ended.stdout, ended.stderr)
 

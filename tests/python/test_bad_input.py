@@ -161,6 +161,7 @@ BAD_LISTS = {
     "no_header": ("0.1,0.2\n", ["starts.csv:1", "0.1", "x0"]),
     "empty": ("", ["starts.csv", "no points", "x0,v0"]),
     "long_line": ("x0,v0\n0," + "1" * 5000 + "x\n", ["starts.csv:2", "v0"]),
+    "zero_byte": ("x0,v0\n0,0\n0,\0\n", ["starts.csv:3", "UTF-8"]),
 }
 
 

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# sbatch --array=1-8 --ntasks=16 --time=04:00:00 scripts/slurm/array.sh CASE OUTPUT [OPTIONS of separatrix basin]
+#
+# One share of a map for each element of a job array (from 1, without gaps); submit_array.sh also submits the merge.
+#SBATCH --job-name=separatrix-share
+#SBATCH --signal=USR1@180
+#SBATCH --requeue
+#SBATCH --open-mode=append
+#SBATCH --output=%x-%A_%a.log
+set -uo pipefail
+SEPARATRIX_ROOT=${SEPARATRIX_ROOT:-$SLURM_SUBMIT_DIR}
+# shellcheck source=scripts/slurm/common.sh
+source "$SEPARATRIX_ROOT/scripts/slurm/common.sh"
+case_file=$1 output=$2
+shift 2
+share=$SLURM_ARRAY_TASK_ID shares=$SLURM_ARRAY_TASK_COUNT
+name=$output.shard-$share-of-$shares
+
+srun --mpi="${SEPARATRIX_SRUN_MPI:-pmix}" "$separatrix" basin "$case_file" -o "$output" --shard "$share/$shares" --resume \
+  --log "$name.log.jsonl" "$@"
+end_job $? "$name.part"

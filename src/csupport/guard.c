@@ -1,0 +1,47 @@
+/* SPDX-FileCopyrightText: The Separatrix developers */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+
+/* Ends the program with a message where a library loops for ever, or crashes, on a damaged file. The time is
+   that of the processor, so that a slow file system is not taken for a loop. */
+#define _GNU_SOURCE
+#include <signal.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+static const int guarded[] = {SIGPROF, SIGSEGV, SIGBUS, SIGFPE, SIGABRT};
+enum { guarded_count = sizeof guarded / sizeof *guarded };
+
+static struct sigaction before[guarded_count];
+static char message[1024];
+static int exit_code;
+
+static void give_up(int number) {
+  (void)number;
+  if (write(STDERR_FILENO, message, strlen(message)) < 0)
+    _exit(exit_code);
+  _exit(exit_code);
+}
+
+/* From here to separatrix_guard_end the program ends with `code`, and says `text`, when a library crashes or
+   uses more than `seconds` of the processor (0 = no limit). Not to be nested. */
+void separatrix_guard_begin(const char *text, int seconds, int code) {
+  const struct itimerval limit = {{0, 0}, {seconds, 0}};
+  struct sigaction action = {0};
+  snprintf(message, sizeof message, "separatrix: %s\n", text);
+  exit_code = code;
+  action.sa_handler = give_up;
+  sigemptyset(&action.sa_mask);
+  for (size_t i = 0; i < guarded_count; i++)
+    sigaction(guarded[i], &action, &before[i]);
+  setitimer(ITIMER_PROF, &limit, NULL);
+}
+
+void separatrix_guard_end(void) {
+  const struct itimerval none = {{0, 0}, {0, 0}};
+  setitimer(ITIMER_PROF, &none, NULL);
+  for (size_t i = 0; i < guarded_count; i++)
+    sigaction(guarded[i], &before[i], NULL);
+}

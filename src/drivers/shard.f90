@@ -1,0 +1,69 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A share of the tiles of a map, computed by a job of its own into a working file of its own.
+module shard
+  use basin, only: catalogue_t
+  use catalogue_search, only: pack_catalogues
+  use errors, only: error_t
+  use kinds, only: int64, wp
+  use map_file, only: map_file_t, working_path
+  use map_schema, only: schema_t, type_float64
+  use session, only: session_t
+  use status, only: exit_done
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: in_shard, shard_path, describe_shard, finish_shard
+
+  !> The catalogues of all slices as `pack_catalogues` makes them.
+  character(len=*), parameter, public :: catalogue_dataset = '/shard/catalogue'
+
+contains
+
+  !> Whether share `number` of `shares` has the tile: every `shares`-th, so that each share has its part of the hard
+  !> regions. Without shares (0) all tiles are of this run.
+  pure logical function in_shard(tile, number, shares)
+    integer, intent(in) :: tile, number, shares
+    in_shard = shares == 0
+    if (shares > 0) in_shard = modulo(tile - 1, shares) == number - 1
+  end function in_shard
+
+  !> The name from which that of a share's working file is made.
+  pure function shard_path(path, number, shares) result(name)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: number, shares
+    character(len=:), allocatable :: name
+    name = path//'.shard-'//to_text(number)//'-of-'//to_text(shares)
+  end function shard_path
+
+  !> What merge needs besides the tiles: which share it is, and the catalogues, so that they are not searched again.
+  subroutine describe_shard(catalogues, number, shares, schema)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer, intent(in) :: number, shares
+    type(schema_t), intent(inout) :: schema
+    real(wp), allocatable :: packed(:)
+    packed = pack_catalogues(catalogues, spread(.true., 1, size(catalogues)))
+    call schema%add_attribute('shard', 'number', number)
+    call schema%add_attribute('shard', 'shares', shares)
+    call schema%add_dimension('packed', size(packed, kind=int64))
+    call schema%add_variable('catalogue', type_float64, ['packed'], data=packed, group='shard', &
+                             long_name='catalogues of all slices')
+  end subroutine describe_shard
+
+  !> Leaves the working file as it is for merge, and ends the program.
+  subroutine finish_shard(session, file)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    type(error_t), allocatable :: error
+    call file%close(session%team, error)
+    call session%stop_if(error)
+    associate (command => session%command)
+      call session%journal%line('shard', 'share '//to_text(command%shard)//' of '//to_text(command%shard_count)// &
+        ' is done in '//working_path(file%path)//'; separatrix merge joins the shares')
+    end associate
+    call session%end_with(exit_done)
+  end subroutine finish_shard
+
+end module shard

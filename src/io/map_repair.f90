@@ -1,0 +1,59 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A working file whose tail is lost gets its length back: HDF5 refuses a file that is shorter than it says. What was in
+!> the tail is zero then, and its tiles do not match their checksums.
+module map_repair
+  use errors, only: error_t, fail
+  use kinds, only: int64, int8
+  use status, only: exit_io
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: restore_length
+
+  !> Start of a superblock of version 2 or 3 up to the address of the end of the file (HDF5 File Format Specification
+  !> 3.0, II.A.2): signature, version, size of offsets, size of lengths, flags, three addresses.
+  integer, parameter :: header_bytes = 36, end_address = 29
+  integer, parameter :: signature(8) = [-119, 72, 68, 70, 13, 10, 26, 10]
+
+contains
+
+  !> `missing`: bytes that were lost, now zero. Code 74 if even the start of the file is gone.
+  subroutine restore_length(path, missing, error)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(out) :: missing
+    type(error_t), allocatable, intent(out) :: error
+    integer(int8) :: header(header_bytes)
+    integer(int64) :: expected, found
+    integer :: unit, status
+    logical :: readable
+    character(len=256) :: message
+    missing = 0
+    message = ''
+    open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='readwrite', iostat=status, &
+          iomsg=message)
+    if (status == 0) then
+      inquire (unit=unit, size=found)
+      read (unit, iostat=status, iomsg=message) header
+      readable = status == 0
+      if (readable) readable = all(header(:8) == signature) .and. (header(9) == 2 .or. header(9) == 3) .and. header(10) == 8
+      if (readable) then
+        expected = transfer(header(end_address:), expected)
+        if (found < expected) then
+          missing = expected - found
+          write (unit, pos=expected, iostat=status, iomsg=message) 0_int8
+        end if
+      end if
+      close (unit)
+      if (.not. readable) then
+        call fail(error, exit_io, ''''//path//''' is damaged: its start is gone, '//to_text(found)// &
+                  ' bytes are left; --force begins again')
+        return
+      end if
+    end if
+    if (status /= 0) call fail(error, exit_io, ''''//path//''': '//trim(message))
+  end subroutine restore_length
+
+end module map_repair

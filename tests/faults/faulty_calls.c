@@ -1,0 +1,153 @@
+/* SPDX-FileCopyrightText: The Separatrix developers */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+
+/* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
+   call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
+   write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
+   MPI run. Without $FAULT_AT the number of calls is added as a line to the file $FAULT_COUNT when the process
+   ends. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/types.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+static const char *name, *action;
+static long at;
+static atomic_long calls;
+
+#define REAL(function) ((__typeof__(&function))dlsym(RTLD_NEXT, #function))
+
+__attribute__((constructor)) static void read_settings(void) {
+  const char *rank = getenv("FAULT_RANK"), *own = getenv("OMPI_COMM_WORLD_RANK"),
+             *number = getenv("FAULT_AT");
+  if (rank != NULL && own != NULL && strcmp(rank, own) != 0)
+    return;
+  name = getenv("FAULT_NAME");
+  action = getenv("FAULT_DO");
+  at = number != NULL && action != NULL ? atol(number) : 0;
+}
+
+__attribute__((destructor)) static void report(void) {
+  const char *path = getenv("FAULT_COUNT");
+  FILE *file = path == NULL || calls == 0 ? NULL : fopen(path, "a");
+  if (file == NULL)
+    return;
+  fprintf(file, "%ld\n", (long)calls);
+  fclose(file);
+}
+
+static void die(void) { kill(getpid(), SIGKILL); }
+
+/* The errno to give, 0 to go on, -1 to die after half of the write. `writes`: the call needs space. */
+static int fault(const char *path, int writes) {
+  if (name == NULL || strstr(path, name) == NULL)
+    return 0;
+  const long call = ++calls;
+  if (at == 0 || call < at)
+    return 0;
+  if (strcmp(action, "kill") == 0)
+    die();
+  if (strcmp(action, "tear") == 0) {
+    if (!writes)
+      die();
+    return -1;
+  }
+  return writes ? atoi(action) : 0;
+}
+
+static int fault_of(int descriptor, int writes) {
+  char link[64], path[PATH_MAX];
+  snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
+  const ssize_t length = readlink(link, path, sizeof path - 1);
+  if (length < 0)
+    return 0;
+  path[length] = '\0';
+  return fault(path, writes);
+}
+
+#define GUARD(number)                                                                                        \
+  if ((number) > 0) {                                                                                        \
+    errno = (number);                                                                                        \
+    return -1;                                                                                               \
+  }
+
+ssize_t write(int descriptor, const void *data, size_t size) {
+  const int number = fault_of(descriptor, 1);
+  GUARD(number)
+  const ssize_t done = REAL(write)(descriptor, data, number < 0 ? size / 2 : size);
+  if (number < 0)
+    die();
+  return done;
+}
+
+ssize_t pwrite(int descriptor, const void *data, size_t size, off_t offset) {
+  const int number = fault_of(descriptor, 1);
+  GUARD(number)
+  const ssize_t done = REAL(pwrite)(descriptor, data, number < 0 ? size / 2 : size, offset);
+  if (number < 0)
+    die();
+  return done;
+}
+
+ssize_t pwrite64(int descriptor, const void *data, size_t size, off64_t offset) {
+  return pwrite(descriptor, data, size, offset);
+}
+
+ssize_t writev(int descriptor, const struct iovec *parts, int count) {
+  const int number = fault_of(descriptor, 1);
+  GUARD(number)
+  const ssize_t done = REAL(writev)(descriptor, parts, number < 0 ? count / 2 : count);
+  if (number < 0)
+    die();
+  return done;
+}
+
+int ftruncate(int descriptor, off_t length) {
+  const int number = fault_of(descriptor, 1);
+  GUARD(number)
+  if (number < 0)
+    die();
+  return REAL(ftruncate)(descriptor, length);
+}
+
+int ftruncate64(int descriptor, off64_t length) { return ftruncate(descriptor, length); }
+
+int fallocate(int descriptor, int mode, off_t offset, off_t length) {
+  const int number = fault_of(descriptor, 1);
+  GUARD(number)
+  if (number < 0)
+    die();
+  return REAL(fallocate)(descriptor, mode, offset, length);
+}
+
+int fallocate64(int descriptor, int mode, off64_t offset, off64_t length) {
+  return fallocate(descriptor, mode, offset, length);
+}
+
+int fsync(int descriptor) {
+  const int number = fault_of(descriptor, 0);
+  if (number < 0)
+    die();
+  return REAL(fsync)(descriptor);
+}
+
+int rename(const char *from, const char *to) {
+  if (fault(to, 0) < 0)
+    die();
+  return REAL(rename)(from, to);
+}
+
+int unlink(const char *path) {
+  if (fault(path, 0) < 0)
+    die();
+  return REAL(unlink)(path);
+}

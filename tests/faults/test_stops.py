@@ -1,0 +1,186 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A signal or the time limit stops a run with code 75, soon; after a death the others say how to go on."""
+
+import os
+import random
+import re
+import signal
+import time
+from collections import Counter
+from pathlib import Path
+
+import life
+import pytest
+
+SEED = 20261124
+# A trajectory of this case takes a millisecond; the promise is 2 s and one trajectory.
+SOON = 2.0
+# So long that a run outlives the second that mpirun takes before it passes SIGTERM on.
+SLOW = ["--set", "run.duration=400"]
+# mpirun waits about two seconds when a process has returned another code than 0.
+MPIRUN = 2.5
+
+
+def alive(rank):
+    """Whether a process still works."""
+    try:
+        return Path(f"/proc/{rank}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def stop(process, ranks, send):
+    """Send a signal; the code, and the seconds until the ranks have ended and until mpirun has."""
+    computing = life.ranks_of(process, ranks)
+    started = time.monotonic()
+    send(computing)
+    while process.poll() is None and any(map(alive, computing)):
+        time.sleep(0.002)
+    ended = time.monotonic() - started
+    return process.wait(20), ended, time.monotonic() - started
+
+
+def start_and_wait(program, folder, ranks, chance, *more):
+    """Start the run and wait for a random moment after its beginning; the seconds since then."""
+    life.write_case(folder)
+    process = life.launch(program, folder, ranks, *more)
+    while process.poll() is None and len(life.ranks_of(process, ranks)) < max(ranks, 1):
+        time.sleep(0.001)
+    part = folder / f"{life.NAME}.part"
+    while process.poll() is None and not part.exists():
+        time.sleep(0.001)
+    time.sleep(chance.uniform(0, 0.15))
+    return process
+
+
+def check_stopped(program, folder, code, reference, chance):
+    """Code 75 and a resumable file, or the whole file if it was too late to stop."""
+    log = (folder / "log").read_text()
+    if code == 0:
+        assert life.stage(folder) == "done"
+    else:
+        assert code == 75, log
+        assert "--resume" in log
+        assert not (folder / life.NAME).exists()
+        life.resume(program, folder, chance.choice([0, 1, 2, 3]))
+    assert life.content_hash(folder / life.NAME) == life.content_hash(reference)
+
+
+@pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGUSR2, signal.SIGTERM])
+def test_a_signal_stops_soon(mpi_separatrix, tmp_path, reference, amount, figures, long_if, number):
+    long_if(number == signal.SIGUSR2)
+    chance = random.Random(f"{SEED} {number}")
+    codes = Counter()
+    longest = returned = 0.0
+    for trial in range(amount(2, 15)):
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        # mpirun has its own way with SIGTERM.
+        ranks = 0 if number == signal.SIGTERM else trial % 4
+        process = start_and_wait(mpi_separatrix, folder, ranks, chance)
+        code, ended, over = stop(process, ranks, lambda _, target=process: target.send_signal(number))
+        longest, returned = max(longest, ended), max(returned, over)
+        codes[code] += 1
+        check_stopped(mpi_separatrix, folder, code, reference, chance)
+    assert codes[75]
+    assert longest < SOON
+    assert returned < SOON + MPIRUN
+    figures.update(
+        seed=SEED, stops=codes.total(), codes=codes, longest=round(longest, 2), mpirun=round(returned, 2)
+    )
+
+
+def test_sigterm_to_all_ranks_stops_soon(mpi_separatrix, tmp_path, reference, amount, figures, long_if):
+    """As srun and batch systems send it: to the ranks, not to mpirun."""
+    long_if(True)
+    chance = random.Random(SEED)
+    codes = Counter()
+    longest = returned = 0.0
+    for trial in range(amount(1, 8)):
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        ranks = 1 + trial % 4
+        process = start_and_wait(mpi_separatrix, folder, ranks, chance)
+        code, ended, over = stop(process, ranks, lambda pids: [os.kill(pid, signal.SIGTERM) for pid in pids])
+        longest, returned = max(longest, ended), max(returned, over)
+        codes[code] += 1
+        check_stopped(mpi_separatrix, folder, code, reference, chance)
+    assert longest < SOON
+    assert returned < SOON + MPIRUN
+    figures.update(
+        seed=SEED, stops=codes.total(), codes=codes, longest=round(longest, 2), mpirun=round(returned, 2)
+    )
+
+
+def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, figures):
+    """mpirun ends its ranks itself and returns 1; they have a second to say how to go on."""
+    process = start_and_wait(mpi_separatrix, tmp_path, 2, random.Random(SEED), *SLOW)
+    started = time.monotonic()
+    process.terminate()
+    code = process.wait(20)
+    seconds = time.monotonic() - started
+    log = (tmp_path / "log").read_text()
+    assert code in (1, 75), log
+    assert "--resume" in log
+    done, _ = life.tiles_of(tmp_path)
+    assert done
+    outcome = life.run(
+        mpi_separatrix, *life.RUN, *SLOW, "--resume", "--time-limit", 0.5, folder=tmp_path, ranks=3
+    )
+    assert outcome.code == 75
+    assert f"{done} of {life.TILES} tiles were done before" in outcome.out
+    assert life.tiles_of(tmp_path)[0] >= done
+    figures.update(code=code, end=round(seconds, 2))
+
+
+def test_the_time_limit_is_kept(mpi_separatrix, tmp_path, reference, amount, figures):
+    chance = random.Random(SEED)
+    codes = Counter()
+    longest = 0.0
+    for trial in range(amount(2, 30)):
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        life.write_case(folder)
+        limit = round(chance.uniform(0.02, 0.5), 3)
+        command = [*life.RUN, "--time-limit", str(limit), "--json"]
+        outcome = life.run(mpi_separatrix, *command, folder=folder, ranks=trial % 4)
+        codes[outcome.code] += 1
+        said = [
+            float(value) for value in re.findall(r'"event": "stopped", "seconds": ([0-9.e-]+)', outcome.out)
+        ]
+        if said:
+            longest = max(longest, said[0] - limit)
+        assert outcome.code in (0, 75)
+        life.resume(mpi_separatrix, folder, chance.choice([0, 2])) if outcome.code else None
+        assert life.content_hash(folder / life.NAME) == life.content_hash(reference)
+    assert codes[75]
+    assert longest < SOON
+    figures.update(seed=SEED, stops=codes.total(), codes=codes, longest_excess=round(longest, 2))
+
+
+@pytest.mark.parametrize("dead", [0, 1, 2])
+def test_a_dead_rank_ends_the_job_and_the_others_say_how_to_go_on(
+    mpi_separatrix, tmp_path, amount, figures, long_if, dead
+):
+    long_if(dead > 0)
+    chance = random.Random(f"{SEED} {dead}")
+    longest = 0.0
+    deaths, told = amount(1, 5), 0
+    for trial in range(deaths):
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        process = start_and_wait(mpi_separatrix, folder, 3, chance, *SLOW)
+        ranks = life.ranks_of(process, 3)
+        assert len(ranks) == 3
+        # mpirun passes on what was said.
+        time.sleep(0.2)
+        longest = max(longest, life.kill(process, [ranks[dead]]))
+        assert process.returncode == 137
+        log = (folder / "log").read_text()
+        assert "after an interruption the same command with --resume" in log
+        told += "was told to end (SIGTERM); the tiles done are kept" in log
+        assert life.stage(folder) == "fill"
+        life.tiles_of(folder)
+    assert longest < 10
+    figures.update(seed=SEED, deaths=deaths, survivors_spoke=told, longest=round(longest, 2))

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The log as JSON lines, where ranks run, and the record of how a file was made."""
+
+import json
+import os
+from pathlib import Path
+
+import h5py
+import pytest
+from program import run, succeed, write_case
+
+COMMAND = ["basin", "case.toml", "-o", "map.h5", "--log", "run.jsonl"]
+
+
+def events(folder: Path) -> list[dict]:
+    """The lines of the log."""
+    return [json.loads(line) for line in (folder / "run.jsonl").read_text().splitlines()]
+
+
+@pytest.mark.parametrize("ranks", [0, 3])
+def test_the_log_has_what_stdout_says_and_more(mpi_separatrix, tmp_path, ranks):
+    write_case(tmp_path)
+    outcome = succeed(mpi_separatrix, *COMMAND, folder=tmp_path, ranks=ranks)
+    lines = events(tmp_path)
+    messages = [line["message"] for line in lines]
+    assert [
+        message for message in messages if message in outcome.out.splitlines()
+    ] == outcome.out.splitlines()
+    named = {line["event"]: line for line in lines}
+    assert named["binding"]["ranks"] == max(1, ranks)
+    assert named["binding"]["rank_cores"].count(":") == max(1, ranks)
+    balance = named["balance"]
+    assert len(balance["busy_percent"]) == max(1, ranks)
+    assert (
+        0 <= balance["busy_percent_min"] <= balance["busy_percent_mean"] <= balance["busy_percent_max"] <= 100
+    )
+    # 48 bytes a point.
+    assert balance["written_bytes"] == 19 * 31 * 48
+    assert balance["resident_bytes_max"] > 1e6
+    assert ("binding" in outcome.out or "cores" in outcome.out) == (ranks > 1)
+
+
+def test_the_log_grows_and_keeps_errors(separatrix, tmp_path):
+    write_case(tmp_path)
+    succeed(separatrix, *COMMAND, "--quiet", folder=tmp_path)
+    first = len(events(tmp_path))
+    assert run(separatrix, *COMMAND, folder=tmp_path).code == 73
+    assert run(separatrix, *COMMAND, "--force", "--time-limit", "1e-9", folder=tmp_path).code == 75
+    lines = events(tmp_path)
+    assert [line["event"] for line in lines if line["event"] == "error"] == ["error", "error"]
+    assert len(lines) > first
+    assert all(line["time"].endswith("Z") and line["seconds"] >= 0 for line in lines)
+
+
+def test_a_log_that_cannot_be_written(separatrix, tmp_path):
+    write_case(tmp_path)
+    outcome = run(separatrix, "basin", "case.toml", "--log", "none/run.jsonl", folder=tmp_path)
+    assert outcome.code == 73 and "none/run.jsonl" in outcome.err
+    outcome = run(separatrix, "basin", "case.toml", "--log", "case.toml", folder=tmp_path)
+    assert outcome.code == 64 and "case.toml" in outcome.err
+    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_a_file_says_how_it_was_made(mpi_separatrix, tmp_path):
+    write_case(tmp_path)
+    os.environ["UCX_TEST_OF_SEPARATRIX"] = "yes"
+    succeed(mpi_separatrix, *COMMAND, folder=tmp_path, ranks=2)
+    del os.environ["UCX_TEST_OF_SEPARATRIX"]
+    with h5py.File(tmp_path / "map.h5") as file:
+        record = dict(file["provenance"].attrs)
+    assert (record["ranks"], record["host_count"]) == (2, 1)
+    assert record["hosts"] == os.uname().nodename
+    assert "--log run.jsonl" in record["command_line"]
+    assert "-ffp-contract=off" in record["flags"] and "C++" in record["c_flags"]
+    variables = record["environment"].split()
+    assert "UCX_TEST_OF_SEPARATRIX=yes" in variables
+    assert "OMPI_MCA_io=romio321" in variables
+    assert not any(word.startswith("OMPI_MCA_orte_") for word in variables)
+    shown = json.loads(succeed(mpi_separatrix, "info", "map.h5", "--json", folder=tmp_path).out)
+    for name in ("version", "commit", "compiler", "flags", "c_flags", "mpi", "hosts", "started", "finished"):
+        assert shown[name] == record[name]
+    assert (shown["ranks"], shown["host_count"]) == (2, 1)
+    assert shown["tiles_done"] == shown["tiles"] > 0

@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A map in shares, merged, is the map; what is no set of shares is refused."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import STACK, differences, listing, run, succeed, write_case
+
+SMALL = ["--set", "grid.tile=[4, 5]"]
+COMMAND = ["basin", "case.toml", *SMALL, "-o", "map.h5"]
+
+
+def part(number: int, count: int) -> str:
+    """The file of a share."""
+    return f"map.h5.shard-{number}-of-{count}.part"
+
+
+@pytest.fixture(scope="module")
+def shares(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the whole map and its three shares. Not to be changed."""
+    folder = tmp_path_factory.mktemp("shares")
+    write_case(folder)
+    succeed(separatrix, "basin", "case.toml", *SMALL, "-o", "whole.h5", folder=folder)
+    for number in (1, 2, 3):
+        succeed(separatrix, *COMMAND, "--shard", f"{number}/3", folder=folder)
+    return folder
+
+
+@pytest.fixture
+def folder(shares: Path, tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return shutil.copytree(shares, tmp_path / "copy")
+
+
+def test_the_merged_map_is_that_of_one_run(separatrix, folder):
+    outcome = succeed(separatrix, "merge", "map.h5", *(part(i, 3) for i in (2, 3, 1)), folder=folder)
+    assert "wrote map.h5" in outcome.out
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+    with h5py.File(folder / "whole.h5") as whole, h5py.File(folder / "map.h5") as merged:
+        for text in ("case_text", "resolved_case"):
+            assert whole[f"provenance/{text}"][()] == merged[f"provenance/{text}"][()]
+        one, other = (file["provenance"].attrs["case_identity"] for file in (whole, merged))
+        assert one == other
+    succeed(separatrix, "verify", "map.h5", "--sample", "20", folder=folder)
+    assert len(list(folder.glob("*.part"))) == 3
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_slices_and_any_number_of_shares_on_any_ranks(mpi_separatrix, tmp_path, count):
+    write_case(tmp_path)
+    asked = ["basin", "case.toml", "--set", STACK, "--set", "grid.tile=[2, 3, 4]"]
+    succeed(mpi_separatrix, *asked, "-o", "whole.h5", folder=tmp_path)
+    for number in range(1, count + 1):
+        succeed(
+            mpi_separatrix,
+            *(*asked, "-o", "map.h5", "--shard", f"{number}/{count}"),
+            folder=tmp_path,
+            ranks=number % 3,
+        )
+    succeed(mpi_separatrix, "merge", "map.h5", *(part(i + 1, count) for i in range(count)), folder=tmp_path)
+    assert differences(tmp_path / "whole.h5", tmp_path / "map.h5") == []
+
+
+def test_more_shares_than_tiles(separatrix, tmp_path):
+    write_case(tmp_path)
+    asked = ["basin", "case.toml", "--set", "grid.tile=[19, 31]", "-o", "map.h5"]
+    for number in (1, 2):
+        succeed(separatrix, *asked, "--shard", f"{number}/2", folder=tmp_path)
+    succeed(separatrix, "merge", "map.h5", part(1, 2), part(2, 2), folder=tmp_path)
+    succeed(separatrix, "verify", "map.h5", "--sample", "5", folder=tmp_path)
+
+
+def test_a_share_that_was_stopped_goes_on(separatrix, folder):
+    damage(folder / part(2, 3))
+    outcome = run(separatrix, "merge", "map.h5", *(part(i, 3) for i in (1, 2, 3)), folder=folder)
+    assert outcome.code == 75
+    for word in ("share 2 of 3", "1 tiles", "--shard 2/3", "--resume"):
+        assert word in outcome.err
+    assert not (folder / "map.h5").exists() and not (folder / "map.h5.part").exists()
+    outcome = succeed(separatrix, *COMMAND, "--shard", "2/3", "--resume", folder=folder)
+    assert "tiles were done before" in outcome.out
+    succeed(separatrix, "merge", "map.h5", *(part(i, 3) for i in (1, 2, 3)), folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+
+
+def damage(path: Path) -> None:
+    """Change a value of a tile that the share has."""
+    with h5py.File(path, "r+") as file:
+        number = np.flatnonzero(file["tiles/state"][()] == 1)[0]
+        rows, columns = file["tiles/tile_shape"][()]
+        across = -(-file["regime"].shape[1] // columns)
+        corner = (number // across) * rows, (number % across) * columns
+        file["x_max"][int(corner[0]), int(corner[1])] += 1
+
+
+@pytest.mark.parametrize(
+    ("files", "code", "words"),
+    [
+        ((1, 2), 66, ["share 3 of 3", "missing"]),
+        ((1, 2, 3, 2), 65, ["share 2 of 3", "twice", part(2, 3)]),
+        ((1, "whole.h5"), 65, ["whole.h5", "no share"]),
+        ((1, "nowhere.part"), 66, ["nowhere.part"]),
+        ((1, "case.toml"), 74, ["case.toml"]),
+    ],
+)
+def test_what_is_no_set_of_shares(separatrix, folder, files, code, words):
+    before = listing(folder)
+    names = [part(name, 3) if isinstance(name, int) else name for name in files]
+    outcome = run(separatrix, "merge", "map.h5", *names, folder=folder)
+    assert (outcome.code, outcome.out) == (code, "")
+    assert outcome.err.count("\n") == 1
+    for word in words:
+        assert word in outcome.err
+    assert listing(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "shard", "code", "words"),
+    [
+        (["--set", "drive.ratio=1.21"], "3/3", 76, ["another case"]),
+        (["--set", "run.domain=1e5"], "3/3", 76, ["another case"]),
+        (["--set", "grid.tile=[6, 5]"], "3/3", 76, ["another layout"]),
+        ([], "1/2", 65, ["is a share of 2", "is one of 3"]),
+    ],
+)
+def test_a_share_of_another_map(separatrix, folder, change, shard, code, words):
+    other = ["basin", "case.toml", *SMALL, *change, "-o", "other.h5", "--shard", shard]
+    succeed(separatrix, *other, folder=folder)
+    name = f"other.h5.shard-{shard.replace('/', '-of-')}.part"
+    before = listing(folder)
+    outcome = run(separatrix, "merge", "map.h5", part(1, 3), part(2, 3), name, folder=folder)
+    assert outcome.code == code
+    for word in words:
+        assert word in outcome.err
+    assert listing(folder) == before
+
+
+def test_an_existing_output_is_only_replaced_with_force(separatrix, folder):
+    (folder / "map.h5").write_text("something dear")
+    command = ["merge", "map.h5", *(part(i, 3) for i in (1, 2, 3))]
+    outcome = run(separatrix, *command, folder=folder)
+    assert outcome.code == 73
+    assert (folder / "map.h5").read_text() == "something dear"
+    succeed(separatrix, *command, "--force", folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+
+
+@pytest.mark.parametrize("value", ["0/3", "4/3", "1", "1/", "/3", "1/0", "-1/3", "1/3/5", "one/3", "1.0/3"])
+def test_bad_shares(separatrix, tmp_path, value):
+    write_case(tmp_path)
+    outcome = run(separatrix, *COMMAND, "--shard", value, folder=tmp_path)
+    assert outcome.code == 64
+    assert f"'{value}'" in outcome.err and "I/N" in outcome.err
+    assert list(listing(tmp_path)) == ["case.toml"]
