@@ -4,13 +4,15 @@
 !> Which tiles of a damaged final file no longer match the checksums that they got when they were computed.
 module tile_damage
   use checksum, only: crc32
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use h5, only: h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_text, h5_has_attribute
+  use h5_stored, only: h5_check_stored
   use kinds, only: int64, int8, real64
+  use status, only: exit_io
   use text, only: join, to_text
   use tiles, only: new_tiling, tiling_t
-  use value_types, only: bytes_of, from_bytes, type_int64, type_uint32
+  use value_types, only: bytes_of, from_bytes, type_string
   implicit none
   private
 
@@ -64,8 +66,8 @@ contains
     if (.not. h5_exists(file, '/tiles/checksum')) return
     if (.not. h5_has_attribute(file, '/tiles', 'variables')) return
     call h5_get_text(file, '/tiles', 'variables', names, error)
-    if (.not. allocated(error)) call read_integers(file, '/tiles/tile_shape', type_int64, shape, error)
-    if (.not. allocated(error)) call read_integers(file, '/tiles/checksum', type_uint32, checksums, error)
+    if (.not. allocated(error)) call read_integers(file, '/tiles/tile_shape', shape, error)
+    if (.not. allocated(error)) call read_integers(file, '/tiles/checksum', checksums, error)
     if (allocated(error)) return
     deallocate (datasets)
     allocate (datasets(1 + count([(names(i:i) == ' ', i=1, len(names))])))
@@ -73,7 +75,10 @@ contains
     do i = 1, size(datasets)
       blank = index(names(from:)//' ', ' ')
       call h5_open_dataset(file, names(from:from + blank - 2), datasets(i), error)
+      if (.not. allocated(error)) call check_numeric(datasets(i), error)
       if (allocated(error)) return
+      if (size(datasets(i)%lengths) /= size(shape)) return
+      if (any(datasets(i)%lengths /= datasets(1)%lengths)) return
       from = from + blank
     end do
     call new_tiling(datasets(1)%lengths, shape, tiling, error)
@@ -81,24 +86,35 @@ contains
     if (tiling%count() == size(checksums)) call move_alloc(checksums, expected)
   end subroutine open_tiles
 
-  subroutine read_integers(file, name, type, values, error)
+  subroutine read_integers(file, name, values, error)
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: name
-    integer, intent(in) :: type
     integer(int64), allocatable, intent(out) :: values(:)
     type(error_t), allocatable, intent(out) :: error
     type(h5_dataset_t) :: dataset
     integer(int8), allocatable :: bytes(:)
     real(real64), allocatable :: numbers(:)
     call h5_open_dataset(file, name, dataset, error)
+    if (.not. allocated(error)) call check_numeric(dataset, error)
     if (allocated(error)) return
-    allocate (numbers(product(dataset%lengths)), bytes(product(dataset%lengths)*bytes_of(type)))
+    allocate (numbers(product(dataset%lengths)), bytes(product(dataset%lengths)*bytes_of(dataset%type)))
     call h5_read(dataset, bytes, error)
     if (allocated(error)) return
-    call from_bytes(type, bytes, numbers)
+    call from_bytes(dataset%type, bytes, numbers)
     values = nint(numbers, int64)
     call h5_close_dataset(dataset, error)
   end subroutine read_integers
+
+  !> Code 74 for a dataset that is not numeric or claims more than is stored.
+  subroutine check_numeric(dataset, error)
+    type(h5_dataset_t), intent(in) :: dataset
+    type(error_t), allocatable, intent(out) :: error
+    if (dataset%type == type_string) then
+      call fail(error, exit_io, ''''//dataset%name//''' of '''//dataset%path//''' is not numeric')
+    else
+      call h5_check_stored(dataset, error)
+    end if
+  end subroutine check_numeric
 
   !> Whether a tile can be read and matches.
   logical function is_whole(datasets, lower, extent, expected)

@@ -65,6 +65,21 @@ def test_slices_and_any_number_of_shares_on_any_ranks(mpi_separatrix, tmp_path, 
     assert differences(tmp_path / "whole.h5", tmp_path / "map.h5") == []
 
 
+def test_a_cut_share_is_mended_by_resume(mpi_separatrix, folder):
+    share = folder / part(2, 3)
+    share.write_bytes(share.read_bytes()[:-1000])
+    merging = ["merge", "map.h5", *(part(i, 3) for i in (1, 2, 3))]
+    assert run(mpi_separatrix, *merging, folder=folder).code == 74
+    outcome = run(
+        mpi_separatrix, *COMMAND, "--shard", "2/3", "--resume", "--set", "drive.ratio=1.3", folder=folder
+    )
+    assert outcome.code == 76
+    assert "drive.ratio: 1.2, now 1.3" in outcome.err
+    outcome = succeed(mpi_separatrix, *COMMAND, "--shard", "2/3", "--resume", folder=folder, ranks=2)
+    succeed(mpi_separatrix, *merging, folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+
+
 def test_more_shares_than_tiles(separatrix, tmp_path):
     write_case(tmp_path)
     asked = ["basin", "case.toml", "--set", "grid.tile=[19, 31]", "-o", "map.h5"]
