@@ -126,7 +126,7 @@ def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, fig
     done, _ = life.tiles_of(tmp_path)
     assert done
     outcome = life.run(
-        mpi_separatrix, *life.RUN, *SLOW, "--resume", "--time-limit", 0.5, folder=tmp_path, ranks=3
+        mpi_separatrix, *life.RUN, *SLOW, "--resume", "--time-limit", 0.1, folder=tmp_path, ranks=3
     )
     assert outcome.code == 75
     assert f"{done} of {life.TILES} tiles were done before" in outcome.out
