@@ -59,7 +59,7 @@ contains
       call report(source, 'friction.static_coefficient', 'found '//to_text(static)// &
                   ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
     end if
-    if (laws(contact_law)%name == 'newton') call check_barriers(source, laws(contact_law), at)
+    if (laws(contact_law)%name /= 'none') call check_barriers(source, laws(contact_law), at)
     if (laws(drive_law)%name /= 'none' .and. laws(restoring_law)%name /= 'linear') then
       call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
                   '", allowed with "linear": the ratio refers to its natural frequency')
@@ -80,7 +80,7 @@ contains
     upper = value_of(contact, 'upper')
     lower = value_of(contact, 'lower')
     if (upper >= huge(upper) .and. lower <= -huge(lower)) then
-      call report(source, 'contact.law', 'found "newton" without a barrier, allowed with upper, lower or both')
+      call report(source, 'contact.law', 'found "'//trim(contact%name)//'" without a barrier, allowed with upper, lower or both')
     else if (lower > upper) then
       call report(source, 'contact.lower', 'found '//to_text(lower)//' m, allowed at most upper = '// &
                   to_text(upper)//' m'//at)

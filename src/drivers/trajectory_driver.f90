@@ -8,6 +8,7 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use contact_law, only: barrier_positions, force_on_body
   use drive_law, only: foot_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
@@ -62,7 +63,7 @@ contains
     call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
     call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
     call describe_file(session, 'trajectory', schema)
-    call describe_motion(moving, span, outcome, schema)
+    call describe_motion(moving, span, outcome, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     call session%provenance%finish(schema)
@@ -76,20 +77,23 @@ contains
   end subroutine run_trajectory_command
 
   !> Attributes: the drive, the barriers, and the steady values over the window.
-  subroutine describe_motion(moving, span, outcome, schema)
+  subroutine describe_motion(moving, span, outcome, log, schema)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(outcome_t), intent(in) :: outcome
+    type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: unreachable
+    real(wp) :: unreachable, barriers(2)
     unreachable = sqrt(huge(1.0_wp))
+    barriers = barrier_positions(moving%machine%contact)
     call schema%add_attribute('', 'drive_period', moving%machine%period)
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
-    if (moving%machine%contact%upper < unreachable) then
-      call schema%add_attribute('', 'barrier_upper', moving%machine%contact%upper)
-    end if
-    if (moving%machine%contact%lower > -unreachable) then
-      call schema%add_attribute('', 'barrier_lower', moving%machine%contact%lower)
+    if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
+    if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
+    if (moving%machine%contact%soft) then
+      call schema%add_attribute('', 'peak_force', log%peak_force)
+      call schema%add_attribute('', 'peak_penetration', log%peak_penetration)
+      call schema%add_attribute('', 'contact_work', log%contact_work)
     end if
     call schema%add_attribute('', 'window', span%window)
     associate (f => outcome%window)
@@ -124,6 +128,11 @@ contains
                              data=log%sample_data(3, :log%samples))
     call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
                              data=foot)
+    if (moving%machine%contact%soft) then
+      call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
+        long_name='force of the barriers on the body', &
+        data=force_on_body(moving%machine%contact, log%sample_data(2, :log%samples), log%sample_data(3, :log%samples)))
+    end if
     call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5], &
       flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier', &
       data=real(log%sample_mode(:log%samples), wp))

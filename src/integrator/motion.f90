@@ -6,6 +6,7 @@
 module motion
   use adaptive_flight, only: fly_adaptive
   use constants, only: two_pi
+  use contact_flight, only: contact_side, fly_contact
   use contact_law, only: velocity_after_impact
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
@@ -14,9 +15,9 @@ module motion
   use kinds, only: wp
   use layer_transit, only: cross_layer, prepare_transit, transit_t
   use motion_state, only: append_word, event_barrier_release, event_chatter_lower, &
-    event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_stick, &
-    event_turning_point, flight_adaptive, flight_exact, log_t, mode_lower_barrier, mode_slip_minus, &
-    mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
+    event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_separation, event_stick, &
+    event_touch_lower, event_touch_upper, event_turning_point, flight_adaptive, flight_exact, log_t, &
+    mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
     record_sample, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
@@ -142,6 +143,13 @@ contains
     logical :: inside
     direction = merge(1, -1, state%mode == mode_slip_plus)
     barrier = merge(moving%machine%contact%upper, moving%machine%contact%lower, direction > 0)
+    if (moving%machine%contact%soft) then
+      if (contact_side(moving%machine%contact, state%x, direction) /= 0) then
+        call press_on(moving, state, time_end, tally, reason, log)
+        return
+      end if
+      barrier = merge(moving%machine%contact%soft_upper, moving%machine%contact%soft_lower, direction > 0)
+    end if
     before = state%time
     inside = moving%layer > 0 .and. abs(state%v) <= moving%layer
     outcome = flight_barrier
@@ -160,7 +168,11 @@ contains
     select case (outcome)
     case (flight_barrier)
       tally%v_max = max(tally%v_max, state%v)
-      call collide(moving, state, direction, time_end, tally, log)
+      if (moving%machine%contact%soft) then
+        call touch(state, direction, tally, log)
+      else
+        call collide(moving, state, direction, time_end, tally, log)
+      end if
     case (flight_speed_reached)
       tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
       call come_to_rest(moving, state, event_turning_point, tally, log)
@@ -168,6 +180,42 @@ contains
       reason = reason_step_failed
     end select
   end subroutine slip_on
+
+  !> A soft barrier is reached: nothing changes but the forces from here on.
+  pure subroutine touch(state, direction, tally, log)
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: direction
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    call count_impact(tally, state, direction)
+    if (present(log)) call record_event(log, merge(event_touch_upper, event_touch_lower, direction > 0), state, state%v)
+  end subroutine touch
+
+  !> One slip against a soft barrier.
+  pure subroutine press_on(moving, state, time_end, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(inout) :: reason
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: before
+    integer :: outcome, direction
+    before = state%time
+    direction = merge(1, -1, state%mode == mode_slip_plus)
+    call fly_contact(moving%machine, moving%options, contact_side(moving%machine%contact, state%x, direction), state, &
+                     time_end, tally, outcome, log)
+    if (state%time > before) tally%slips = tally%slips + 1
+    call note_position(tally, state)
+    select case (outcome)
+    case (flight_barrier)
+      if (present(log)) call record_event(log, event_separation, state, state%v)
+    case (flight_speed_reached)
+      call come_to_rest(moving, state, event_turning_point, tally, log)
+    case (flight_failed)
+      reason = reason_step_failed
+    end select
+  end subroutine press_on
 
   !> A slip within the Stribeck layer, or of a machine without closed form: in one stroke if the body passes straight
   !> through the layer, else by the adaptive flight.
@@ -225,10 +273,7 @@ contains
     type(log_t), intent(inout), optional :: log
     real(wp) :: after, left
     after = velocity_after_impact(moving%machine%contact, state%v)
-    tally%impacts = tally%impacts + 1
-    tally%last_impact_speed = abs(state%v)
-    tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)
-    call append_word(tally, merge(word_upper, word_lower, direction > 0))
+    call count_impact(tally, state, direction)
     if (present(log)) call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), &
                                         state, after)
     state%v = after
@@ -250,6 +295,16 @@ contains
                                         state, 0.0_wp)
     state%time = min(state%time, time_end)
   end subroutine collide
+
+  pure subroutine count_impact(tally, state, direction)
+    type(tally_t), intent(inout) :: tally
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: direction
+    tally%impacts = tally%impacts + 1
+    tally%last_impact_speed = abs(state%v)
+    tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)
+    call append_word(tally, merge(word_upper, word_lower, direction > 0))
+  end subroutine count_impact
 
   !> Zero velocity: the forces choose the next mode. `passing` is the event written down if the body does not stay.
   pure subroutine come_to_rest(moving, state, passing, tally, log)

@@ -5,7 +5,7 @@
 !> fixed positions, crank angle phi = Omega t + phi_0.
 module oscillator
   use constants, only: two_pi
-  use contact_law, only: contact_of, contact_t
+  use contact_law, only: contact_of, contact_t, force_on_body
   use drive_law, only: drive_of, drive_t, foot_motion
   use errors, only: error_t, fail
   use friction_law, only: friction_of, friction_t
@@ -62,7 +62,7 @@ contains
       case ('friction')
         machine%friction = friction_of(choices(i), normal_force)
       case ('contact')
-        machine%contact = contact_of(choices(i))
+        machine%contact = contact_of(choices(i), machine%mass)
       case ('drive')
         machine%drive = drive_of(choices(i))
       end select
@@ -110,6 +110,7 @@ contains
     stretch = machine%restoring%free_length + foot - x
     force = restoring_force(machine%restoring, stretch)
     rate = restoring_stiffness(machine%restoring, stretch)*foot_rate*machine%drive_frequency
+    if (machine%contact%soft) force = force + force_on_body(machine%contact, x, 0.0_wp)
     curvature_bound = machine%restoring%stiffness*machine%foot_acceleration_bound
   end subroutine holding_force
 
