@@ -8,6 +8,8 @@ module trajectory
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
+  use pair_flight, only: body_state
+  use pair_trajectory, only: pair_course_t, run_pair
   use status, only: reason_settled, reason_time_over
   implicit none
   private
@@ -66,6 +68,10 @@ contains
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
     type(course_t) :: course
+    if (allocated(moving%pair)) then
+      call run_two_bodies(moving, span, x, v, crank_angle, outcome, log)
+      return
+    end if
     course%state = start_state(moving, x, v, crank_angle)
     if (present(log)) then
       log%origin = -course%state%time
@@ -90,6 +96,28 @@ contains
     end if
     call conclude(catalogue, course, outcome)
   end subroutine run_trajectory
+
+  !> The same for two bodies, which no attractor captures.
+  pure subroutine run_two_bodies(moving, span, x, v, angle, outcome, log)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    real(wp), intent(in) :: x, v, angle
+    type(outcome_t), intent(inout) :: outcome
+    type(log_t), intent(inout), optional :: log
+    type(pair_course_t) :: course
+    type(state_t) :: body
+    call run_pair(moving%pair, span%duration, span%window, x, v, angle, course, log)
+    body = body_state(course%state)
+    outcome%x = body%x
+    outcome%v = body%v
+    outcome%impacts = course%impacts
+    outcome%last_impact_speed = course%last_impact_speed
+    outcome%reason = merge(course%reason, reason_time_over, course%reason /= 0)
+    if (course%reason /= 0) return
+    outcome%window = regime_of(course%tally, span%window/moving%machine%period)
+    outcome%features = outcome%window
+    outcome%features%word = 0
+  end subroutine run_two_bodies
 
   !> State and counts where the course is now.
   pure subroutine note_state(course, outcome)

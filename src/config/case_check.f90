@@ -11,6 +11,8 @@ module case_check
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
   use lever_reach, only: check_assembly
+  use oscillator, only: refuse_pair
+  use pair, only: build_pair, is_pair, pair_t
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -60,7 +62,8 @@ contains
                   ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
     end if
     if (laws(contact_law)%name /= 'none') call check_barriers(source, laws(contact_law), at)
-    if (laws(drive_law)%name /= 'none' .and. laws(restoring_law)%name /= 'linear') then
+    call check_bodies(source, laws)
+    if (needs_spring(laws(drive_law)%name) .and. laws(restoring_law)%name /= 'linear') then
       call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
                   '", allowed with "linear": the ratio refers to its natural frequency')
     end if
@@ -71,6 +74,26 @@ contains
       call check_lever(source, laws(drive_law), at)
     end select
   end subroutine check_laws
+
+  pure logical function needs_spring(drive)
+    character(len=*), intent(in) :: drive
+    needs_spring = drive == 'harmonic' .or. drive == 'fourier' .or. drive == 'crank_lever_rod'
+  end function needs_spring
+
+  !> One body and two have laws of their own.
+  subroutine check_bodies(source, laws)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: laws(:)
+    type(pair_t) :: pair
+    type(error_t), allocatable :: error
+    if (is_pair(laws)) then
+      call build_pair(laws, pair, error)
+    else
+      call refuse_pair(laws, error)
+    end if
+    if (.not. allocated(error)) return
+    call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:))
+  end subroutine check_bodies
 
   subroutine check_barriers(source, contact, at)
     type(case_source_t), intent(inout) :: source

@@ -18,7 +18,7 @@ module trajectory_driver
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
-  use motion_state, only: event_names, log_t, open_log
+  use motion_state, only: closing_error, event_names, log_t, open_log
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, exit_io, reason_name, reason_time_over
   use text, only: to_text
@@ -66,6 +66,7 @@ contains
     call describe_motion(moving, span, outcome, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
+    if (allocated(moving%pair)) call add_pair(log, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
@@ -114,11 +115,6 @@ contains
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: foot(log%samples)
-    integer :: i
-    do i = 1, log%samples
-      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
-    end do
     call schema%add_dimension('time', int(log%samples, int64))
     call schema%add_variable('time', type_float64, ['time'], units='s', long_name='time since the start', &
                              data=log%sample_data(1, :log%samples))
@@ -126,17 +122,59 @@ contains
                              data=log%sample_data(2, :log%samples))
     call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
                              data=log%sample_data(3, :log%samples))
-    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
-                             data=foot)
+    if (allocated(moving%pair)) then
+      call schema%add_variable('driver_x', type_float64, ['time'], units='m', long_name='position of the driving body', &
+                               data=log%sample_driver(1, :log%samples))
+      call schema%add_variable('driver_v', type_float64, ['time'], units='m/s', long_name='velocity of the driving body', &
+                               data=log%sample_driver(2, :log%samples))
+    else
+      call add_foot(moving, crank_angle, log, schema)
+    end if
     if (moving%machine%contact%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
         long_name='force of the barriers on the body', &
         data=force_on_body(moving%machine%contact, log%sample_data(2, :log%samples), log%sample_data(3, :log%samples)))
     end if
-    call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5], &
-      flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier', &
+    call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5, 6], &
+      flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
       data=real(log%sample_mode(:log%samples), wp))
   end subroutine add_history
+
+  subroutine add_foot(moving, crank_angle, log, schema)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: crank_angle
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: foot(log%samples)
+    integer :: i
+    do i = 1, log%samples
+      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
+    end do
+    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
+                             data=foot)
+  end subroutine add_foot
+
+  !> What only two bodies have: the driving one at the events, and where the energy went.
+  subroutine add_pair(log, schema)
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: driver(2, log%events)
+    driver = 0
+    if (log%events > 0) driver = log%event_driver(:, :log%events)
+    call schema%add_variable('event_driver_x', type_float64, ['event'], units='m', &
+                             long_name='position of the driving body', data=driver(1, :))
+    call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
+                             long_name='velocity of the driving body', data=driver(2, :))
+    associate (book => log%book)
+      call schema%add_attribute('', 'energy_start', book%at_start)
+      call schema%add_attribute('', 'energy_end', book%at_end)
+      call schema%add_attribute('', 'friction_loss', book%friction)
+      call schema%add_attribute('', 'damping_loss', book%damping)
+      call schema%add_attribute('', 'contact_loss', book%contact)
+      call schema%add_attribute('', 'drive_work', book%work)
+      call schema%add_attribute('', 'energy_closing_error', closing_error(book))
+    end associate
+  end subroutine add_pair
 
   !> The events as a table at full precision.
   subroutine write_events(path, log, error)

@@ -21,6 +21,7 @@ module motion
     record_sample, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
+  use pair_modes, only: pair_motion_t
   use rest, only: chatter_time, hold, mode_from_rest
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
     reason_step_failed
@@ -48,6 +49,8 @@ module motion
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
     real(wp) :: layer = 0
+    !> Two bodies, which have an event loop of their own.
+    type(pair_motion_t), allocatable :: pair
   end type motion_t
 
 contains

@@ -8,6 +8,7 @@ module law_table
   use contact_rows, only: contact_laws, contact_parameters
   use kinds, only: wp
   use law_row, only: family_length, law_length, law_row_t, none_above, none_below, parameter_row_t
+  use pair_rows, only: pair_laws, pair_parameters
   use text, only: join
   implicit none
   private
@@ -121,9 +122,11 @@ module law_table
     parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
                     'offset added to the crank angle')]
 
-  type(law_row_t), parameter, public :: laws(size(other_laws) + size(contact_laws)) = [other_laws, contact_laws]
-  type(parameter_row_t), parameter, public :: parameters(size(other_parameters) + size(contact_parameters)) = &
-    [other_parameters, contact_parameters]
+  type(law_row_t), parameter, public :: laws(size(other_laws) + size(contact_laws) + size(pair_laws)) = &
+    [other_laws, contact_laws, pair_laws]
+  type(parameter_row_t), parameter, public :: parameters( &
+    size(other_parameters) + size(contact_parameters) + size(pair_parameters)) = &
+    [other_parameters, contact_parameters, pair_parameters]
 
 contains
 

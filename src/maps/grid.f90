@@ -5,12 +5,12 @@
 !> A slice is one combination of the parameters: one machine, one catalogue of attractors.
 module grid
   use axis, only: axis_t
+  use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: int64, wp
   use law_table, only: change_parameter, law_choice_t
-  use motion, only: motion_t, prepare_motion
+  use motion, only: motion_t
   use motion_state, only: options_t
-  use oscillator, only: build_oscillator, oscillator_t
   implicit none
   private
 
@@ -126,17 +126,6 @@ contains
     call change_parameter(laws, path, value, known)
     call machine_of(laws, grid%options, moving, error)
   end subroutine machine_with
-
-  pure subroutine machine_of(laws, options, moving, error)
-    type(law_choice_t), intent(in) :: laws(:)
-    type(options_t), intent(in) :: options
-    type(motion_t), intent(out) :: moving
-    type(error_t), allocatable, intent(out) :: error
-    type(oscillator_t) :: machine
-    call build_oscillator(laws, machine, error)
-    if (allocated(error)) return
-    call prepare_motion(machine, options, moving, error)
-  end subroutine machine_of
 
   !> Slices next to `slice` along each parameter axis, last axis first: those before it, and with `both` those behind it.
   pure function slice_neighbours(grid, slice, both) result(neighbours)

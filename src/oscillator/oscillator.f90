@@ -16,7 +16,7 @@ module oscillator
   implicit none
   private
 
-  public :: build_oscillator, holding_force
+  public :: build_oscillator, refuse_pair, holding_force
 
   type, public :: oscillator_t
     !> Mass [kg].
@@ -50,6 +50,8 @@ contains
     real(wp) :: normal_force
     integer :: i, n
     normal_force = 0
+    call refuse_pair(choices, error)
+    if (allocated(error)) return
     do i = 1, size(choices)
       if (choices(i)%family /= 'body') cycle
       machine%mass = value_of(choices(i), 'mass')
@@ -97,6 +99,23 @@ contains
       + abs(machine%drive%mean) + sum(abs(machine%drive%cosine)) + sum(abs(machine%drive%sine))) &
       + machine%friction%break_away
   end subroutine build_oscillator
+
+  !> One body has no place for the laws of two. The message begins with the key.
+  pure subroutine refuse_pair(choices, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    do i = 1, size(choices)
+      if (allocated(error)) return
+      select case (choices(i)%name)
+      case ('friction_pair', 'backlash_pair')
+        call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
+      case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')
+        call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with two bodies '// &
+                  '(body.law = "friction_pair" or "backlash_pair")')
+      end select
+    end do
+  end subroutine refuse_pair
 
   !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
   !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
