@@ -4,7 +4,8 @@
 !> One trajectory from its start to its label: a pure function of the machine, the frozen catalogue and
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
-  use attractors, only: attractor_t, features_t, find_box, find_capture, regime_of
+  use attractors, only: attractor_t, features_t, find_box, find_capture, regime_at_rest, regime_of, &
+    regime_stuck
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
@@ -115,6 +116,7 @@ contains
     outcome%reason = merge(course%reason, reason_time_over, course%reason /= 0)
     if (course%reason /= 0) return
     outcome%window = regime_of(course%tally, span%window/moving%machine%period)
+    if (outcome%window%regime == regime_at_rest) outcome%window%regime = regime_stuck
     outcome%features = outcome%window
     outcome%features%word = 0
   end subroutine run_two_bodies

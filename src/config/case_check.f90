@@ -280,8 +280,10 @@ contains
     type(axis_t), intent(in) :: axes(:)
     real(wp), intent(in) :: x
     character(len=:), allocatable :: problem
-    real(wp) :: upper, lower
+    real(wp) :: upper, lower, driver
     integer :: i
+    driver = 0
+    if (the_case%laws(1)%name == 'backlash_pair') driver = parameter_value(the_case%laws, 'body.driver_x0', 0.0_wp)
     upper = parameter_value(the_case%laws, 'contact.upper', huge(1.0_wp))
     lower = parameter_value(the_case%laws, 'contact.lower', -huge(1.0_wp))
     do i = 1, size(axes)
@@ -289,10 +291,10 @@ contains
       if (axes(i)%name == 'contact.lower') lower = maxval(axes(i)%values)
     end do
     problem = ''
-    if (x > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier contact.upper = '// &
-                             to_text(upper)//' m'
-    if (x < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier contact.lower = '// &
-                             to_text(lower)//' m'
+    if (x - driver > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier contact.upper = '// &
+                                      to_text(upper)//' m'
+    if (x - driver < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier contact.lower = '// &
+                                      to_text(lower)//' m'
   end function beyond
 
   !> A basin needs two axes or more. Code 65.
@@ -309,7 +311,10 @@ contains
   subroutine require_sweep(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    if (.not. the_case%sweep%present) then
+    if (is_pair(the_case%laws)) then
+      call fail(error, exit_bad_case, the_case%path//': key ''body.law'': found "'//trim(the_case%laws(1)%name)// &
+                '", allowed for a sweep point_mass; a basin over parameters shows the regimes of two bodies')
+    else if (.not. the_case%sweep%present) then
       call fail(error, exit_bad_case, the_case%path//': a sweep needs a table [sweep]')
     else
       call allow_start(the_case, [the_case%sweep%swept], error)

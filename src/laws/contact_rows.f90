@@ -24,6 +24,7 @@ module contact_rows
   character(len=law_length), parameter :: barrier_laws(14) = [character(len=law_length) :: &
     'newton', 'newton_linear', 'newton_power', 'newton_viscoelastic', soft_laws]
 
+  character(len=*), parameter :: goldsmith = 'Goldsmith, Impact (1960)'
   character(len=*), parameter :: formula_meaning = 'K p^n (1 + d p''/speed), '
 
   type(law_row_t), parameter, public :: contact_laws(15) = [ &
@@ -35,8 +36,8 @@ module contact_rows
               'Johnson, Contact Mechanics (1985), 11.5'), &
     law_row_t('contact', 'newton_viscoelastic', 'rigid barrier: k = 1 - g1 v^(1/5) + g2 v^(2/5), within 0 and 1', &
               'Ramirez, Poeschel, Brilliantov, Schwager, Phys. Rev. E 60 (1999) 4465'), &
-    law_row_t('contact', 'kelvin_voigt', 'K p + D p''; jumps to D p'' at first touch', ''), &
-    law_row_t('contact', 'kelvin_voigt_restitution', 'K p + D p'' with the D that gives the free body a restitution', ''), &
+    law_row_t('contact', 'kelvin_voigt', 'K p + D p''; jumps to D p'' at first touch', goldsmith), &
+    law_row_t('contact', 'kelvin_voigt_restitution', 'K p + D p'' with the D that gives the free body a restitution', goldsmith), &
     law_row_t('contact', 'hunt_crossley', 'K p^n (1 + a p''), never pulls', 'Hunt, Crossley, J. Appl. Mech. 42 (1975)'), &
     law_row_t('contact', 'hunt_crossley_exact', formula_meaning//'ln(1+d) - ln(1-ed) = d(1+e)', &
               'compare Zhang, Sharf, J. Appl. Mech. 76 (2009)'), &

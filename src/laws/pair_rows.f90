@@ -11,6 +11,7 @@ module pair_rows
   integer :: i
 
   character(len=*), parameter :: source = 'Ruderman, Zagvozdkin, Rachinskii, IEEE CDC (2022), arXiv:2202.13913'
+  character(len=*), parameter :: experiments = 'Ruderman, De Rito, arXiv:2501.03653 (2025)'
 
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'friction_pair', 'backlash_pair']
   character(len=law_length), parameter :: at_speed(2) = [character(len=law_length) :: 'velocity', 'pid_velocity']
@@ -20,11 +21,12 @@ module pair_rows
   type(law_row_t), parameter, public :: pair_laws(7) = [ &
     law_row_t('body', 'friction_pair', 'two bodies coupled by b sgn(v1 - v2) alone; barriers bound x2', source), &
     law_row_t('body', 'backlash_pair', 'the same; barriers carried by the driving body bound x2 - x1', source), &
-    law_row_t('drive', 'force', 'two bodies: force mean + amplitude cos(frequency t) on the driving one', ''), &
-    law_row_t('drive', 'velocity', 'two bodies: the driving one moves at a constant velocity', ''), &
-    law_row_t('drive', 'sine', 'two bodies: the driving one moves as amplitude sin(frequency t)', ''), &
-    law_row_t('drive', 'pid_velocity', 'two bodies: a controller moves the driving one along velocity t', ''), &
-    law_row_t('drive', 'pid_sine', 'two bodies: a controller moves the driving one along amplitude sin(frequency t)', '')]
+    law_row_t('drive', 'force', 'two bodies: force mean + amplitude cos(frequency t) on the driving one', source), &
+    law_row_t('drive', 'velocity', 'two bodies: the driving one moves at a constant velocity', experiments), &
+    law_row_t('drive', 'sine', 'two bodies: the driving one moves as amplitude sin(frequency t)', source), &
+    law_row_t('drive', 'pid_velocity', 'two bodies: a controller moves the driving one along velocity t', experiments), &
+    law_row_t('drive', 'pid_sine', 'two bodies: a controller moves the driving one along amplitude sin(frequency t)', &
+              experiments)]
 
   type(parameter_row_t), parameter, public :: pair_parameters(31) = [ &
     (parameter_row_t('body', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
