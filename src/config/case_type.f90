@@ -67,6 +67,12 @@ module case_type
     integer :: samples_per_period = 200
   end type trajectory_t
 
+  !> A sensor: samples per second, noise (one sigma), resolution and delay.
+  type, public :: record_t
+    real(wp) :: rate = 2000, noise = 0, resolution = 0, delay = 0
+    integer :: seed = 1
+  end type record_t
+
   type, public :: case_t
     character(len=:), allocatable :: title
     !> Name of the file and its text as read.
@@ -83,6 +89,7 @@ module case_type
     integer, allocatable :: tile(:)
     type(sweep_t) :: sweep
     type(trajectory_t) :: trajectory
+    type(record_t) :: record
   end type case_t
 
 end module case_type

@@ -24,7 +24,7 @@ module command_line
     character(len=:), allocatable :: name
     !> The case, or the file of `info` and `verify`.
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: output, list, csv
+    character(len=:), allocatable :: output, list, csv, record
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -48,6 +48,7 @@ contains
     command%output = ''
     command%list = ''
     command%csv = ''
+    command%record = ''
     allocate (command%overrides(0))
     position = 0
     do while (position < command_argument_count())
@@ -87,6 +88,8 @@ contains
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. command%name /= 'points' .and. command%name /= 'trajectory') then
       call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
+    else if (len(command%record) > 0 .and. command%name /= 'trajectory') then
+      call fail(error, exit_usage, '--record belongs to the command trajectory')
     else if (command%resume .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
     else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
@@ -108,6 +111,9 @@ contains
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
     else if (len(command%csv) > 0 .and. command%csv == command%output) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' is the file of -o")
+    else if (len(command%record) > 0 .and. (command%record == command%path .or. command%record == command%output .or. &
+                                            command%record == command%csv)) then
+      call fail(error, exit_usage, "--record '"//command%record//"' would replace another file of the command")
     end if
   end subroutine check_outputs
 
@@ -139,7 +145,7 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--time-limit', '--ranks-per-node', '--sample', &
+    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--time-limit', '--ranks-per-node', '--sample', &
           '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
@@ -165,7 +171,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv')
+    case ('-o', '--output', '--list', '--csv', '--record')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -191,6 +197,8 @@ contains
       command%list = value
     case ('--csv')
       command%csv = value
+    case ('--record')
+      command%record = value
     case default
       command%output = value
     end select
@@ -248,8 +256,9 @@ contains
         '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
         '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl
     case ('trajectory')
-      lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE]: one motion with all its events'//nl// &
-        '  --csv FILE      also write the events as a table'//nl
+      lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
+        '  --csv FILE      also write the events as a table'//nl// &
+        '  --record FILE   also write the position as the sensor of the table [record] would measure it'//nl
     case ('points')
       lines = 'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
         '  --list FILE     table with the columns x0,v0 and optionally ratio; replaces the grid of the case'//nl// &

@@ -93,8 +93,8 @@ contains
     else
       call check_result(path, command%force, error)
     end if
-    if (allocated(error) .or. len(command%csv) == 0) return
-    call check_table(command%csv, command%force, error)
+    if (.not. allocated(error) .and. len(command%csv) > 0) call check_table(command%csv, command%force, error)
+    if (.not. allocated(error) .and. len(command%record) > 0) call check_table(command%record, command%force, error)
   end subroutine check_outputs
 
   !> Attributes and texts that every file carries. `inputs` stands for what besides the case decides the results.

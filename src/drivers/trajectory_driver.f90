@@ -19,6 +19,7 @@ module trajectory_driver
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
   use motion_state, only: closing_error, event_names, log_t, open_log
+  use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, exit_io, reason_name, reason_time_over
   use text, only: to_text
@@ -71,6 +72,9 @@ contains
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
       if (.not. allocated(error) .and. len(command%csv) > 0) call write_events(command%csv, log, error)
+      if (.not. allocated(error) .and. len(command%record) > 0) then
+        call write_record(command%record, session%the_case, moving, grid%start, error)
+      end if
     end if
     call session%stop_if(error)
     call report(session, moving, outcome, log, path)
