@@ -54,7 +54,8 @@ contains
     if (course%tally%impacts > 0) course%last_impact_speed = course%tally%last_impact_speed
     if (.not. present(log)) return
     log%book%at_end = energy_of(moving, course%state)
-    if (log%sample_interval > 0) call record_sample(log, body_state(course%state), driver_of(course%state))
+    if (log%sample_interval > 0) call record_sample(log, body_state(course%state), &
+                                                    driver_of(course%state), log%book)
   end subroutine run_pair
 
   pure real(wp) function x_of(course)

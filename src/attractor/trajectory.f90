@@ -6,6 +6,7 @@
 module trajectory
   use attractors, only: attractor_t, features_t, find_box, find_capture, regime_at_rest, regime_of, &
     regime_stuck
+  use energy, only: energy_of_body
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
@@ -75,6 +76,7 @@ contains
     end if
     course%state = start_state(moving, x, v, crank_angle)
     if (present(log)) then
+      log%book%at_start = energy_of_body(moving%machine, course%state)
       log%origin = -course%state%time
       if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
     end if
@@ -90,6 +92,7 @@ contains
     outcome%window = regime_of(course%tally, span%window/moving%machine%period)
     call note_state(course, outcome)
     if (present(log)) then
+      log%book%at_end = energy_of_body(moving%machine, course%state)
       if (log%sample_interval > 0) call record_sample(log, course%state)
     end if
     if (course%reason == 0 .and. course%captured == 0 .and. size(catalogue) > 0) then

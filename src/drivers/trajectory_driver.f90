@@ -18,7 +18,7 @@ module trajectory_driver
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
-  use motion_state, only: closing_error, event_names, log_t, open_log
+  use motion_state, only: book_t, closing_error, event_names, log_t, open_log
   use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, exit_io, reason_name, reason_time_over
@@ -68,6 +68,7 @@ contains
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     if (allocated(moving%pair)) call add_pair(log, schema)
+    call add_book(log%book, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
@@ -158,7 +159,20 @@ contains
                              data=foot)
   end subroutine add_foot
 
-  !> What only two bodies have: the driving one at the events, and where the energy went.
+  !> Where the energy went by the end.
+  subroutine add_book(book, schema)
+    type(book_t), intent(in) :: book
+    type(schema_t), intent(inout) :: schema
+    call schema%add_attribute('', 'energy_start', book%at_start)
+    call schema%add_attribute('', 'energy_end', book%at_end)
+    call schema%add_attribute('', 'energy_lost_to_friction', book%friction)
+    call schema%add_attribute('', 'energy_lost_to_damping', book%damping)
+    call schema%add_attribute('', 'energy_lost_to_contacts', book%contact)
+    call schema%add_attribute('', 'energy_put_in', book%work)
+    call schema%add_attribute('', 'energy_closing_error', closing_error(book))
+  end subroutine add_book
+
+  !> What only two bodies have: the driving one at the events, and where the energy went over time.
   subroutine add_pair(log, schema)
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
@@ -169,15 +183,21 @@ contains
                              long_name='position of the driving body', data=driver(1, :))
     call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
                              long_name='velocity of the driving body', data=driver(2, :))
-    associate (book => log%book)
-      call schema%add_attribute('', 'energy_start', book%at_start)
-      call schema%add_attribute('', 'energy_end', book%at_end)
-      call schema%add_attribute('', 'friction_loss', book%friction)
-      call schema%add_attribute('', 'damping_loss', book%damping)
-      call schema%add_attribute('', 'contact_loss', book%contact)
-      call schema%add_attribute('', 'drive_work', book%work)
-      call schema%add_attribute('', 'energy_closing_error', closing_error(book))
-    end associate
+    call add('energy', 5, 'energy of spring and bodies')
+    call add('friction_loss', 1, 'energy lost to dry friction since the start')
+    call add('damping_loss', 2, 'energy lost to viscous damping since the start')
+    call add('contact_loss', 3, 'energy lost to impacts since the start')
+    call add('drive_work', 4, 'work of drive and blows since the start')
+
+  contains
+
+    subroutine add(name, row, long_name)
+      character(len=*), intent(in) :: name, long_name
+      integer, intent(in) :: row
+      call schema%add_variable(name, type_float64, ['time'], units='J', long_name=long_name, &
+                               data=log%sample_book(row, :log%samples))
+    end subroutine add
+
   end subroutine add_pair
 
   !> The events as a table at full precision.

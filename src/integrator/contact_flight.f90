@@ -7,6 +7,7 @@
 module contact_flight
   use contact_law, only: contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion
+  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: sliding_friction
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
@@ -79,7 +80,7 @@ contains
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       call take_step(march, pressed, guards, time_end - pressed%start, fallen)
-      call look_along(march, pressed, tally, log)
+      call look_along(march, pressed, time_end, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing
         guards = guards_of(pressed)
@@ -89,7 +90,10 @@ contains
         exit
       end if
     end do
-    if (present(log)) log%contact_work = log%contact_work + march%y(3)
+    if (present(log)) then
+      log%contact_work = log%contact_work + march%y(3)
+      log%book%contact = log%book%contact + march%y(3)
+    end if
     state%time = merge(time_end, min(pressed%start + march%time, time_end), fallen == march_time_over)
     state%x = pressed%surface + side*march%y(1)
     state%v = side*march%y(2)
@@ -172,18 +176,26 @@ contains
   end subroutine sizes_of
 
   !> Samples and extremes of the step behind.
-  pure subroutine look_along(march, pressed, tally, log)
+  pure subroutine look_along(march, pressed, time_end, tally, log)
     type(march_t), intent(in) :: march
     type(pressed_t), intent(in) :: pressed
+    real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
     real(wp) :: t
+    integer :: k
     if (.not. march%fraction > 0) return
     if (tally%wants_v_max .and. pressed%direction > 0) then
       tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
+    do k = 1, gauss_points
+      t = march%fraction*gauss_place(k)
+      call book_instant(pressed%machine, pressed%start + march%from + t*march%length, &
+                        pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
+                        pressed%side*value_at(march%path(:, 2), t), march%fraction*march%length*gauss_weight(k), log%book)
+    end do
     log%peak_penetration = max(log%peak_penetration, march%y(1))
     if (pressed%pushing) call raise_peak_force(march, pressed%machine%contact, log%peak_force)
     if (log%sample_interval <= 0) return
@@ -191,7 +203,8 @@ contains
     do
       sample%time = log%next_sample*log%sample_interval
       t = (sample%time - pressed%start - march%from)/march%length
-      if (t >= march%fraction) exit
+      ! The end of a period is the first sample of the next.
+      if (t >= march%fraction .or. sample%time >= time_end) exit
       sample%x = pressed%surface + pressed%side*value_at(march%path(:, 1), t)
       sample%v = pressed%side*value_at(march%path(:, 2), t)
       call record_sample(log, sample)

@@ -8,6 +8,7 @@ module motion
   use constants, only: two_pi
   use contact_flight, only: contact_side, fly_contact
   use contact_law, only: velocity_after_impact
+  use energy, only: book_exact, book_rest
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
@@ -141,6 +142,7 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
+    type(state_t) :: start
     real(wp) :: barrier, before
     integer :: outcome, direction
     logical :: inside
@@ -158,7 +160,9 @@ contains
     outcome = flight_barrier
     if (direction*(state%x - barrier) < 0) then
       if (moving%exact .and. .not. inside) then
+        start = state
         call fly_exact(moving%flow, state, time_end, moving%layer, barrier, tally, outcome, log)
+        if (present(log)) call book_exact(moving%machine, moving%flow, start, direction, state%time, log%book)
         if (outcome == flight_speed_reached .and. moving%layer > 0) outcome = flight_layer_left
       else
         call cross(moving, state, direction, time_end, barrier, tally, outcome, log)
@@ -252,7 +256,7 @@ contains
     if (direction > 0) tally%v_max = max(tally%v_max, state%v)
   end subroutine cross
 
-  !> Writes down the samples that fall into a crossing, from a copy flown adaptively.
+  !> Writes down the samples and the energy of a crossing, from a copy flown adaptively.
   pure subroutine sample_crossing(moving, state, time_end, barrier, log)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(in) :: state
@@ -261,7 +265,6 @@ contains
     type(state_t) :: copy
     type(tally_t) :: unused
     integer :: outcome
-    if (log%sample_interval <= 0 .or. log%next_sample*log%sample_interval >= time_end) return
     copy = state
     call fly_adaptive(moving%machine, moving%options, copy, time_end, huge(1.0_wp), barrier, unused, outcome, log)
   end subroutine sample_crossing
@@ -274,11 +277,14 @@ contains
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
+    type(state_t) :: before
     real(wp) :: after, left
     after = velocity_after_impact(moving%machine%contact, state%v)
     call count_impact(tally, state, direction)
-    if (present(log)) call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), &
-                                        state, after)
+    if (present(log)) then
+      log%book%contact = log%book%contact + 0.5_wp*moving%machine%mass*(state%v**2 - after**2)
+      call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), state, after)
+    end if
     state%v = after
     state%mode = merge(mode_slip_minus, mode_slip_plus, direction > 0)
     if (.not. abs(after) > 0) then
@@ -290,6 +296,8 @@ contains
     tally%chatters = tally%chatters + 1
     tally%sticks = tally%sticks + 1
     ! The log has the instant of accumulation even where the clock stops before it.
+    if (present(log)) log%book%contact = log%book%contact + 0.5_wp*moving%machine%mass*after**2
+    before = state
     state%time = state%time + left
     state%v = 0
     state%mode = merge(mode_upper_barrier, mode_lower_barrier, direction > 0)
@@ -297,6 +305,7 @@ contains
     if (present(log)) call record_event(log, merge(event_chatter_upper, event_chatter_lower, direction > 0), &
                                         state, 0.0_wp)
     state%time = min(state%time, time_end)
+    if (present(log)) call book_rest(moving%machine, before, state, log%book)
   end subroutine collide
 
   pure subroutine count_impact(tally, state, direction)
@@ -341,6 +350,7 @@ contains
     tally%v_max = max(tally%v_max, 0.0_wp)
     call hold(moving%machine, state, time_end)
     if (.not. present(log)) return
+    call book_rest(moving%machine, start, state, log%book)
     if (log%sample_interval > 0) then
       sample = start
       do

@@ -88,7 +88,9 @@ module motion_state
     real(wp) :: peak_force = 0, peak_penetration = 0, contact_work = 0
     !> Position and velocity of the driving body of two, at events and at samples.
     real(wp), allocatable :: event_driver(:, :), sample_driver(:, :)
+    !> Where the energy went until now, and until each sample: rows as in `book_t`, `at_end` being the energy then.
     type(book_t) :: book
+    real(wp), allocatable :: sample_book(:, :)
   end type log_t
 
 contains
@@ -169,14 +171,15 @@ contains
     log%events = log%events + 1
     log%event_kind(log%events) = kind
     log%event_data(:, log%events) = [log%origin + state%time, state%x, state%v, v_after]
-    if (present(driver)) call append_driver(log%event_driver, log%events, driver)
+    if (present(driver)) call put_column(log%event_driver, log%events, driver)
   end subroutine record_event
 
-  !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two.
-  pure subroutine record_sample(log, state, driver)
+  !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two, `book` the energy.
+  pure subroutine record_sample(log, state, driver, book)
     type(log_t), intent(inout) :: log
     type(state_t), intent(in) :: state
     real(wp), intent(in), optional :: driver(2)
+    type(book_t), intent(in), optional :: book
     integer, allocatable :: modes_grown(:)
     real(wp), allocatable :: data_grown(:, :)
     if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
@@ -191,22 +194,24 @@ contains
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
     log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
-    if (present(driver)) call append_driver(log%sample_driver, log%samples, driver)
+    if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
+    if (present(book)) call put_column(log%sample_book, log%samples, &
+                                       [book%friction, book%damping, book%contact, book%work, book%at_end])
   end subroutine record_sample
 
-  !> Puts x, v of the driving body into column `column`, the one after the last.
-  pure subroutine append_driver(columns, column, driver)
+  !> Puts values into column `column`, the one after the last.
+  pure subroutine put_column(columns, column, values)
     real(wp), allocatable, intent(inout) :: columns(:, :)
     integer, intent(in) :: column
-    real(wp), intent(in) :: driver(2)
+    real(wp), intent(in) :: values(:)
     real(wp), allocatable :: grown(:, :)
-    if (.not. allocated(columns)) allocate (columns(2, 256))
+    if (.not. allocated(columns)) allocate (columns(size(values), 256))
     if (column > size(columns, 2)) then
-      allocate (grown(2, 2*size(columns, 2)))
+      allocate (grown(size(values), 2*size(columns, 2)))
       grown(:, :size(columns, 2)) = columns
       call move_alloc(grown, columns)
     end if
-    columns(:, column) = driver
-  end subroutine append_driver
+    columns(:, column) = values
+  end subroutine put_column
 
 end module motion_state

@@ -7,7 +7,7 @@ module pair_flight
   use kinds, only: wp
   use linear_flow, only: expand, first_zero, most_unknowns, order, product_integral, series_of, series_value, state_at, &
     stretch_t
-  use motion_state, only: log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
+  use motion_state, only: book_t, log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
     state_t, tally_t
   use pair, only: driven_by_motion
   use pair_modes, only: at_one, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of
@@ -169,10 +169,12 @@ contains
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(pair_state_t) :: sample
+    type(book_t) :: book
     real(wp) :: t
     call note_extremes(stretch, last, tally)
     if (.not. present(log)) return
-    call book_stretch(moving, state, stretch, last, log)
+    book = log%book
+    call book_stretch(moving, state, stretch, last, log%book)
     if (log%sample_interval <= 0) return
     do
       sample = state
@@ -180,9 +182,24 @@ contains
       if (sample%time >= state%time + last*stretch%length) exit
       t = max(0.0_wp, (sample%time - state%time)/stretch%length)
       sample%y = state_at(stretch, t)
-      call record_sample(log, body_state(sample), driver_of(sample))
+      call record_at(moving, state, stretch, t, book, sample, log)
     end do
   end subroutine look_along
+
+  !> Writes down a sample at a fraction of a stretch, `book` being that at its start.
+  pure subroutine record_at(moving, state, stretch, t, book, sample, log)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state, sample
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: t
+    type(book_t), intent(in) :: book
+    type(log_t), intent(inout) :: log
+    type(book_t) :: now
+    now = book
+    call book_stretch(moving, state, stretch, t, now)
+    now%at_end = energy_of(moving, sample)
+    call record_sample(log, body_state(sample), driver_of(sample), now)
+  end subroutine record_at
 
   !> Turning points and largest velocity of m2.
   pure subroutine note_extremes(stretch, last, tally)
@@ -209,18 +226,18 @@ contains
   end subroutine note_extremes
 
   !> Where the energy of a stretch went.
-  pure subroutine book_stretch(moving, state, stretch, last, log)
+  pure subroutine book_stretch(moving, state, stretch, last, book)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(in) :: state
     type(stretch_t), intent(in) :: stretch
     real(wp), intent(in) :: last
-    type(log_t), intent(inout) :: log
+    type(book_t), intent(inout) :: book
     real(wp) :: change(most_unknowns), end_state(most_unknowns), v1(0:order)
     integer :: s
     end_state = state_at(stretch, last)
     change = end_state - stretch%path(0, :)
     s = sense_of(state%mode)
-    associate (machine => moving%machine, book => log%book)
+    associate (machine => moving%machine)
       book%friction = book%friction + s*machine%friction*(change(at_x1) - change(at_x2))
       if (machine%drive == driven_by_motion) then
         book%work = book%work + s*machine%friction*change(at_x1)

@@ -137,7 +137,9 @@ def test_two_bodies_are_asked_for_what_they_have(separatrix, case):
 def test_book_of_energy(separatrix, case):
     succeed(separatrix, "trajectory", "case.toml", folder=case)
     with h5py.File(case / "case.h5") as file:
-        book = {name: file.attrs[name] for name in file.attrs}
+        book = dict(file.attrs)
+        names = ("energy", "friction_loss", "damping_loss", "contact_loss", "drive_work")
+        losses = {name: file[name][:] for name in names}
         assert file["mode"][-1] == 4
         assert file["x"][-1] == 1
         names = file["event_kind"].attrs["flag_meanings"].split()
@@ -145,4 +147,10 @@ def test_book_of_energy(separatrix, case):
         assert file["event_time"][-1] == pytest.approx(2 + 2 * 0.7 * 0.5 * 0.6 / (0.3 * 0.4), abs=1e-10)
     assert book["energy_start"] == 0.5 * 0.7 * 0.25
     assert abs(book["energy_closing_error"]) < 1e-12
-    assert book["contact_loss"] > 0
+    assert losses["contact_loss"][-1] > 0
+    turned = losses["energy"][0] + losses["drive_work"]
+    assert turned == pytest.approx(
+        losses["energy"] + losses["friction_loss"] + losses["damping_loss"] + losses["contact_loss"],
+        abs=1e-12,
+    )
+    assert np.all(np.diff(losses["friction_loss"]) >= 0)
