@@ -12,7 +12,8 @@ module adaptive_flight
     flight_time_over
   use friction_law, only: sliding_friction
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_plus, options_t, record_sample, state_t, tally_t
+  use motion_state, only: log_t, mode_slip_plus, options_t, record_sample, sample_due, sample_time, state_t, &
+    tally_t
   use oscillator, only: oscillator_t
   use polynomial, only: degree, first_fall, maximum_until, value_at
   use restoring_law, only: restoring_force
@@ -290,8 +291,8 @@ contains
     if (log%sample_interval <= 0) return
     do
       sample = state
-      sample%time = log%next_sample*log%sample_interval
-      if (sample%time >= state%time + fraction*h) exit
+      sample%time = sample_time(log)
+      if (.not. sample_due(log, state%time + fraction*h)) exit
       sample%x = value_at(path(:, 1), (sample%time - state%time)/h)
       sample%v = value_at(path(:, 2), (sample%time - state%time)/h)
       call record_sample(log, sample)

@@ -13,7 +13,8 @@ module contact_flight
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
     take_step
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, state_t, tally_t
+  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, sample_due, &
+    sample_time, state_t, tally_t
   use oscillator, only: oscillator_t
   use polynomial, only: maximum_until, value_at
   use restoring_law, only: restoring_force
@@ -80,7 +81,7 @@ contains
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       call take_step(march, pressed, guards, time_end - pressed%start, fallen)
-      call look_along(march, pressed, time_end, tally, log)
+      call look_along(march, pressed, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing
         guards = guards_of(pressed)
@@ -176,10 +177,9 @@ contains
   end subroutine sizes_of
 
   !> Samples and extremes of the step behind.
-  pure subroutine look_along(march, pressed, time_end, tally, log)
+  pure subroutine look_along(march, pressed, tally, log)
     type(march_t), intent(in) :: march
     type(pressed_t), intent(in) :: pressed
-    real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
@@ -201,10 +201,9 @@ contains
     if (log%sample_interval <= 0) return
     sample%mode = merge(mode_slip_plus, mode_slip_minus, pressed%direction > 0)
     do
-      sample%time = log%next_sample*log%sample_interval
-      t = (sample%time - pressed%start - march%from)/march%length
-      ! The end of a period is the first sample of the next.
-      if (t >= march%fraction .or. sample%time >= time_end) exit
+      sample%time = sample_time(log)
+      t = max(0.0_wp, (sample%time - pressed%start - march%from)/march%length)
+      if (t >= march%fraction .or. .not. sample_due(log, pressed%start + march%time)) exit
       sample%x = pressed%surface + pressed%side*value_at(march%path(:, 1), t)
       sample%v = pressed%side*value_at(march%path(:, 2), t)
       call record_sample(log, sample)

@@ -19,7 +19,7 @@ module motion
     event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_separation, event_stick, &
     event_touch_lower, event_touch_upper, event_turning_point, flight_adaptive, flight_exact, log_t, &
     mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
-    record_sample, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+    record_sample, sample_due, sample_time, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
   use pair_modes, only: pair_motion_t
@@ -354,8 +354,8 @@ contains
     if (log%sample_interval > 0) then
       sample = start
       do
-        sample%time = log%next_sample*log%sample_interval
-        if (sample%time >= state%time) exit
+        sample%time = sample_time(log)
+        if (.not. sample_due(log, state%time)) exit
         call record_sample(log, sample)
       end do
     end if

@@ -8,7 +8,7 @@ module motion_state
   implicit none
   private
 
-  public :: closing_error, reset_tally, note_position, append_word, open_log, record_event, record_sample
+  public :: sample_time, sample_due, closing_error, reset_tally, note_position, append_word, open_log, record_event, record_sample
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -94,6 +94,20 @@ module motion_state
   end type log_t
 
 contains
+
+  !> Time of the next sample [s after the section].
+  pure real(wp) function sample_time(log)
+    type(log_t), intent(in) :: log
+    sample_time = log%next_sample*log%sample_interval
+  end function sample_time
+
+  !> Whether the next sample comes before `until` [s after the section] by more than rounding: the end of a period is the
+  !> first sample of the next.
+  pure logical function sample_due(log, until)
+    type(log_t), intent(in) :: log
+    real(wp), intent(in) :: until
+    sample_due = sample_time(log) < until*(1 - 8*epsilon(until))
+  end function sample_due
 
   !> What is missing in a book [J].
   pure elemental real(wp) function closing_error(book)

@@ -8,7 +8,7 @@ module pair_flight
   use linear_flow, only: expand, first_zero, most_unknowns, order, product_integral, series_of, series_value, state_at, &
     stretch_t
   use motion_state, only: book_t, log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
-    state_t, tally_t
+    sample_due, sample_time, state_t, tally_t
   use pair, only: driven_by_motion
   use pair_modes, only: at_one, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of
   implicit none
@@ -178,8 +178,8 @@ contains
     if (log%sample_interval <= 0) return
     do
       sample = state
-      sample%time = log%next_sample*log%sample_interval
-      if (sample%time >= state%time + last*stretch%length) exit
+      sample%time = sample_time(log)
+      if (.not. sample_due(log, state%time + last*stretch%length)) exit
       t = max(0.0_wp, (sample%time - state%time)/stretch%length)
       sample%y = state_at(stretch, t)
       call record_at(moving, state, stretch, t, book, sample, log)
