@@ -3,7 +3,8 @@
 
 !> One slip by the embedded Runge-Kutta pair of `dormand_prince_table`, for whatever is not linear. Events
 !> are isolated on the continuous extension by its Bernstein coefficients, then the step is taken
-!> again to the event itself, so that the state carries the error of the method and not of the extension.
+!> again to the event itself, so that the state carries the error of the method and not of the extension. The same
+!> as `guarded_march` to the bit, but for two unknowns only and faster: basins with a Stribeck layer need it.
 module adaptive_flight
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use drive_law, only: foot_motion
