@@ -67,7 +67,7 @@ contains
     type(pressed_t) :: pressed
     type(march_t) :: march
     type(guard_t) :: guards(cut)
-    real(wp) :: y(3), scale(3), duration
+    real(wp) :: y(3), scale(3), duration, time
     integer :: fallen
     pressed%machine = machine
     pressed%side = side
@@ -86,7 +86,8 @@ contains
         pressed%pushing = .not. pressed%pushing
         guards = guards_of(pressed)
         y = march%y(:3)
-        call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, march%time, y)
+        time = march%time
+        call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, time, y)
       else if (fallen /= march_goes_on) then
         exit
       end if
