@@ -19,5 +19,7 @@ add_library(separatrix_strict INTERFACE)
 target_compile_options(separatrix_strict INTERFACE
   -ffp-contract=off
   "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2018;-fimplicit-none;-Wall;-Wextra;-Wno-compare-reals;-Wno-maybe-uninitialized;-Wno-uninitialized;-Werror=implicit-interface;-ffree-line-length-132>"
-  "$<$<COMPILE_LANGUAGE:C>:-Wall;-Wextra>"
+  "$<$<COMPILE_LANGUAGE:C,CXX>:-Wall;-Wextra>"
+  # Vectors are passed between functions that are always inlined.
+  "$<$<COMPILE_LANGUAGE:CXX>:-Wno-psabi>"
   "$<$<AND:$<CONFIG:Debug>,$<COMPILE_LANGUAGE:Fortran>>:-fcheck=all;-fbacktrace>")

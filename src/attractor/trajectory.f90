@@ -16,7 +16,7 @@ module trajectory
   implicit none
   private
 
-  public :: run_trajectory
+  public :: run_trajectory, begin_course, go_to_stop, pass_stop, conclude
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -44,14 +44,20 @@ module trajectory
     real(wp) :: last_impact_speed = 0
   end type outcome_t
 
-  !> A trajectory under way.
-  type :: course_t
+  !> Parts of a trajectory: up to the window, the window, and on until captured.
+  integer, parameter, public :: phase_transient = 1, phase_window = 2, phase_extension = 3, phase_over = 4
+
+  !> A trajectory under way. It moves from stop to stop: the stroboscopic sections, and the ends of its phases.
+  type, public :: course_t
     type(state_t) :: state
     type(tally_t) :: tally
-    !> Time since the start [s].
+    integer :: phase = phase_transient
+    !> Time since the start [s], up to the last stop.
     real(wp) :: elapsed = 0
+    !> Where it stops next, and where it stopped last [s after the section].
+    real(wp) :: until = 0, since = 0
     !> Counts before the last reset of the tally.
-    integer(int64) :: impacts = 0, slips = 0
+    integer(int64) :: impacts = 0
     real(wp) :: last_impact_speed = 0
     real(wp) :: grazing_margin = huge(1.0_wp)
     integer :: captured = 0
@@ -70,34 +76,30 @@ contains
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
     type(course_t) :: course
+    logical :: slipped, described
     if (allocated(moving%pair)) then
       call run_two_bodies(moving, span, x, v, crank_angle, outcome, log)
       return
     end if
-    course%state = start_state(moving, x, v, crank_angle)
+    call begin_course(moving, span, x, v, crank_angle, course)
     if (present(log)) then
       log%book%at_start = energy_of_body(moving%machine, course%state)
       log%origin = -course%state%time
       if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
     end if
-    call reset_tally(course%tally, course%state)
-    call run_until(moving, catalogue, span, course, span%duration - span%window, outcome, log)
-    if (ended(course, span)) then
-      call note_state(course, outcome)
-      call conclude(catalogue, course, outcome)
-      return
-    end if
-    call open_window(course)
-    call run_until(moving, catalogue, span, course, span%duration, outcome, log)
-    outcome%window = regime_of(course%tally, span%window/moving%machine%period)
-    call note_state(course, outcome)
+    do while (course%phase == phase_transient .or. course%phase == phase_window)
+      call go_to_stop(moving, course, slipped, log)
+      call pass_stop(moving, catalogue, span, slipped, course, outcome)
+    end do
     if (present(log)) then
       log%book%at_end = energy_of_body(moving%machine, course%state)
-      if (log%sample_interval > 0) call record_sample(log, course%state)
+      described = log%sample_interval > 0 .and. course%elapsed >= span%duration
+      if (described) call record_sample(log, course%state)
     end if
-    if (course%reason == 0 .and. course%captured == 0 .and. size(catalogue) > 0) then
-      call wait_for_capture(moving, catalogue, span, course, outcome)
-    end if
+    do while (course%phase == phase_extension)
+      call go_to_stop(moving, course, slipped)
+      call pass_stop(moving, catalogue, span, slipped, course, outcome)
+    end do
     call conclude(catalogue, course, outcome)
   end subroutine run_trajectory
 
@@ -124,6 +126,125 @@ contains
     outcome%features%word = 0
   end subroutine run_two_bodies
 
+  !> A body set off from `x` [m], `v` [m/s], with the crank at `crank_angle` [rad].
+  pure subroutine begin_course(moving, span, x, v, crank_angle, course)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    real(wp), intent(in) :: x, v, crank_angle
+    type(course_t), intent(out) :: course
+    course%state = start_state(moving, x, v, crank_angle)
+    call reset_tally(course%tally, course%state)
+    if (.not. span%duration - span%window > 0) call open_window(course)
+    call set_stop(moving, span, course)
+  end subroutine begin_course
+
+  !> Moves to the next stop. `slipped` tells whether the body moved on the way.
+  pure subroutine go_to_stop(moving, course, slipped, log)
+    type(motion_t), intent(in) :: moving
+    type(course_t), intent(inout) :: course
+    logical, intent(out) :: slipped
+    type(log_t), intent(inout), optional :: log
+    integer(int64) :: slips
+    slips = course%tally%slips
+    if (course%until >= moving%machine%period) then
+      call advance_period(moving, course%state, course%tally, course%reason, log)
+    else
+      call advance(moving, course%state, course%until, course%tally, course%reason, log)
+    end if
+    slipped = course%tally%slips > slips
+  end subroutine go_to_stop
+
+  !> What is due at a stop, the state being there: has the motion been captured, is a phase over, where to stop next.
+  !> `slipped` tells whether the body moved since the last stop.
+  pure subroutine pass_stop(moving, catalogue, span, slipped, course, outcome)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(span_t), intent(in) :: span
+    logical, intent(in) :: slipped
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    real(wp) :: phase_end
+    logical :: ended
+    phase_end = end_of_phase(span, course%phase)
+    if (course%reason == 0) then
+      if (course%until >= moving%machine%period) then
+        course%elapsed = course%elapsed + (moving%machine%period - course%since)
+        call note_section(catalogue, slipped .or. course%since > 0, course, outcome)
+        course%since = 0
+      else
+        course%elapsed = phase_end
+        course%since = course%until
+      end if
+    end if
+    ended = course%reason /= 0 .or. (course%captured > 0 .and. (span%stop_when_captured .or. &
+                                                                course%phase == phase_extension))
+    if (ended .or. course%elapsed >= phase_end) call end_phase(moving, span, size(catalogue) > 0, ended, course, outcome)
+    if (course%phase /= phase_over) call set_stop(moving, span, course)
+  end subroutine pass_stop
+
+  !> Time since the start at which a phase ends [s].
+  pure real(wp) function end_of_phase(span, phase)
+    type(span_t), intent(in) :: span
+    integer, intent(in) :: phase
+    select case (phase)
+    case (phase_transient)
+      end_of_phase = span%duration - span%window
+    case (phase_window)
+      end_of_phase = span%duration
+    case default
+      end_of_phase = span%extension*span%duration
+    end select
+  end function end_of_phase
+
+  !> Where the course stops next. In the extension only at sections.
+  pure subroutine set_stop(moving, span, course)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(course_t), intent(inout) :: course
+    real(wp) :: left
+    course%since = course%state%time
+    course%until = moving%machine%period
+    left = end_of_phase(span, course%phase) - course%elapsed
+    if (course%phase == phase_extension .or. moving%machine%period - course%since <= left) return
+    course%until = course%since + left
+  end subroutine set_stop
+
+  !> On the section: captured, and since when?
+  pure subroutine note_section(catalogue, slipped, course, outcome)
+    type(attractor_t), intent(in) :: catalogue(:)
+    logical, intent(in) :: slipped
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    course%captured = find_capture(catalogue, course%state, slipped)
+    if (course%captured == 0) then
+      outcome%settle_time = -1
+    else if (outcome%settle_time < 0) then
+      outcome%settle_time = course%elapsed
+    end if
+  end subroutine note_section
+
+  !> The phase is over, or with `ended` the course is. An uncaptured motion goes on if there is anything to be captured by.
+  pure subroutine end_phase(moving, span, can_be_captured, ended, course, outcome)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    logical, intent(in) :: can_be_captured, ended
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    select case (course%phase)
+    case (phase_transient)
+      if (ended) call note_state(course, outcome)
+      if (.not. ended) call open_window(course)
+    case (phase_window)
+      outcome%window = regime_of(course%tally, span%window/moving%machine%period)
+      call note_state(course, outcome)
+      course%phase = merge(phase_over, phase_extension, ended .or. course%captured > 0 .or. .not. can_be_captured)
+      course%tally%wants_v_max = .false.
+    case default
+      course%phase = phase_over
+    end select
+    if (ended) course%phase = phase_over
+  end subroutine end_phase
+
   !> State and counts where the course is now.
   pure subroutine note_state(course, outcome)
     type(course_t), intent(in) :: course
@@ -134,75 +255,11 @@ contains
     outcome%last_impact_speed = latest_impact_speed(course)
   end subroutine note_state
 
-  pure logical function ended(course, span)
-    type(course_t), intent(in) :: course
-    type(span_t), intent(in) :: span
-    ended = course%reason /= 0 .or. (course%captured > 0 .and. span%stop_when_captured)
-  end function ended
-
-  !> Moves on to a time since the start, looking at every stroboscopic section on the way.
-  pure subroutine run_until(moving, catalogue, span, course, time_end, outcome, log)
-    type(motion_t), intent(in) :: moving
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(span_t), intent(in) :: span
-    type(course_t), intent(inout) :: course
-    real(wp), intent(in) :: time_end
-    type(outcome_t), intent(inout) :: outcome
-    type(log_t), intent(inout), optional :: log
-    do while (course%elapsed < time_end)
-      if (course%elapsed + (moving%machine%period - course%state%time) > time_end) then
-        call advance(moving, course%state, course%state%time + (time_end - course%elapsed), course%tally, &
-                     course%reason, log)
-        course%elapsed = time_end
-        return
-      end if
-      call run_to_section(moving, catalogue, course, outcome, log)
-      if (ended(course, span)) return
-    end do
-  end subroutine run_until
-
-  !> Goes on after the duration, section by section, until captured or the extension is over.
-  pure subroutine wait_for_capture(moving, catalogue, span, course, outcome)
-    type(motion_t), intent(in) :: moving
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(span_t), intent(in) :: span
-    type(course_t), intent(inout) :: course
-    type(outcome_t), intent(inout) :: outcome
-    do
-      call run_to_section(moving, catalogue, course, outcome)
-      if (course%reason /= 0 .or. course%captured > 0) return
-      if (course%elapsed >= span%extension*span%duration) return
-    end do
-  end subroutine wait_for_capture
-
-  !> To the next stroboscopic section: has the motion been captured there?
-  pure subroutine run_to_section(moving, catalogue, course, outcome, log)
-    type(motion_t), intent(in) :: moving
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(course_t), intent(inout) :: course
-    type(outcome_t), intent(inout) :: outcome
-    type(log_t), intent(inout), optional :: log
-    real(wp) :: start
-    integer(int64) :: slips_before
-    start = course%state%time
-    slips_before = course%slips + course%tally%slips
-    call advance_period(moving, course%state, course%tally, course%reason, log)
-    course%elapsed = course%elapsed + (moving%machine%period - start)
-    if (course%reason /= 0) return
-    course%captured = find_capture(catalogue, course%state, start > 0 .or. &
-                                   course%slips + course%tally%slips > slips_before)
-    if (course%captured == 0) then
-      outcome%settle_time = -1
-    else if (outcome%settle_time < 0) then
-      outcome%settle_time = course%elapsed
-    end if
-  end subroutine run_to_section
-
   !> Starts the statistics window.
   pure subroutine open_window(course)
     type(course_t), intent(inout) :: course
+    course%phase = phase_window
     course%impacts = course%impacts + course%tally%impacts
-    course%slips = course%slips + course%tally%slips
     course%last_impact_speed = latest_impact_speed(course)
     course%grazing_margin = min(course%grazing_margin, course%tally%grazing_margin)
     course%tally%wants_v_max = .true.

@@ -95,6 +95,7 @@ contains
              line('domain', to_text(run%domain))// &
              newline//'[integrator]'//newline// &
              line('flight', quoted(trim(integrator%flight)))// &
+             line('lanes', quoted(trim(integrator%lanes)))// &
              line('tolerance', to_text(integrator%tolerance))// &
              line('event_budget', to_text(integrator%event_budget))// &
              newline//'[attractors]'//newline// &

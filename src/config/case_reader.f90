@@ -97,6 +97,7 @@ contains
     call enter_table(source, 'integrator', found)
     associate (integrator => the_case%integrator)
       call take_choice(source, 'integrator.flight', ['auto    ', 'exact   ', 'adaptive'], integrator%flight)
+      call take_choice(source, 'integrator.lanes', ['auto', 'off '], integrator%lanes)
       call take_real(source, 'integrator.tolerance', between(1e-15_wp, 1e-3_wp, '1'), integrator%tolerance)
       call take_integer(source, 'integrator.event_budget', 1, integrator%event_budget)
     end associate

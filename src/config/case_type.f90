@@ -32,6 +32,8 @@ module case_type
   type, public :: integrator_t
     !> 'auto', 'exact' or 'adaptive'.
     character(len=8) :: flight = 'auto'
+    !> Whether many trajectories fly at once, in vectors, where the machine allows: auto or off.
+    character(len=4) :: lanes = 'auto'
     !> Relative tolerance of the adaptive flight.
     real(wp) :: tolerance = 1e-13_wp
     !> Most events of one trajectory.

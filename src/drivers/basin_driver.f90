@@ -4,7 +4,7 @@
 !> `separatrix basin`: where every point of a grid ends up.
 module basin_driver
   use attractors, only: last_regime, regime_names
-  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, open_journey, slice_cache_t
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of
   use case_type, only: case_t
@@ -21,6 +21,7 @@ module basin_driver
   use status, only: last_reason, exit_done, reason_names
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
+  use trajectories, only: block_size, describe_all, journey_t
   use trajectory, only: span_t
   implicit none
   private
@@ -44,7 +45,7 @@ module basin_driver
     !> Entries of the catalogue before each slice.
     integer, allocatable :: offset(:)
   contains
-    procedure :: compute => compute_basin_point
+    procedure :: compute => compute_basin_points
     procedure :: note => note_basin_point
   end type basin_work_t
 
@@ -85,6 +86,8 @@ contains
     call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                            command%time_limit, work%catalogues, error)
     call session%stop_if(error)
+    call choose_block(work, error)
+    call session%stop_if(error)
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)
     call report_catalogue(session, work)
@@ -100,6 +103,16 @@ contains
     call session%end_with(exit_done)
   end subroutine run_basin
 
+  !> The first slice's machine tells how many points are worth computing at a time.
+  subroutine choose_block(work, error)
+    type(basin_work_t), intent(inout) :: work
+    type(error_t), allocatable, intent(out) :: error
+    type(journey_t) :: journey
+    if (size(work%catalogues) == 0) return
+    call open_journey(work%grid, work%span, 0_int64, describe_all, journey, error)
+    if (.not. allocated(error)) work%block = block_size(journey)
+  end subroutine choose_block
+
   subroutine prepare_counts(work)
     type(basin_work_t), intent(inout) :: work
     integer :: i
@@ -111,13 +124,13 @@ contains
     allocate (work%captured(work%offset(size(work%offset))), source=0_int64)
   end subroutine prepare_counts
 
-  subroutine compute_basin_point(self, index, values, error)
+  subroutine compute_basin_points(self, index, values, error)
     class(basin_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    real(wp), intent(out) :: values(:)
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    call basin_point(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
-  end subroutine compute_basin_point
+    call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
+  end subroutine compute_basin_points
 
   subroutine note_basin_point(self, index, values)
     class(basin_work_t), intent(inout) :: self

@@ -7,6 +7,7 @@ module case_setup
   use case_type, only: case_t
   use grid, only: grid_t, make_grid
   use kinds, only: int64, wp
+  use lanes, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
   use trajectory, only: span_t
   implicit none
@@ -14,10 +15,13 @@ module case_setup
 
   public :: options_of, span_of, grid_of, output_path, automatic_tile
 
+  !> Doubles per vector, to try a narrower kernel than the processor allows (2, 4, 8). The results are the same.
+  character(len=*), parameter :: width_variable = 'SEPARATRIX_LANE_WIDTH'
+
 contains
 
   !> Integrator options of a case.
-  pure function options_of(the_case) result(options)
+  function options_of(the_case) result(options)
     type(case_t), intent(in) :: the_case
     type(options_t) :: options
     select case (the_case%integrator%flight)
@@ -31,7 +35,19 @@ contains
     options%tolerance = the_case%integrator%tolerance
     options%event_budget = int(the_case%integrator%event_budget, int64)
     options%domain = the_case%run%domain
+    if (the_case%integrator%lanes == 'auto') options%lane_width = lane_width()
   end function options_of
+
+  !> The widest vectors of this processor, or what the environment asks for if that is narrower.
+  integer function lane_width()
+    character(len=16) :: text
+    integer :: asked, status
+    lane_width = widest_lanes()
+    call get_environment_variable(width_variable, text, status=status)
+    if (status /= 0) return
+    read (text, *, iostat=status) asked
+    if (status == 0 .and. asked > 0) lane_width = min(lane_width, asked)
+  end function lane_width
 
   !> Length and window of the trajectories of a case.
   pure function span_of(the_case) result(span)
@@ -44,7 +60,7 @@ contains
   end function span_of
 
   !> The grid of a case over `axes`.
-  pure function grid_of(the_case, axes) result(grid)
+  function grid_of(the_case, axes) result(grid)
     type(case_t), intent(in) :: the_case
     type(axis_t), intent(in) :: axes(:)
     type(grid_t) :: grid

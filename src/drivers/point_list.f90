@@ -149,7 +149,7 @@ contains
     else if (columns(3) > 0 .and. .not. row(3) > 0) then
       call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed is a number above 0')
     else if (columns(3) > 0 .and. .not. default_ratio > 0) then
-      call fail(error, exit_bad_case, where_found//'ratio: the case has no drive')
+      call fail(error, exit_bad_case, where_found//'ratio: the drive of the case has no ratio')
     end if
   end subroutine read_row
 

@@ -6,25 +6,27 @@ module points_driver
   use attractors, only: attractor_t
   use checksum, only: crc32
   use case_setup, only: grid_of, output_path, span_of
+  use case_type, only: case_t
   use command_line, only: command_t
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
   use kinds, only: int64, int8, wp
+  use lanes, only: prepare_lanes
   use map_file, only: map_file_t
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t, type_float64, type_int32
-  use motion, only: motion_t
   use point_list, only: point_list_t, read_point_list
   use session, only: describe_file, open_session, session_t
   use status, only: last_reason, exit_done, exit_io, reason_names
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectories, only: block_size, describe_regime, journey_t, run_trajectories
+  use trajectory, only: outcome_t
   implicit none
   private
 
-  public :: run_points
+  public :: run_points, open_list_journey
 
   integer, parameter :: points_per_tile = 256
   !> Starts, final state, impacts, last impact speed, regime, reason.
@@ -34,13 +36,12 @@ module points_driver
 
   type, extends(point_work_t) :: list_work_t
     type(grid_t) :: grid
-    type(span_t) :: span
+    type(journey_t) :: journey
     type(point_list_t) :: list
-    type(motion_t) :: moving
     real(wp) :: ratio = -1
     integer(int64) :: reasons(0:last_reason) = 0
   contains
-    procedure :: compute => compute_list_point
+    procedure :: compute => compute_list_points
     procedure :: note => note_list_point
   end type list_work_t
 
@@ -61,12 +62,10 @@ contains
     call open_session(command, session)
     work%variables = point_variables
     work%grid = grid_of(session%the_case, session%the_case%axes(:0))
-    work%span = span_of(session%the_case)
-    work%span%stop_when_captured = .false.
-    work%span%extension = 1
-    call slice_motion(work%grid, 0_int64, work%moving, error)
-    if (.not. allocated(error)) work%ratio = work%moving%machine%drive%ratio
-    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%moving%machine%contact, &
+    call open_list_journey(work%grid, session%the_case, work%journey, error)
+    work%block = block_size(work%journey)
+    if (.not. allocated(error)) work%ratio = work%journey%moving%machine%drive%ratio
+    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%journey%moving%machine%contact, &
                                                      work%list, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
@@ -96,6 +95,21 @@ contains
     if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     call session%end_with(exit_done)
   end subroutine run_points
+
+  !> The machine of a list of starts: whole durations, of whose windows only the regime is told.
+  subroutine open_list_journey(grid, the_case, journey, error)
+    type(grid_t), intent(in) :: grid
+    type(case_t), intent(in) :: the_case
+    type(journey_t), intent(out) :: journey
+    type(error_t), allocatable, intent(out) :: error
+    call slice_motion(grid, 0_int64, journey%moving, error)
+    if (allocated(error)) return
+    call prepare_lanes(journey%moving, journey%flow)
+    journey%span = span_of(the_case)
+    journey%span%stop_when_captured = .false.
+    journey%span%extension = 1
+    journey%describe = describe_regime
+  end subroutine open_list_journey
 
   !> Checksum of the starts.
   function list_identity(list) result(identity)
@@ -134,25 +148,52 @@ contains
 
   end subroutine describe_points
 
-  subroutine compute_list_point(self, index, values, error)
+  subroutine compute_list_points(self, index, values, error)
     class(list_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    real(wp), intent(out) :: values(:)
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    type(outcome_t) :: outcome
+    integer :: first, last
+    first = 1
+    do while (first <= size(index, 2))
+      associate (ratio => self%list%ratio(index(1, first)))
+        last = first
+        do while (last < size(index, 2))
+          if (abs(self%list%ratio(index(1, last + 1)) - ratio) > 0) exit
+          last = last + 1
+        end do
+        if (abs(ratio - self%ratio) > 0) then
+          call machine_with(self%grid, 'drive.ratio', ratio, self%journey%moving, error)
+          if (allocated(error)) return
+          call prepare_lanes(self%journey%moving, self%journey%flow)
+          self%ratio = ratio
+        end if
+      end associate
+      call run_block(self, index(1, first:last), values(first:last, :))
+      first = last + 1
+    end do
+  end subroutine compute_list_points
+
+  !> Points of one machine.
+  subroutine run_block(work, points, values)
+    type(list_work_t), intent(in) :: work
+    integer, intent(in) :: points(:)
+    real(wp), intent(out) :: values(:, :)
+    type(outcome_t) :: outcomes(size(points))
     type(attractor_t) :: no_catalogue(0)
-    associate (ratio => self%list%ratio(index(1)))
-      if (abs(ratio - self%ratio) > 0) then
-        call machine_with(self%grid, 'drive.ratio', ratio, self%moving, error)
-        if (allocated(error)) return
-        self%ratio = ratio
-      end if
-    end associate
-    call run_trajectory(self%moving, no_catalogue, self%span, self%list%x0(index(1)), self%list%v0(index(1)), &
-                        self%grid%start(3), outcome)
-    values = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &
-              real(outcome%features%regime, wp), real(outcome%reason, wp)]
-  end subroutine compute_list_point
+    real(wp) :: starts(3, size(points))
+    integer :: i
+    starts(1, :) = work%list%x0(points)
+    starts(2, :) = work%list%v0(points)
+    starts(3, :) = work%grid%start(3)
+    call run_trajectories(work%journey, no_catalogue, starts, outcomes)
+    do i = 1, size(points)
+      associate (outcome => outcomes(i))
+        values(i, :) = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &
+                        real(outcome%features%regime, wp), real(outcome%reason, wp)]
+      end associate
+    end do
+  end subroutine run_block
 
   subroutine note_list_point(self, index, values)
     class(list_work_t), intent(inout) :: self

@@ -5,7 +5,7 @@
 module sweep_driver
   use axis, only: axis_t, linear_values
   use basin_driver, only: bytes_per_point
-  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, open_journey, slice_cache_t
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t, contact_position => contact_law
@@ -24,6 +24,7 @@ module sweep_driver
   use sweep_chain, only: chains_t, limit_t, run_chains
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
+  use trajectories, only: block_size, describe_all
   use trajectory, only: span_t
   implicit none
   private
@@ -40,7 +41,7 @@ module sweep_driver
     !> Per value: points with impacts and points without.
     integer(int64), allocatable :: impacting(:), free(:)
   contains
-    procedure :: compute => compute_branch_point
+    procedure :: compute => compute_branch_points
     procedure :: note => note_branch_point
   end type branch_work_t
 
@@ -140,6 +141,9 @@ contains
     call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                            session%command%time_limit, work%catalogues, error)
     call session%stop_if(error)
+    call open_journey(work%grid, work%span, 0_int64, describe_all, work%cache%journey, error)
+    call session%stop_if(error)
+    work%block = block_size(work%cache%journey)
     starts = product(work%grid%shape(2:3))
     associate (axes => work%grid%axes)
       x0 = [(axes(2)%values(1 + (i - 1)/work%grid%shape(3)), i=1, starts)]
@@ -159,15 +163,17 @@ contains
     call report_multiple(session, work)
   end subroutine run_branches
 
-  subroutine compute_branch_point(self, index, values, error)
+  subroutine compute_branch_points(self, index, values, error)
     class(branch_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    real(wp), intent(out) :: values(:)
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    call basin_point(self%grid, self%span, self%max_period, self%catalogues, &
-                     [index(1), 1 + (index(2) - 1)/self%grid%shape(3), 1 + modulo(index(2) - 1, self%grid%shape(3))], &
-                     self%cache, values, error)
-  end subroutine compute_branch_point
+    integer :: place(3, size(index, 2))
+    place(1, :) = index(1, :)
+    place(2, :) = 1 + (index(2, :) - 1)/self%grid%shape(3)
+    place(3, :) = 1 + modulo(index(2, :) - 1, self%grid%shape(3))
+    call basin_points(self%grid, self%span, self%max_period, self%catalogues, place, self%cache, values, error)
+  end subroutine compute_branch_points
 
   subroutine note_branch_point(self, index, values)
     class(branch_work_t), intent(inout) :: self

@@ -29,20 +29,22 @@ module tiled_run
   !> What is computed at the points of a grid.
   type, abstract, public :: point_work_t
     integer :: variables = 0
+    !> Most points computed at a time: as many as a stop signal may wait for.
+    integer :: block = 1
   contains
-    procedure(compute_point), deferred :: compute
+    procedure(compute_points), deferred :: compute
     procedure(note_point), deferred :: note
   end type point_work_t
 
   abstract interface
-    !> Values of the point at `index` (from 1 along each axis).
-    subroutine compute_point(self, index, values, error)
+    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis.
+    subroutine compute_points(self, index, values, error)
       import :: error_t, point_work_t, wp
       class(point_work_t), intent(inout) :: self
-      integer, intent(in) :: index(:)
-      real(wp), intent(out) :: values(:)
+      integer, intent(in) :: index(:, :)
+      real(wp), intent(out) :: values(:, :)
       type(error_t), allocatable, intent(out) :: error
-    end subroutine compute_point
+    end subroutine compute_points
 
     !> Counts a point that is done, computed now or read back after an interruption.
     subroutine note_point(self, index, values)
@@ -132,15 +134,19 @@ contains
     logical, intent(out) :: whole
     type(error_t), allocatable :: error
     real(wp), allocatable :: values(:, :)
-    integer :: index(size(file%tiling%lengths)), point, points
-    integer(int64) :: lower(size(index)), extent(size(index)), done
+    integer, allocatable :: index(:, :)
+    integer :: point, points, first, last
+    integer(int64) :: lower(size(file%tiling%lengths)), extent(size(file%tiling%lengths)), done
     call file%tiling%block_of(tile, lower, extent)
     points = int(product(extent))
-    allocate (values(points, work%variables))
-    whole = .true.
+    allocate (values(points, work%variables), index(size(lower), points))
     do point = 1, points
-      index = index_in_block(lower, extent, point)
-      call work%compute(index, values(point, :), error)
+      index(:, point) = index_in_block(lower, extent, point)
+    end do
+    whole = .true.
+    do first = 1, points, work%block
+      last = min(first + work%block - 1, points)
+      call work%compute(index(:, first:last), values(first:last, :), error)
       call session%abort_if(error)
       call scheduler%poll()
       if (scheduler%stop_requested()) then
@@ -154,7 +160,7 @@ contains
     call file%write_tile(tile, values, error)
     call session%abort_if(error)
     do point = 1, points
-      call work%note(index_in_block(lower, extent, point), values(point, :))
+      call work%note(index(:, point), values(point, :))
     end do
   end subroutine run_tile
 
@@ -222,14 +228,17 @@ contains
     integer, intent(in) :: lengths(:)
     real(wp), intent(out) :: seconds
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: values(work%variables), start
-    integer :: index(size(lengths)), i, k
-    start = monotonic_seconds()
+    real(wp) :: values(pilot_points, work%variables), start
+    integer :: index(size(lengths), pilot_points), first, last, i, k
     do i = 1, pilot_points
       do k = 1, size(lengths)
-        index(k) = 1 + int(modulo(0.5_wp + i*sqrt(real(4*k + 1, wp)), 1.0_wp)*lengths(k))
+        index(k, i) = 1 + int(modulo(0.5_wp + i*sqrt(real(4*k + 1, wp)), 1.0_wp)*lengths(k))
       end do
-      call work%compute(index, values, error)
+    end do
+    start = monotonic_seconds()
+    do first = 1, pilot_points, work%block
+      last = min(first + work%block - 1, pilot_points)
+      call work%compute(index(:, first:last), values(first:last, :), error)
       if (allocated(error)) return
     end do
     seconds = (monotonic_seconds() - start)/pilot_points

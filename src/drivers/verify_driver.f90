@@ -6,7 +6,7 @@
 module verify_driver
   use attractors, only: regime_names
   use axis, only: axis_t
-  use basin, only: basin_point, basin_variables, catalogue_t, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of, options_of, span_of
   use case_type, only: case_t
@@ -14,14 +14,14 @@ module verify_driver
   use command_line, only: command_t
   use errors, only: error_t, fail
   use file_layout, only: map_variables
-  use grid, only: grid_t, point_slice, point_start, slice_laws, slice_motion
+  use grid, only: grid_t, point_slice, point_start, slice_laws
   use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64, real32, wp
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
   use map_verify, only: verify_file
-  use motion, only: motion_t
+  use points_driver, only: open_list_journey
   use random, only: uniform
   use reference, only: run_reference
   use serial_team, only: serial_team_t
@@ -29,7 +29,8 @@ module verify_driver
   use status, only: exit_io, reason_settled
   use sweep_driver, only: sweep_axes
   use text, only: to_text
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectories, only: journey_t, run_trajectories
+  use trajectory, only: outcome_t, span_t
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -100,7 +101,7 @@ contains
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
-    real(wp) :: values(basin_variables), random_numbers(6)
+    real(wp) :: values(1, basin_variables), random_numbers(6)
     integer, allocatable :: index(:)
     integer(int64), allocatable :: lengths(:), place(:)
     integer :: i, k
@@ -121,11 +122,12 @@ contains
       else
         place = [index(1) - 1, (index(2) - 1)*grid%shape(3) + index(3) - 1]
       end if
-      call basin_point(grid, span_of(the_case), the_case%attractors%max_period, catalogues, index, cache, values, error)
+      call basin_points(grid, span_of(the_case), the_case%attractors%max_period, catalogues, reshape(index, [size(index), 1]), &
+                        cache, values, error)
       if (allocated(error)) return
-      call compare_with_file(reader, prefix, place, values, audit, error)
+      call compare_with_file(reader, prefix, place, values(1, :), audit, error)
       if (allocated(error)) return
-      call compare_with_reference(the_case, grid, catalogues, index, values, cache%moving, &
+      call compare_with_reference(grid, catalogues, index, values(1, :), cache%journey, &
                                   audit, error)
       if (allocated(error)) return
       call journal%progress(int(i, int64))
@@ -172,34 +174,33 @@ contains
 
   !> Label from a quadruple-precision run, and how far the double one has drifted at the end of the duration if the
   !> motion settles (on a chaotic one any error grows to its size).
-  subroutine compare_with_reference(the_case, grid, catalogues, index, values, moving, audit, error)
-    type(case_t), intent(in) :: the_case
+  subroutine compare_with_reference(grid, catalogues, index, values, journey, audit, error)
     type(grid_t), intent(in) :: grid
     type(catalogue_t), intent(in) :: catalogues(:)
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    type(motion_t), intent(in) :: moving
+    type(journey_t), intent(in) :: journey
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
     type(catalogue_t) :: own
-    type(outcome_t) :: outcome
-    type(span_t) :: span
-    real(wp) :: start(3), results(6, 1)
-    start = point_start(grid, index)
-    span = span_of(the_case)
-    span%stop_when_captured = .false.
+    type(outcome_t) :: outcome(1)
+    type(journey_t) :: whole
+    real(wp) :: start(3, 1), results(6, 1)
+    start(:, 1) = point_start(grid, index)
+    whole = journey
+    whole%span%stop_when_captured = .false.
     allocate (own%attractors(0))
     if (size(catalogues) > 0) own = catalogues(point_slice(grid, index) + 1)
-    call run_trajectory(moving, own%attractors, span, start(1), start(2), start(3), outcome)
-    call run_reference(slice_laws(grid, point_slice(grid, index)), grid%options, span, own%attractors, &
-                       reshape(start, [3, 1]), results, error)
+    call run_trajectories(whole, own%attractors, start, outcome)
+    call run_reference(slice_laws(grid, point_slice(grid, index)), grid%options, whole%span, own%attractors, start, &
+                       results, error)
     if (allocated(error)) return
     if (size(catalogues) > 0) then
       if (nint(results(2, 1)) /= nint(values(2))) audit%flips = audit%flips + 1
     else if (nint(results(3, 1)) /= nint(values(1))) then
       audit%flips = audit%flips + 1
     end if
-    if (nint(values(3)) == reason_settled) call note_deviation(outcome, results(:, 1), audit)
+    if (nint(values(3)) == reason_settled) call note_deviation(outcome(1), results(:, 1), audit)
   end subroutine compare_with_reference
 
   subroutine note_deviation(outcome, results, audit)
@@ -220,12 +221,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(axis_t) :: axes(3)
     type(grid_t) :: grid
-    type(motion_t) :: moving
+    type(journey_t) :: journey
     type(catalogue_t) :: none
-    type(outcome_t) :: outcome
-    type(span_t) :: span
+    type(outcome_t) :: outcomes(1)
     real(wp), allocatable :: column(:), table(:, :)
-    real(wp) :: random_numbers(1), results(6, 1)
+    real(wp) :: random_numbers(1), results(6, 1), start(3, 1)
     character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
     integer :: i, k, point
     do k = 1, size(names)
@@ -234,29 +234,28 @@ contains
       if (k == 1) allocate (table(size(column), size(names)))
       table(:, k) = column
     end do
-    span = span_of(the_case)
-    span%stop_when_captured = .false.
-    span%extension = 1
     allocate (none%attractors(0))
     do i = 1, min(sample, size(table, 1))
       call uniform(int(seed, int64), int(i, int64), random_numbers)
       point = 1 + int(random_numbers(1)*size(table, 1))
       axes(1) = axis_t('drive.ratio', '1', [table(point, 3)])
       grid = grid_of(the_case, axes(:merge(1, 0, table(point, 3) > 0)))
-      call slice_motion(grid, 0_int64, moving, error)
+      call open_list_journey(grid, the_case, journey, error)
       if (allocated(error)) return
-      call run_trajectory(moving, none%attractors, span, table(point, 1), table(point, 2), grid%start(3), outcome)
-      audit%points = audit%points + 1
-      if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &
-          .or. outcome%impacts /= nint(table(point, 6)) .or. outcome%reason /= nint(table(point, 7))) then
-        audit%differing = audit%differing + 1
-        if (audit%differing == 1) audit%first_difference = 'point '//to_text(point - 1)
-      end if
-      call run_reference(slice_laws(grid, 0_int64), options_of(the_case), span, none%attractors, &
-                         reshape([table(point, 1), table(point, 2), grid%start(3)], [3, 1]), results, error)
+      start(:, 1) = [table(point, 1), table(point, 2), grid%start(3)]
+      call run_trajectories(journey, none%attractors, start, outcomes)
+      associate (outcome => outcomes(1))
+        audit%points = audit%points + 1
+        if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &
+            .or. outcome%impacts /= nint(table(point, 6)) .or. outcome%reason /= nint(table(point, 7))) then
+          audit%differing = audit%differing + 1
+          if (audit%differing == 1) audit%first_difference = 'point '//to_text(point - 1)
+        end if
+      end associate
+      call run_reference(slice_laws(grid, 0_int64), options_of(the_case), journey%span, none%attractors, start, results, error)
       if (allocated(error)) return
-      if (nint(results(3, 1)) /= outcome%features%regime) audit%flips = audit%flips + 1
-      call note_deviation(outcome, results(:, 1), audit)
+      if (nint(results(3, 1)) /= outcomes(1)%features%regime) audit%flips = audit%flips + 1
+      call note_deviation(outcomes(1), results(:, 1), audit)
     end do
   end subroutine audit_points
 

@@ -47,6 +47,8 @@ module motion_state
     integer(int64) :: event_budget = 1000000_int64
     !> |x| beyond which the body has left the domain [m].
     real(wp) :: domain = 1e6_wp
+    !> Doubles per vector where many bodies fly together; 0 = one by one.
+    integer :: lane_width = 0
   end type options_t
 
   !> Counts and extremes since the last reset.

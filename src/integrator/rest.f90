@@ -14,7 +14,7 @@ module rest
   implicit none
   private
 
-  public :: mode_from_rest, hold, chatter_time
+  public :: mode_from_rest, hold, chatter_time, chatter_speed
 
   !> Relative change of the acceleration over what is left of a chatter sequence at which it is
   !> completed analytically.
@@ -162,6 +162,20 @@ contains
     if (bounce <= briefest_bounce*machine%period) return
     if (abs(k - machine%contact%restitution) > chatter_uniformity) k = huge(k)
   end function chatter_restitution
+
+  !> Speed [m/s] of rebound above which a chatter sequence is never completed: the acceleration changes too much on the
+  !> way out alone, c v^2/(2 a_out m) > uniformity a_in, as both are at most the largest force over the mass.
+  pure real(wp) function chatter_speed(machine) result(speed)
+    type(oscillator_t), intent(in) :: machine
+    real(wp) :: barrier, strongest
+    barrier = 0
+    if (machine%contact%upper < huge(1.0_wp)) barrier = abs(machine%contact%upper)
+    if (machine%contact%lower > -huge(1.0_wp)) barrier = max(barrier, abs(machine%contact%lower))
+    strongest = (machine%force_scale + machine%restoring%stiffness*barrier + machine%friction%kinetic + &
+                 machine%friction%excess)/machine%mass
+    speed = huge(1.0_wp)
+    if (machine%natural_frequency > 0) speed = sqrt(2*chatter_uniformity)*strongest/machine%natural_frequency
+  end function chatter_speed
 
   !> How much the sliding friction changes between rest and `speed` [N].
   pure real(wp) function layer_change(law, speed)

@@ -9,15 +9,17 @@ module basin
   use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
   use kinds, only: int64, wp
   use match, only: carry_labels, number_new, remember
+  use lanes, only: prepare_lanes
   use motion, only: motion_t
   use status, only: exit_bad_case
   use text, only: to_text
+  use trajectories, only: describe_all, journey_t, run_trajectories
   use trajectory, only: outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: open_slice, search_starts, label_slices, basin_point, outcome_values
+  public :: open_slice, open_journey, search_starts, label_slices, basin_points, outcome_values
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13
@@ -27,10 +29,10 @@ module basin
     type(attractor_t), allocatable :: attractors(:)
   end type catalogue_t
 
-  !> The machine of the slice that was last looked at.
+  !> The slice that was last looked at.
   type, public :: slice_cache_t
     integer(int64) :: slice = -1
-    type(motion_t) :: moving
+    type(journey_t) :: journey
   end type slice_cache_t
 
 contains
@@ -48,6 +50,21 @@ contains
     if (span%duration < moving%machine%period) call fail(error, exit_bad_case, "key 'run.duration': found "// &
       to_text(span%duration)//' s, allowed at least one drive period, '//to_text(moving%machine%period, 6)//' s')
   end subroutine open_slice
+
+  !> The machine of a slice, ready for whole trajectories.
+  subroutine open_journey(grid, span, slice, describe, journey, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    integer(int64), intent(in) :: slice
+    integer, intent(in) :: describe
+    type(journey_t), intent(out) :: journey
+    type(error_t), allocatable, intent(out) :: error
+    call open_slice(grid, span, slice, journey%moving, error)
+    if (allocated(error)) return
+    journey%span = span
+    journey%describe = describe
+    call prepare_lanes(journey%moving, journey%flow)
+  end subroutine open_journey
 
   !> Starts from which the attractors of a slice are searched: its own sample, or, where `neighbours` (attractors of other
   !> slices) are given, their section points.
@@ -94,37 +111,82 @@ contains
     end do
   end subroutine label_slices
 
-  !> Values of the point at `index` (from 1 along each axis). Without a start among the axes every point is its own
-  !> slice: then `catalogues` is empty and the point's attractor is discovered on the spot, unlabelled.
-  subroutine basin_point(grid, span, max_period, catalogues, index, cache, values, error)
+  !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Without a start among the
+  !> axes every point is its own slice: then `catalogues` is empty and the point's attractor is discovered on the spot,
+  !> unlabelled.
+  subroutine basin_points(grid, span, max_period, catalogues, index, cache, values, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer, intent(in) :: max_period
     type(catalogue_t), intent(in) :: catalogues(:)
-    integer, intent(in) :: index(:)
+    integer, intent(in) :: index(:, :)
     type(slice_cache_t), intent(inout) :: cache
-    real(wp), intent(out) :: values(basin_variables)
+    real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: slices(size(index, 2))
+    logical :: left(size(index, 2))
+    integer :: i, first
+    do i = 1, size(index, 2)
+      slices(i) = point_slice(grid, index(:, i))
+    end do
+    left = .true.
+    do first = 1, size(slices)
+      if (.not. left(first)) cycle
+      if (slices(first) /= cache%slice) then
+        cache%slice = -1
+        call open_journey(grid, span, slices(first), describe_all, cache%journey, error)
+        if (allocated(error)) return
+        cache%slice = slices(first)
+      end if
+      associate (members => pack([(i, i=1, size(slices))], left .and. slices == slices(first)))
+        left(members) = .false.
+        if (size(catalogues) > 0) then
+          call slice_points(grid, cache%journey, catalogues(slices(first) + 1)%attractors, index, members, values)
+        else
+          call lone_points(grid, max_period, cache%journey, index, members, values)
+        end if
+      end associate
+    end do
+  end subroutine basin_points
+
+  !> Points of one slice with a catalogue.
+  subroutine slice_points(grid, journey, catalogue, index, members, values)
+    type(grid_t), intent(in) :: grid
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    integer, intent(in) :: index(:, :), members(:)
+    real(wp), intent(inout) :: values(:, :)
+    type(outcome_t) :: outcomes(size(members))
+    real(wp) :: starts(3, size(members))
+    integer :: i
+    do i = 1, size(members)
+      starts(:, i) = point_start(grid, index(:, members(i)))
+    end do
+    call run_trajectories(journey, catalogue, starts, outcomes)
+    do i = 1, size(members)
+      values(members(i), :) = outcome_values(outcomes(i))
+    end do
+  end subroutine slice_points
+
+  !> Points that are their own slices: each discovers its attractor.
+  subroutine lone_points(grid, max_period, journey, index, members, values)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: max_period
+    type(journey_t), intent(in) :: journey
+    integer, intent(in) :: index(:, :), members(:)
+    real(wp), intent(inout) :: values(:, :)
     type(attractor_t), allocatable :: own(:)
     type(outcome_t) :: outcome
-    integer(int64) :: slice
     real(wp) :: start(3)
-    slice = point_slice(grid, index)
-    if (slice /= cache%slice) then
-      call open_slice(grid, span, slice, cache%moving, error)
-      if (allocated(error)) return
-      cache%slice = slice
-    end if
-    start = point_start(grid, index)
-    if (size(catalogues) > 0) then
-      call run_trajectory(cache%moving, catalogues(slice + 1)%attractors, span, start(1), start(2), start(3), &
-                          outcome)
-    else
-      call discover_attractors(cache%moving, span, reshape(start, [3, 1]), max_period, own)
-      call run_trajectory(cache%moving, own, span, start(1), start(2), start(3), outcome)
-    end if
-    values = outcome_values(outcome)
-  end subroutine basin_point
+    integer :: i
+    do i = 1, size(members)
+      start = point_start(grid, index(:, members(i)))
+      if (allocated(own)) deallocate (own)
+      call discover_attractors(journey%moving, journey%span, reshape(start, [3, 1]), max_period, own)
+      call run_trajectory(journey%moving, own, journey%span, start(1), start(2), start(3), outcome)
+      values(members(i), :) = outcome_values(outcome)
+    end do
+  end subroutine lone_points
 
   !> An outcome in the order of the file: regime, attractor, reason, period, event word, impacts per period, mean
   !> impact speed, amplitude, x_max, x_min, v_max, settle time (not a number: not captured), grazing margin (infinite:

@@ -1,0 +1,7 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// The kernel for processors with AVX-512.
+#include "lane_kernel.hpp"
+
+SEPARATRIX_LANE_KERNEL(separatrix_fly_avx512)

@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// Which kernel this processor gets. All give the same bits.
+#include "lane_types.hpp"
+
+extern "C" {
+
+void separatrix_fly_sse2(const lane_machine *, lane_batch *);
+void separatrix_fly_avx2(const lane_machine *, lane_batch *);
+void separatrix_fly_avx512(const lane_machine *, lane_batch *);
+
+// Doubles in the widest vector that the processor has: 2, 4 or 8.
+int separatrix_lane_width(void) {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512cd"))
+    return 8;
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma"))
+    return 4;
+#endif
+  return 2;
+}
+
+void separatrix_fly_lanes(int width, const lane_machine *machine, lane_batch *batch) {
+  if (width >= 8)
+    separatrix_fly_avx512(machine, batch);
+  else if (width >= 4)
+    separatrix_fly_avx2(machine, batch);
+  else
+    separatrix_fly_sse2(machine, batch);
+}
+}

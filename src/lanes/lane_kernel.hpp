@@ -1,0 +1,308 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// Exact flight for many bodies at once. Between events x = equilibrium + periodic response + Im(exp(lambda s)
+// Z)/w_d, lambda = -g + i w_d. All lanes of a vector look for the end of their flights together: Householder
+// steps of fourth order from the duration of the last flight in that direction, one or two evaluations each
+// in a settled motion. What was found is then proven to be the first event: the velocity has no zero on the
+// way, because the Bernstein coefficients of its Hermite interpolant between the two ends, less the bound on
+// the interpolation error, are positive. While the velocity keeps its sign the position is monotone, so no
+// barrier is missed either. What is rare (sticking, slow impacts, a proof that does not succeed) is left to
+// the scalar code.
+#ifndef SEPARATRIX_LANE_KERNEL_HPP
+#define SEPARATRIX_LANE_KERNEL_HPP
+
+#include "lane_types.hpp"
+#include "lane_vectors.hpp"
+
+namespace {
+
+typedef lane_fields<vec> lane_group;
+
+enum { members = sizeof(lane_batch) / sizeof(double[lanes]), most_rounds = 10 };
+
+inline void load(const lane_batch &batch, int first, lane_group &g) {
+  for (int i = 0; i < members; i++)
+    memcpy((vec *)&g + i, (const double *)&batch + i * lanes + first, sizeof(vec));
+}
+
+inline void store(const lane_group &g, int first, lane_batch &batch) {
+  for (int i = 0; i < members; i++)
+    memcpy((double *)&batch + i * lanes + first, (const vec *)&g + i, sizeof(vec));
+}
+
+// Position and four derivatives, and the free part exp(lambda s) Z.
+struct kinematics {
+  vec x, v, a, j, s, re, im;
+};
+
+template <bool damping> inline kinematics evaluate(const lane_machine &m, const lane_group &g, vec elapsed) {
+  kinematics k;
+  vec turn_s, turn_c, sine, cosine;
+  sine_cosine(elapsed * m.damped, turn_s, turn_c);
+  sine_cosine((g.start + elapsed) * m.drive_frequency, sine, cosine);
+  if (damping) {
+    vec shrink = exponential(-m.decay * elapsed);
+    turn_s *= shrink;
+    turn_c *= shrink;
+  }
+  k.re = turn_c * g.z_re - turn_s * g.z_im;
+  k.im = turn_s * g.z_re + turn_c * g.z_im;
+  const double stiffness = m.natural * m.natural, drag = 2 * m.decay;
+  vec y = k.im * (1 / m.damped);
+  k.v = damping ? k.re - m.decay * y : k.re;
+  k.a = damping ? -stiffness * y - drag * k.v : -stiffness * y;
+  k.j = damping ? -stiffness * k.v - drag * k.a : -stiffness * k.v;
+  k.s = damping ? -stiffness * k.a - drag * k.j : -stiffness * k.a;
+  vec c = cosine, s = sine;
+  for (int n = 0; n < m.harmonics; n++) {
+    double w = (n + 1) * m.drive_frequency, w2 = w * w;
+    vec part = m.cosine[n] * c + m.sine[n] * s, slope = m.sine[n] * c - m.cosine[n] * s;
+    y += part;
+    k.v += w * slope;
+    k.a -= w2 * part;
+    k.j -= (w2 * w) * slope;
+    k.s += (w2 * w2) * part;
+    vec next = c * cosine - s * sine;
+    s = s * cosine + c * sine;
+    c = next;
+  }
+  k.x = (m.rest - g.direction * m.offset) + y;
+  return k;
+}
+
+// exp(lambda step) (re + i im) for a step short enough for three terms.
+template <bool damping> inline void turn_on(const lane_machine &m, vec step, vec &re, vec &im) {
+  vec a = re, b = im;
+  for (int n = 3; n >= 1; n--) {
+    vec part = (1.0 / n) * step;
+    vec next = re + part * (damping ? -m.decay * a - m.damped * b : -m.damped * b);
+    b = im + part * (damping ? m.damped * a - m.decay * b : m.damped * a);
+    a = next;
+  }
+  re = a;
+  im = b;
+}
+
+// Are the Bernstein coefficients c of degree 6, or those of both halves, positive within?
+inline mask all_positive(const vec (&c)[7]) {
+  mask plain = (c[1] > 0.0) & (c[2] > 0.0) & (c[3] > 0.0) & (c[4] > 0.0) & (c[5] > 0.0);
+  vec d[7];
+  mask halved = ~mask{};
+  for (int i = 0; i < 7; i++)
+    d[i] = c[i];
+  for (int level = 1; level <= 6; level++) {
+    for (int i = 0; i <= 6 - level; i++)
+      d[i] = 0.5 * (d[i] + d[i + 1]);
+    halved = halved & (d[0] > 0.0) & (d[6 - level] > 0.0);
+  }
+  return plain | halved;
+}
+
+// Is w > 0 strictly between two times `span` apart? From w, w' and w'' at both and a bound on |w^(6)|: the
+// error of the quintic through them is at most bound s^3 (span - s)^3/720.
+inline mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, vec rate1, vec curl1,
+                             vec bound) {
+  vec step = 0.2 * span, bend = 0.05 * span * span, cube = span * span * span;
+  vec b1 = w0 + step * rate0, b2 = w0 + 2 * step * rate0 + bend * curl0;
+  vec b4 = w1 - step * rate1, b3 = w1 - 2 * step * rate1 + bend * curl1;
+  vec error = bound * (cube * cube) * (1.0 / 14400);
+  const vec c[7] = {w0,
+                    (w0 + 5 * b1) * (1.0 / 6),
+                    (b1 + 2 * b2) * (1.0 / 3),
+                    0.5 * (b2 + b3) - error,
+                    (2 * b3 + b4) * (1.0 / 3),
+                    (5 * b4 + w1) * (1.0 / 6),
+                    w1};
+  return all_positive(c);
+}
+
+// A body set off: the free part of its motion.
+template <bool damping> inline void begin_flight(const lane_machine &m, lane_group &g) {
+  mask fresh = g.status == lane_fresh;
+  if (!any(fresh))
+    return;
+  g.start = fresh ? g.time : g.start;
+  g.z_re = fresh ? vec{} : g.z_re;
+  g.z_im = fresh ? vec{} : g.z_im;
+  kinematics k = evaluate<damping>(m, g, g.time - g.start);
+  vec y = g.x - k.x, v = g.v - k.v;
+  vec a = -m.natural * m.natural * y - 2 * m.decay * v;
+  g.z_re = fresh ? v + m.decay * y : g.z_re;
+  g.z_im = fresh ? m.damped * y : g.z_im;
+  g.start_v = fresh ? g.v : g.start_v;
+  g.start_a = fresh ? k.a + a : g.start_a;
+  g.start_j = fresh ? k.j - m.natural * m.natural * v - 2 * m.decay * a : g.start_j;
+  g.found = fresh ? vec{} : g.found;
+  g.status = fresh ? all(lane_flying) : g.status;
+}
+
+// Keeps the event that is `step` after the evaluated point, where `accept`.
+template <bool damping>
+inline void keep_event(const lane_machine &m, const kinematics &k, mask accept, mask hit, vec span, vec step,
+                       lane_group &g) {
+  vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, re = k.re, im = k.im;
+  turn_on<damping>(m, step, re, im);
+  g.found = accept ? all(1) : g.found;
+  g.span = accept ? span : g.span;
+  g.hits = accept ? (hit ? all(1) : vec{}) : g.hits;
+  g.end_x = accept ? k.x + step * (k.v + half * (k.a + third * (k.j + fourth * k.s))) : g.end_x;
+  g.end_v = accept ? k.v + step * (k.a + half * (k.j + third * k.s)) : g.end_v;
+  g.end_a = accept ? k.a + step * (k.j + half * k.s) : g.end_a;
+  g.end_j = accept ? k.j + step * k.s : g.end_j;
+  g.end_re = accept ? re : g.end_re;
+  g.end_im = accept ? im : g.end_im;
+}
+
+// Finds the ends of the flights of `seek`: a turning point, or the barrier if that lies before it. Returns
+// the lanes whose search failed.
+template <bool damping>
+inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
+  vec s = upward ? g.up_span : g.down_span, low = {}, high = all(1e300);
+  mask hit = (upward ? g.up_hits : g.down_hits) > 0.5;
+  for (int round = 0; round < most_rounds; round++) {
+    kinematics k = evaluate<damping>(m, g, s);
+    vec w = g.direction * k.v, rate = g.direction * k.a, curl = g.direction * k.j, snap = g.direction * k.s;
+    vec gap = g.direction * (barrier - k.x);
+    // Past the turning point, short of the barrier: the body turns first.
+    hit = hit & ((w > 0.0) | (gap <= 0.0));
+    vec f = hit ? gap : w, f1 = hit ? -w : rate, f2 = hit ? -rate : curl, f3 = hit ? -curl : snap;
+    low = f > 0.0 ? s : low;
+    high = f > 0.0 ? high : s;
+    // Householder's step of fourth order.
+    vec step = -f * (f1 * f1 - 0.5 * f * f2) / (f1 * (f1 * f1 - f * f2) + (1.0 / 6) * f * f * f3);
+    vec next = s + step;
+    mask guided = (f1 < 0.0) & (next >= low) & (next <= high) & (next > 0.0);
+    // Newton's step is asked, too: where the numerator vanishes Householder's says nothing.
+    mask close = guided & (magnitude(step) <= m.close) & (magnitude(f) <= -2 * m.close * f1);
+    vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step;
+    vec turn_x = k.x + step * (k.v + half * (k.a + third * (k.j + fourth * k.s)));
+    mask beyond = close & ~hit & (g.direction * (barrier - turn_x) <= 0.0);
+    mask accept = seek & close & ~beyond;
+    if (any(accept)) {
+      keep_event<damping>(m, k, accept, hit, next, step, g);
+      seek = seek & ~accept;
+      if (!any(seek))
+        break;
+    }
+    // A turning point beyond the barrier: the impact is before it.
+    low = beyond ? vec{} : low;
+    high = beyond ? next : high;
+    hit = hit | beyond;
+    vec onward = high < 1e299 ? 0.5 * (low + high) : s + m.stride;
+    s = beyond ? 0.5 * next : (guided ? next : onward);
+  }
+  return seek;
+}
+
+// Of the flights `found` just now: which are proven to have no event on the way?
+template <bool damping> inline mask prove(const lane_machine &m, mask found, const lane_group &g) {
+  vec re = magnitude(g.z_re), im = magnitude(g.z_im);
+  // At least |Z|, at most 8 % more.
+  vec size = re + im - 0.5857864376269049 * (re < im ? re : im);
+  vec bound = m.bound_periodic + m.bound_free * size, d = g.direction;
+  vec end_w = g.hits > 0.5 ? d * g.end_v : vec{};
+  mask proven = positive_between(g.span, d * g.start_v, d * g.start_a, d * g.start_j, end_w, d * g.end_a,
+                                 d * g.end_j, bound);
+  if (!any(found & ~proven))
+    return proven;
+  vec half = 0.5 * g.span;
+  kinematics k = evaluate<damping>(m, g, half);
+  mask first =
+      positive_between(half, d * g.start_v, d * g.start_a, d * g.start_j, d * k.v, d * k.a, d * k.j, bound);
+  mask second = positive_between(half, d * k.v, d * k.a, d * k.j, end_w, d * g.end_a, d * g.end_j, bound);
+  return proven | (first & second);
+}
+
+// The events of the lanes `due`: Newton's impact or the reversal of friction, and the flight that follows.
+// Returns those that the scalar code must look at: sticking, chatter, a body that has left the domain.
+template <bool damping>
+inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrier, lane_group &g) {
+  mask hit = g.hits > 0.5;
+  vec w = g.direction * g.end_v, gap = g.direction * (barrier - g.end_x);
+  vec push = -g.direction * g.end_a - m.kinetic;
+  mask plain = (hit ? m.restitution * w > m.slow : push > m.break_away) & (magnitude(g.end_x) < m.domain);
+  mask rare = due & ~plain;
+  due = due & plain;
+  vec v = hit ? -m.restitution * g.end_v : vec{};
+  vec v_jump = hit ? v - g.end_v : vec{};
+  vec y_jump = (-2 * m.offset) * g.direction, a_jump = (2 * m.kinetic) * g.direction;
+  if (damping)
+    a_jump -= 2 * m.decay * v_jump;
+  vec j_jump = -m.natural * m.natural * v_jump - 2 * m.decay * a_jump;
+  mask up = due & upward, down = due & ~upward, struck = due & hit;
+  g.up_span = up ? g.span : g.up_span;
+  g.up_hits = up ? g.hits : g.up_hits;
+  g.down_span = down ? g.span : g.down_span;
+  g.down_hits = down ? g.hits : g.down_hits;
+  g.flights = due ? g.flights + 1.0 : g.flights;
+  g.impacts = struck ? g.impacts + 1.0 : g.impacts;
+  g.speed_sum = struck ? g.speed_sum + w : g.speed_sum;
+  g.last_speed = struck ? w : g.last_speed;
+  g.margin = (due & ~hit & (gap < g.margin)) ? gap : g.margin;
+  g.start = due ? g.start + g.span : g.start;
+  g.time = due ? g.start : g.time;
+  g.x = due ? (hit ? barrier : g.end_x) : g.x;
+  g.v = due ? v : g.v;
+  g.start_v = due ? v : g.start_v;
+  g.start_a = due ? g.end_a + a_jump : g.start_a;
+  g.start_j = due ? g.end_j + j_jump : g.start_j;
+  g.z_re = due ? g.end_re + v_jump + m.decay * y_jump : g.z_re;
+  g.z_im = due ? g.end_im + m.damped * y_jump : g.z_im;
+  g.direction = due ? -g.direction : g.direction;
+  g.found = due ? vec{} : g.found;
+  return rare;
+}
+
+// The state of the lanes that have come to where they stop. The end of the period starts the clock anew.
+template <bool damping> inline void take_stops(const lane_machine &m, lane_group &g) {
+  mask stopped = g.status == lane_stopped;
+  if (!any(stopped))
+    return;
+  kinematics k = evaluate<damping>(m, g, g.until - g.start);
+  mask section = stopped & (g.until >= m.period);
+  g.x = stopped ? k.x : g.x;
+  g.v = stopped ? k.v : g.v;
+  g.time = stopped ? (section ? vec{} : g.until) : g.time;
+  g.start = section ? g.start - m.period : g.start;
+}
+
+// Flies the lanes of one vector until each has stopped or is left to the scalar code.
+template <bool damping> void fly(const lane_machine &m, int first, lane_batch &batch) {
+  lane_group g;
+  load(batch, first, g);
+  begin_flight<damping>(m, g);
+  mask flying = g.status == lane_flying;
+  while (any(flying)) {
+    mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5);
+    vec barrier = upward ? all(m.upper) : all(m.lower);
+    mask left = {};
+    if (any(seek)) {
+      left = find_events<damping>(m, seek, upward, barrier, g);
+      mask found = seek & ~left;
+      left = left | (found & ~prove<damping>(m, found, g));
+    }
+    mask stops = flying & ~left & (g.start + g.span >= g.until);
+    g.status = stops ? all(lane_stopped) : g.status;
+    flying = flying & ~left & ~stops;
+    if (any(flying))
+      left = left | take_events<damping>(m, flying, upward, barrier, g);
+    g.status = left ? all(lane_left) : g.status;
+    flying = flying & ~left;
+  }
+  take_stops<damping>(m, g);
+  store(g, first, batch);
+}
+
+} // namespace
+
+#define SEPARATRIX_LANE_KERNEL(name)                                                                         \
+  extern "C" void name(const lane_machine *m, lane_batch *batch) {                                           \
+    for (int first = 0; first < lanes; first += width)                                                       \
+      if (m->decay > 0)                                                                                      \
+        fly<true>(*m, first, *batch);                                                                        \
+      else                                                                                                   \
+        fly<false>(*m, first, *batch);                                                                       \
+  }
+
+#endif

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// What the kernel and its caller share. `lanes.f90` mirrors both structures member by member.
+#ifndef SEPARATRIX_LANE_TYPES_HPP
+#define SEPARATRIX_LANE_TYPES_HPP
+
+enum { lanes = 16, most_harmonics = 64 };
+
+// The machine, per unit of mass where forces are meant, SI.
+struct lane_machine {
+  double natural, damped, decay, drive_frequency, period;
+  // Equilibrium without friction, and how far sliding friction moves it [m].
+  double rest, offset;
+  // Sliding and break-away friction per mass [m/s^2].
+  double kinetic, break_away;
+  double upper, lower, restitution;
+  // Rebounds up to this speed [m/s] may belong to a chatter sequence: left to the scalar code.
+  double slow;
+  // |x| up to which a flight is kept [m].
+  double domain;
+  // Bound on |d7x/dt7|: of the periodic response, and per unit of |Z|.
+  double bound_periodic, bound_free;
+  // A step of the root search shorter than `close` [s] is the last; without a guide it strides on by `stride`
+  // [s].
+  double close, stride;
+  // Periodic response x = sum cosine(n) cos(n phi) + sine(n) sin(n phi), n = 1 ... [m].
+  int harmonics;
+  double cosine[most_harmonics], sine[most_harmonics];
+};
+
+// What a lane is doing.
+const double lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4;
+
+// One member per quantity: T is an array over lanes, or the part of it that is in a register.
+template <class T> struct lane_fields {
+  T status;
+  // Where the lane stops [s after the section].
+  T until;
+  // The state that the scalar code would go on from.
+  T time, x, v;
+  // The flight: start [s after the section, negative if before it], direction, velocity, acceleration and
+  // its rate at the start, free part Z of the motion.
+  T start, direction, start_v, start_a, start_j, z_re, z_im;
+  // The last flight up and down: its duration, and whether it ended at a barrier. Where the next search
+  // begins.
+  T up_span, down_span, up_hits, down_hits;
+  // The event found at the end of the flight: 1 = found, when, whether at a barrier, the motion just before
+  // it.
+  T found, span, hits, end_x, end_v, end_a, end_j, end_re, end_im;
+  // Counts and extremes since the caller last took them away.
+  T flights, impacts, speed_sum, last_speed, margin;
+};
+typedef lane_fields<double[lanes]> lane_batch;
+
+#endif

@@ -1,0 +1,193 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Exact flight for a batch of bodies at once, in vectors (the kernel is C++: `lane_kernel.hpp`). A lane flies until it
+!> stops at its time, or is left to the event loop of module `motion` where something rare is due. What comes out of a lane does
+!> not depend on its neighbours, nor on the width of the vectors.
+module lanes
+  use contact_law, only: contact_constant
+  use exact_flow, only: flow_t
+  use kinds, only: wp
+  use motion, only: motion_t
+  use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
+  use rest, only: chatter_speed
+  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  implicit none
+  private
+
+  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, take_counts, fly_lanes
+
+  integer, parameter, public :: lane_count = 16
+  integer, parameter :: most_harmonics = 64
+
+  !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
+  real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
+
+  !> A harmonic is too near resonance for the periodic response if that grows to more than this multiple of the forcing.
+  real(wp), parameter :: largest_amplification = 500
+
+  !> Mirrors `lane_machine` of lane_types.hpp.
+  type, bind(c) :: machine_t
+    real(c_double) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, period = 0
+    real(c_double) :: rest = 0, offset = 0, kinetic = 0, break_away = 0
+    real(c_double) :: upper = 0, lower = 0, restitution = 0, slow = 0, domain = 0
+    real(c_double) :: bound_periodic = 0, bound_free = 0, close = 0, stride = 0
+    integer(c_int) :: harmonics = 0
+    real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
+  end type machine_t
+
+  !> Mirrors `lane_batch` of lane_types.hpp.
+  type, bind(c), public :: lane_batch_t
+    real(c_double), dimension(lane_count) :: status = lane_idle, until = 0, time = 0, x = 0, v = 0, start = 0, &
+      direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
+      down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
+      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double)
+  end type lane_batch_t
+
+  !> A machine ready to fly in lanes.
+  type, public :: lane_flow_t
+    !> False if the machine has something that only the event loop knows.
+    logical :: available = .false.
+    !> Doubles per vector.
+    integer :: width = 2
+    type(machine_t) :: machine
+  end type lane_flow_t
+
+  interface
+    pure function separatrix_lane_width() result(width) bind(c)
+      import :: c_int
+      integer(c_int) :: width
+    end function separatrix_lane_width
+
+    pure subroutine separatrix_fly_lanes(width, machine, batch) bind(c)
+      import :: c_int, lane_batch_t, machine_t
+      integer(c_int), value :: width
+      type(machine_t), intent(in) :: machine
+      type(lane_batch_t), intent(inout) :: batch
+    end subroutine separatrix_fly_lanes
+  end interface
+
+contains
+
+  !> Doubles in the widest vector of this processor.
+  pure integer function widest_lanes()
+    widest_lanes = separatrix_lane_width()
+  end function widest_lanes
+
+  !> Lanes for one body with a closed form, no Stribeck layer, no harmonic at resonance, and rigid barriers of constant
+  !> restitution, if its options ask for lanes.
+  pure subroutine prepare_lanes(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(out) :: flow
+    real(wp) :: fastest
+    flow%width = moving%options%lane_width
+    flow%available = flow%width > 0 .and. moving%exact .and. moving%layer <= 0 .and. moving%flow%harmonics <= most_harmonics
+    flow%available = flow%available .and. .not. allocated(moving%pair) .and. .not. moving%machine%contact%soft .and. &
+      moving%machine%contact%kind == contact_constant
+    if (.not. flow%available) return
+    associate (from => moving%flow, m => flow%machine, law => moving%machine)
+      m%natural = from%natural
+      m%damped = from%damped
+      m%decay = from%decay
+      m%drive_frequency = from%drive_frequency
+      m%period = law%period
+      m%rest = from%equilibrium(0)
+      m%offset = from%equilibrium(0) - from%equilibrium(1)
+      m%kinetic = law%friction%kinetic/law%mass
+      ! A tie is left to the event loop.
+      m%break_away = (law%friction%break_away + 1e-12_wp*law%force_scale)/law%mass
+      m%upper = law%contact%upper
+      m%lower = law%contact%lower
+      m%restitution = law%contact%restitution
+      m%slow = chatter_speed(law)
+      m%domain = moving%options%domain
+      m%bound_free = from%natural**7/from%damped
+      fastest = max(from%natural, from%harmonics*from%drive_frequency)
+      ! Taylor's remainder after four terms is below rounding.
+      m%close = 1e-4_wp/fastest
+      m%stride = 0.15_wp*law%period
+    end associate
+    call set_response(moving%flow, flow)
+  end subroutine prepare_lanes
+
+  !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin; not available at resonance.
+  pure subroutine set_response(from, flow)
+    type(flow_t), intent(in) :: from
+    type(lane_flow_t), intent(inout) :: flow
+    real(wp) :: w, stiff, drag, size_squared
+    integer :: n
+    flow%machine%harmonics = from%harmonics
+    do n = 1, from%harmonics
+      w = n*from%drive_frequency
+      stiff = (from%natural - w)*(from%natural + w)
+      drag = 2*from%decay*w
+      size_squared = stiff**2 + drag**2
+      if (size_squared*largest_amplification**2 < from%natural**4) then
+        flow%available = .false.
+        return
+      end if
+      associate (cosine => (stiff*from%f_cos(n) - drag*from%f_sin(n))/size_squared, &
+                 sine => (stiff*from%f_sin(n) + drag*from%f_cos(n))/size_squared)
+        flow%machine%cosine(n) = cosine
+        flow%machine%sine(n) = sine
+        flow%machine%bound_periodic = flow%machine%bound_periodic + sqrt(cosine**2 + sine**2)*w**7
+      end associate
+    end do
+  end subroutine set_response
+
+  !> Puts a slipping body into a lane, which will fly it until `until` [s after the section]. `new`: without memory of
+  !> flights before.
+  pure subroutine occupy_lane(flow, lane, state, until, new, batch)
+    type(lane_flow_t), intent(in) :: flow
+    integer, intent(in) :: lane
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: until
+    logical, intent(in) :: new
+    type(lane_batch_t), intent(inout) :: batch
+    batch%status(lane) = lane_fresh
+    batch%until(lane) = until
+    batch%time(lane) = state%time
+    batch%x(lane) = state%x
+    batch%v(lane) = state%v
+    batch%direction(lane) = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
+    if (.not. new) return
+    batch%up_span(lane) = 0.4_wp*flow%machine%period
+    batch%down_span(lane) = 0.4_wp*flow%machine%period
+    batch%up_hits(lane) = 0
+    batch%down_hits(lane) = 0
+  end subroutine occupy_lane
+
+  !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop.
+  pure function lane_state(batch, lane) result(state)
+    type(lane_batch_t), intent(in) :: batch
+    integer, intent(in) :: lane
+    type(state_t) :: state
+    state = state_t(x=batch%x(lane), v=batch%v(lane), time=batch%time(lane), mode=mode_slip_plus)
+    if (batch%direction(lane) < 0) state%mode = mode_slip_minus
+  end function lane_state
+
+  !> Moves what a lane has counted to a tally.
+  pure subroutine take_counts(batch, lane, tally)
+    type(lane_batch_t), intent(inout) :: batch
+    integer, intent(in) :: lane
+    type(tally_t), intent(inout) :: tally
+    tally%events = tally%events + int(batch%flights(lane), kind(tally%events))
+    tally%slips = tally%slips + int(batch%flights(lane), kind(tally%slips))
+    tally%impacts = tally%impacts + int(batch%impacts(lane), kind(tally%impacts))
+    tally%impact_speed_sum = tally%impact_speed_sum + batch%speed_sum(lane)
+    if (batch%impacts(lane) > 0) tally%last_impact_speed = batch%last_speed(lane)
+    tally%grazing_margin = min(tally%grazing_margin, batch%margin(lane))
+    batch%flights(lane) = 0
+    batch%impacts(lane) = 0
+    batch%speed_sum(lane) = 0
+    batch%margin(lane) = huge(1.0_wp)
+  end subroutine take_counts
+
+  !> Flies every occupied lane until it has stopped or is left to the event loop.
+  pure subroutine fly_lanes(flow, batch)
+    type(lane_flow_t), intent(in) :: flow
+    type(lane_batch_t), intent(inout) :: batch
+    call separatrix_fly_lanes(int(flow%width, c_int), flow%machine, batch)
+  end subroutine fly_lanes
+
+end module lanes

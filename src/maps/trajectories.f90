@@ -1,0 +1,168 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Many trajectories of one machine: in lanes where the machine allows, a lane that has come to the end being given the
+!> next start. The outcome of a start does not depend on the others.
+module trajectories
+  use attractors, only: attractor_t
+  use kinds, only: wp
+  use lanes, only: fly_lanes, lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_state, lane_stopped, &
+    occupy_lane, take_counts
+  use motion, only: motion_t
+  use motion_state, only: mode_slip_minus, mode_slip_plus
+  use status, only: reason_event_budget
+  use trajectory, only: begin_course, conclude, course_t, go_to_stop, outcome_t, pass_stop, phase_over, phase_window, &
+    run_trajectory, span_t
+  implicit none
+  private
+
+  public :: run_trajectories, block_size
+
+  !> What is asked of the statistics window of a motion that is not captured.
+  integer, parameter, public :: describe_regime = 1, describe_all = 2
+
+  !> All that trajectories have in common.
+  type, public :: journey_t
+    type(motion_t) :: moving
+    type(lane_flow_t) :: flow
+    type(span_t) :: span
+    !> With `describe_regime` the extremes, which take a search in every flight, are not asked for.
+    integer :: describe = describe_all
+  end type journey_t
+
+  !> The trajectory in a lane: number of its start (0 = none), and whether the extremes of its window went unseen.
+  type :: passenger_t
+    integer :: start = 0
+    type(course_t) :: course
+    logical :: unseen = .false.
+  end type passenger_t
+
+contains
+
+  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad]; one column each).
+  pure subroutine run_trajectories(journey, catalogue, starts, outcomes)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    type(outcome_t), intent(out) :: outcomes(:)
+    type(passenger_t) :: passengers(lane_count)
+    type(lane_batch_t) :: batch
+    integer :: lane, i, next
+    if (.not. journey%flow%available) then
+      do i = 1, size(starts, 2)
+        call run_trajectory(journey%moving, catalogue, journey%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i))
+      end do
+      return
+    end if
+    next = 1
+    do lane = 1, lane_count
+      call board(journey, catalogue, starts, lane, next, passengers(lane), batch, outcomes)
+    end do
+    do while (any(passengers%start > 0))
+      call fly_lanes(journey%flow, batch)
+      do lane = 1, lane_count
+        if (passengers(lane)%start == 0) cycle
+        call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, &
+                    outcomes(passengers(lane)%start))
+        if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, &
+                                                                    passengers(lane), batch, outcomes)
+      end do
+    end do
+  end subroutine run_trajectories
+
+  !> Trajectories worth asking for at a time: enough to keep the lanes full, or one by one.
+  pure integer function block_size(journey)
+    type(journey_t), intent(in) :: journey
+    block_size = merge(32*lane_count, 1, journey%flow%available)
+  end function block_size
+
+  !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
+  pure subroutine board(journey, catalogue, starts, lane, next, passenger, batch, outcomes)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    integer, intent(in) :: lane
+    integer, intent(inout) :: next
+    type(passenger_t), intent(inout) :: passenger
+    type(lane_batch_t), intent(inout) :: batch
+    type(outcome_t), intent(inout) :: outcomes(:)
+    do while (next <= size(starts, 2))
+      passenger%start = next
+      passenger%unseen = .false.
+      associate (start => starts(:, next), outcome => outcomes(next))
+        next = next + 1
+        call begin_course(journey%moving, journey%span, start(1), start(2), start(3), passenger%course)
+        call go_on(journey, catalogue, start, passenger, outcome)
+      end associate
+      if (passenger%course%phase /= phase_over) then
+        call occupy_lane(journey%flow, lane, passenger%course%state, passenger%course%until, .true., batch)
+        return
+      end if
+    end do
+    passenger%start = 0
+    batch%status(lane) = lane_idle
+  end subroutine board
+
+  !> A lane that has stopped, or is left to the event loop up to its stop.
+  pure subroutine attend(journey, catalogue, start, lane, passenger, batch, outcome)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: start(3)
+    integer, intent(in) :: lane
+    type(passenger_t), intent(inout) :: passenger
+    type(lane_batch_t), intent(inout) :: batch
+    type(outcome_t), intent(inout) :: outcome
+    logical :: slipped, left
+    left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
+    slipped = .true.
+    associate (course => passenger%course)
+      course%state = lane_state(batch, lane)
+      call take_counts(batch, lane, course%tally)
+      if (left) call go_to_stop(journey%moving, course, slipped)
+      if (course%tally%events > journey%moving%options%event_budget) course%reason = reason_event_budget
+      call pass_stop(journey%moving, catalogue, journey%span, slipped, course, outcome)
+      if (.not. left .and. flies(journey, course)) then
+        passenger%unseen = passenger%unseen .or. course%phase == phase_window
+        batch%status(lane) = lane_flying
+        batch%until(lane) = course%until
+        return
+      end if
+      call go_on(journey, catalogue, start, passenger, outcome)
+      if (course%phase /= phase_over) call occupy_lane(journey%flow, lane, course%state, course%until, .false., batch)
+    end associate
+  end subroutine attend
+
+  !> Goes on in the event loop until a lane can take the trajectory, or to its end.
+  pure subroutine go_on(journey, catalogue, start, passenger, outcome)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: start(3)
+    type(passenger_t), intent(inout) :: passenger
+    type(outcome_t), intent(inout) :: outcome
+    logical :: slipped
+    associate (course => passenger%course)
+      do while (course%phase /= phase_over .and. .not. flies(journey, course))
+        call go_to_stop(journey%moving, course, slipped)
+        call pass_stop(journey%moving, catalogue, journey%span, slipped, course, outcome)
+      end do
+      passenger%unseen = passenger%unseen .or. course%phase == phase_window
+      if (course%phase /= phase_over) return
+      if (passenger%unseen .and. course%reason == 0 .and. course%captured == 0 .and. journey%describe == describe_all) then
+        ! It was captured when its window began, and lost: once more, in the event loop.
+        call run_trajectory(journey%moving, catalogue, journey%span, start(1), start(2), start(3), outcome)
+      else
+        call conclude(catalogue, course, outcome)
+      end if
+    end associate
+  end subroutine go_on
+
+  !> Whether a lane can take a course: it slips, and nobody needs the extremes of its window.
+  pure logical function flies(journey, course)
+    type(journey_t), intent(in) :: journey
+    type(course_t), intent(in) :: course
+    flies = (course%state%mode == mode_slip_plus .or. course%state%mode == mode_slip_minus) .and. &
+      course%phase /= phase_over .and. (course%phase /= phase_window .or. course%captured > 0 .or. &
+                                        journey%describe == describe_regime)
+  end function flies
+
+end module trajectories
