@@ -11,7 +11,7 @@ from separatrix import style
 from separatrix.labels import flag_text
 from separatrix.open import decode_word, flag_names, table
 
-CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word")
+CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
 _MOST = len(style.TOL_MUTED)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import report
 from compiled import Compiled, build
-from ours import FullRuns, Program, StoppedRuns, Timing, read_points
+from ours import FULL, ONE_BY_ONE, Maps, Program, Timing, flips, read_points
 from published_case import SEED, SOURCE, TOLERANCE, Outcomes, published_machine, start_points
 from python_peers import Heyoka, Scipy
 from reference_run import Reference
@@ -25,10 +25,12 @@ class Sizes:
     """How much of everything; the batch divides that of heyoka."""
 
     rounds: int = 7
-    full: tuple[int, int] = (2000, 22000)
-    stopped: tuple[int, int] = (100, 600)
-    viscous: tuple[int, int] = (1000, 6000)
-    stribeck: tuple[int, int] = (200, 1200)
+    full: tuple[int, int] = (100, 500)
+    full_single: tuple[int, int] = (30, 110)
+    stopped: tuple[int, int] = (200, 1000)
+    stopped_single: tuple[int, int] = (100, 500)
+    viscous: tuple[int, int] = (100, 400)
+    stribeck: tuple[int, int] = (15, 35)
     heyoka: int = 2000
     heyoka_batch: int = 4000
     gsl: int = 1500
@@ -36,10 +38,12 @@ class Sizes:
     scipy: int = 6
     reference: int = 10000
     stopped_reference: int = 4000
-    stopped_full: int = 50000
+    flips: int = 1000
 
 
-QUICK = Sizes(3, (1000, 6000), (100, 300), (500, 2500), (100, 500), 600, 1200, 500, 30, 2, 2000, 500, 5000)
+QUICK = Sizes(
+    3, (50, 200), (15, 50), (100, 400), (50, 200), (50, 150), (8, 20), 600, 1200, 500, 30, 2, 2000, 500, 300
+)
 
 
 class Peer:
@@ -81,8 +85,8 @@ class Results:
     timings: dict[str, list[Timing]] = field(default_factory=dict)
     accuracy: dict[str, Accuracy] = field(default_factory=dict)
     outcomes: dict[str, Outcomes] = field(default_factory=dict)
-    flips: int = 0
-    """Labels of settle-and-stop that differ from our own full runs."""
+    flips: tuple[int, int] = (0, 0)
+    """Labels of settle-and-stop that differ from our own full runs, and points compared."""
     version: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -99,31 +103,28 @@ def compare(found: Outcomes, reference: Outcomes) -> Accuracy:
     return Accuracy(points, deviation, int(np.sum(~same)), labels)
 
 
-def contestants(
-    program: Program, build_folder: Path, sizes: Sizes
-) -> dict[str, Peer | FullRuns | StoppedRuns]:
+def contestants(program: Program, build_folder: Path, sizes: Sizes) -> dict[str, Peer | Maps]:
     """Everybody who is timed, ready to run."""
     machine = published_machine()
-    starts = start_points(max(sizes.full[1], sizes.reference))
-
-    def full(law: str, size: tuple[int, int]) -> FullRuns:
-        return FullRuns(program, law, starts[: size[1]], size[0])
+    starts = start_points(max(sizes.heyoka_batch, sizes.reference))
 
     def compiled(peer: str, count: int) -> Peer:
         library = build(peer, build_folder / "bench_peers")
         return Peer(Compiled(library, machine, TOLERANCE), starts[:count])
 
     return {
-        "full": full("coulomb", sizes.full),
-        "stopped": StoppedRuns(program, *sizes.stopped),
+        "full": Maps(program, "coulomb", sizes.full, *FULL),
+        "full_single": Maps(program, "coulomb", sizes.full_single, *FULL, *ONE_BY_ONE),
+        "stopped": Maps(program, "coulomb", sizes.stopped),
+        "stopped_single": Maps(program, "coulomb", sizes.stopped_single, *ONE_BY_ONE),
         "heyoka_batch": Peer(Heyoka(machine, TOLERANCE, BATCH), starts[: sizes.heyoka_batch]),
         "heyoka": Peer(Heyoka(machine, TOLERANCE, 0), starts[: sizes.heyoka]),
         "gsl": compiled("gsl", sizes.gsl),
         "cvode": compiled("cvode", sizes.cvode),
         "scipy": Peer(Scipy(machine, TOLERANCE), starts[: sizes.scipy]),
         "flow": Peer(Heyoka(machine, TOLERANCE, BATCH, events=False), starts[: sizes.heyoka_batch]),
-        "viscous": full("viscous", sizes.viscous),
-        "stribeck": full("stribeck", sizes.stribeck),
+        "viscous": Maps(program, "viscous", sizes.viscous, *FULL),
+        "stribeck": Maps(program, "stribeck", sizes.stribeck, *FULL),
     }
 
 
@@ -131,20 +132,25 @@ def judge(everybody: dict, reference: Reference, program: Program, results: Resu
     """Accuracy of all who ran the Coulomb case."""
     sizes = results.sizes
     print(
-        f"bench: {sizes.reference + sizes.stopped_reference} trajectories in quadruple precision", flush=True
+        f"bench: {sizes.reference + 2 * sizes.stopped_reference} trajectories in quadruple precision",
+        flush=True,
     )
-    truth = reference.run(start_points(sizes.reference))
-    for name in ("full", "heyoka_batch", "heyoka", "gsl", "cvode", "scipy"):
+    starts = start_points(sizes.reference)
+    truth = reference.run(starts)
+    for name, words in (("full", ()), ("full_single", ONE_BY_ONE)):
+        _, path = program.points("coulomb", starts, f"points_{name}", *words)
+        results.outcomes[name] = read_points(path)
+    for name in ("heyoka_batch", "heyoka", "gsl", "cvode", "scipy"):
         results.outcomes[name] = everybody[name].outcomes()
-        results.accuracy[name] = compare(results.outcomes[name], truth)
-    stopped = everybody["stopped"]
-    chosen = np.array(random.Random(SEED).sample(range(stopped.long**2), sizes.stopped_full))
-    starts, labels = stopped.labels(chosen)
-    _, path = program.points("coulomb", starts, "points_of_map")
-    results.flips = int(np.sum(read_points(path).label != labels))
-    count = sizes.stopped_reference
-    wrong = int(np.sum(reference.run(starts[:count]).label != labels[:count]))
-    results.accuracy["stopped"] = Accuracy(count, None, None, wrong)
+    for name, found in results.outcomes.items():
+        results.accuracy[name] = compare(found, truth)
+    for name in ("stopped", "stopped_single"):
+        count, size = sizes.stopped_reference, everybody[name].sizes[1]
+        chosen = np.array(random.Random(SEED).sample(range(size**2), count))
+        starts, labels = everybody[name].labels(chosen)
+        wrong = int(np.sum(reference.run(starts).label != labels))
+        results.accuracy[name] = Accuracy(count, None, None, wrong)
+    results.flips = flips(program, sizes.flips)
 
 
 def main() -> None:

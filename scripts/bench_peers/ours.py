@@ -41,52 +41,38 @@ class Program:
         wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
         return Timing(points, sum(after[:2]) - sum(before[:2]), wall)
 
-    def points(self, law: str, starts: np.ndarray, name: str) -> tuple[Timing, Path]:
+    def points(self, law: str, starts: np.ndarray, name: str, *words: str) -> tuple[Timing, Path]:
         """Run starts for the whole duration."""
         listed, path = self.folder / f"{name}.csv", self.folder / f"{name}.h5"
         lines = [f"{x0!r},{v0!r}\n" for x0, v0 in starts.tolist()]
         listed.write_text("x0,v0\n" + "".join(lines))
         case = SOURCE / "examples" / f"basin_{law}.toml"
-        return self.timed(len(starts), "points", case, "--list", listed, "-o", path), path
+        return self.timed(len(starts), "points", case, "--list", listed, "-o", path, *words), path
 
-    def basin(self, count: int, name: str) -> tuple[Timing, Path]:
-        """A map of count x count starts, each stopped as soon as it is captured."""
+    def basin(self, law: str, count: int, name: str, *words: str) -> tuple[Timing, Path]:
+        """A map of count x count starts."""
         path = self.folder / f"{name}.h5"
         size = [word for axis in (1, 2) for word in ("--set", f"axis[{axis}].count={count}")]
-        case = SOURCE / "examples" / "basin_coulomb.toml"
-        return self.timed(count**2, "basin", case, "-o", path, *size), path
+        case = SOURCE / "examples" / f"basin_{law}.toml"
+        return self.timed(count**2, "basin", case, "-o", path, *size, *words), path
 
 
-class FullRuns:
-    """`separatrix points`: every start for the whole duration."""
+FULL = ("--set", 'run.stop="duration"')
+ONE_BY_ONE = ("--set", 'integrator.lanes="off"')
 
-    def __init__(self, program: Program, law: str, starts: np.ndarray, short: int) -> None:
-        self.program, self.law, self.starts, self.short = program, law, starts, short
+
+class Maps:
+    """`separatrix basin`: a fine map minus a coarse one; both search for the attractors first."""
+
+    def __init__(self, program: Program, law: str, sizes: tuple[int, int], *words: str) -> None:
+        self.program, self.law, self.sizes, self.words = program, law, sizes, words
         self.path = Path()
 
     def round(self) -> Timing:
-        """A long list minus the short list at its beginning."""
-        name = f"points_{self.law}"
-        short, _ = self.program.points(self.law, self.starts[: self.short], f"{name}_short")
-        long, self.path = self.program.points(self.law, self.starts, name)
-        return long - short
-
-    def outcomes(self) -> Outcomes:
-        """What the last long run found."""
-        return read_points(self.path)
-
-
-class StoppedRuns:
-    """`separatrix basin`: every start until it is captured."""
-
-    def __init__(self, program: Program, short: int, long: int) -> None:
-        self.program, self.short, self.long = program, short, long
-        self.path = Path()
-
-    def round(self) -> Timing:
-        """A fine map minus a coarse one; both search for the attractors first."""
-        short, _ = self.program.basin(self.short, "basin_short")
-        long, self.path = self.program.basin(self.long, "basin")
+        """Both maps once."""
+        name = "_".join(["map", self.law, *(word for word in self.words if word != "--set")]).replace('"', "")
+        short, _ = self.program.basin(self.law, self.sizes[0], f"{name}_short", *self.words)
+        long, self.path = self.program.basin(self.law, self.sizes[1], name, *self.words)
         return long - short
 
     def labels(self, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -96,6 +82,14 @@ class StoppedRuns:
             i, j = np.unravel_index(chosen, regime.shape)
             starts = np.column_stack([file["x0"][()][i], file["v0"][()][j]])
         return starts, np.isin(regime[i, j], IMPACT_REGIMES)
+
+
+def flips(program: Program, count: int) -> tuple[int, int]:
+    """Labels of a map that differ when nothing ends at its capture, and points of the map."""
+    _, stopped = program.basin("coulomb", count, "stopped_map")
+    _, full = program.basin("coulomb", count, "full_map", *FULL)
+    with h5py.File(stopped) as one, h5py.File(full) as other:
+        return int(np.sum(one["attractor"][()] != other["attractor"][()])), count**2
 
 
 def read_points(path: Path) -> Outcomes:

@@ -88,19 +88,23 @@ contains
     type(attractor_t), intent(in) :: catalogue(:)
     type(state_t), intent(in) :: state
     logical, intent(in) :: slipped
+    real(wp) :: x, v
     integer :: k, i
-    real(wp) :: d(2)
     found = 0
     do k = 1, size(catalogue)
-      if (catalogue(k)%rests .and. .not. slipped) found = k
-      do i = 1, catalogue(k)%period
-        if (catalogue(k)%rests) exit
-        d = ([state%x, state%v] - catalogue(k)%points(:, i))/catalogue(k)%scale
-        associate (s => catalogue(k)%metric(:, i))
-          if (s(1)*d(1)**2 + 2*s(2)*d(1)*d(2) + s(3)*d(2)**2 <= catalogue(k)%capture_radius**2) found = k
-        end associate
-        if (found > 0) return
-      end do
+      associate (attractor => catalogue(k))
+        if (attractor%rests) then
+          if (.not. slipped) found = k
+        else
+          do i = 1, attractor%period
+            x = (state%x - attractor%points(1, i))/attractor%scale(1)
+            v = (state%v - attractor%points(2, i))/attractor%scale(2)
+            if (attractor%metric(1, i)*x**2 + 2*attractor%metric(2, i)*x*v + attractor%metric(3, i)*v**2 &
+                <= attractor%capture_radius**2) found = k
+            if (found > 0) return
+          end do
+        end if
+      end associate
       if (found > 0) return
     end do
   end function find_capture

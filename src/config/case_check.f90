@@ -39,6 +39,12 @@ contains
                     to_text(run%duration)//' s')
       end if
     end associate
+    associate (refine => the_case%refine)
+      if (modulo(refine%block, refine%step) /= 0) then
+        call report(source, 'refine.block', 'found '//to_text(refine%block)//', allowed a multiple of the step '// &
+                    to_text(refine%step))
+      end if
+    end associate
     before = size(source%problems)
     call check_laws(source, the_case%laws, '')
     if (size(source%problems) > before) return

@@ -8,6 +8,7 @@ module case_echo
   use case_type, only: case_t, sweep_t
   use kinds, only: wp
   use law_table, only: law_choice_t, parameter_row_t, parameters_of
+  use refinement, only: refine_t
   use text, only: to_text
   use toml_bindings, only: hash_text
   implicit none
@@ -56,6 +57,7 @@ contains
       text = text//newline//'[[axis]]'//newline//line('name', quoted(trim(the_case%axes(i)%name)))// &
              values_text(the_case%axes(i)%values)
     end do
+    if (the_case%refine%active) text = text//refine_text(the_case%refine)
     if (the_case%sweep%present) text = text//sweep_text(the_case%sweep)
   end function deciding_text
 
@@ -106,6 +108,18 @@ contains
              line('samples_per_period', to_text(the_case%trajectory%samples_per_period))
     end associate
   end function settings_text
+
+  pure function refine_text(refine) result(text)
+    type(refine_t), intent(in) :: refine
+    character(len=:), allocatable :: text
+    text = newline//'[refine]'//newline// &
+           line('step', to_text(refine%step))// &
+           line('block', to_text(refine%block))// &
+           line('contrast', to_text(refine%contrast))// &
+           line('contrast_side', to_text(refine%contrast_side))// &
+           line('probes', to_text(refine%probes))// &
+           line('seed', to_text(refine%seed))
+  end function refine_text
 
   pure function sweep_text(sweep) result(text)
     type(sweep_t), intent(in) :: sweep

@@ -15,6 +15,7 @@ module case_reader
   use kinds, only: wp
   use law_reader, only: read_laws
   use law_table, only: largest_angle
+  use refinement, only: largest_block, largest_step, most_probes
   use toml_bindings, only: read_text_file
   implicit none
   private
@@ -53,6 +54,7 @@ contains
     call read_integrator(source, the_case)
     call read_attractors(source, the_case)
     call read_axes(source, the_case)
+    call read_refine(source, the_case)
     call read_sweep(source, the_case)
     call read_trajectory(source, the_case)
     call read_record(source, the_case)
@@ -114,6 +116,20 @@ contains
       call take_integer(source, 'attractors.max_period', 1, attractors%max_period, highest=longest_period)
     end associate
   end subroutine read_attractors
+
+  subroutine read_refine(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    call enter_table(source, 'refine', the_case%refine%active)
+    associate (refine => the_case%refine)
+      call take_integer(source, 'refine.step', 2, refine%step, highest=largest_step)
+      call take_integer(source, 'refine.block', 0, refine%block, highest=largest_block)
+      call take_real(source, 'refine.contrast', more_than(0.0_wp, '1'), refine%contrast)
+      call take_integer(source, 'refine.contrast_side', 1, refine%contrast_side)
+      call take_integer(source, 'refine.probes', 1, refine%probes, highest=most_probes)
+      call take_integer(source, 'refine.seed', 0, refine%seed)
+    end associate
+  end subroutine read_refine
 
   subroutine read_trajectory(source, the_case)
     type(case_source_t), intent(inout) :: source

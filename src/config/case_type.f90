@@ -6,6 +6,7 @@ module case_type
   use axis, only: axis_t
   use kinds, only: wp
   use law_table, only: families, law_choice_t
+  use refinement, only: refine_t
   implicit none
   private
 
@@ -33,7 +34,7 @@ module case_type
     !> 'auto', 'exact' or 'adaptive'.
     character(len=8) :: flight = 'auto'
     !> Whether many trajectories fly at once, in vectors, where the machine allows: auto or off.
-    character(len=4) :: lanes = 'auto'
+    character(len=8) :: lanes = 'auto'
     !> Relative tolerance of the adaptive flight.
     real(wp) :: tolerance = 1e-13_wp
     !> Most events of one trajectory.
@@ -89,6 +90,7 @@ module case_type
     type(axis_t), allocatable :: axes(:)
     !> Points of a tile along each axis, 0 = automatic.
     integer, allocatable :: tile(:)
+    type(refine_t) :: refine
     type(sweep_t) :: sweep
     type(trajectory_t) :: trajectory
     type(record_t) :: record

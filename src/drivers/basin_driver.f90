@@ -4,21 +4,25 @@
 !> `separatrix basin`: where every point of a grid ends up.
 module basin_driver
   use attractors, only: last_regime, regime_names
-  use basin, only: basin_points, basin_variables, catalogue_t, open_journey, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, marks_of_attractor, open_journey, settling_value, &
+    slice_cache_t
   use case_check, only: require_axes
-  use case_setup, only: automatic_tile, grid_of, output_path, span_of
+  use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
   use errors, only: error_t
-  use file_layout, only: add_axes, add_catalogue, add_map_variables
-  use grid, only: grid_t, point_slice
+  use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
+  use grid, only: grid_t, point_slice, slice_period, two_axes
   use journal, only: json_text
   use kinds, only: int64, wp
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
+  use refinement, only: automatic_block, last_origin
+  use refinement_report, only: add_refinement, report_refinement
+  use refined_tile, only: layers_of, pilot_share
   use session, only: describe_file, open_session, session_t
-  use status, only: last_reason, exit_done, reason_names
+  use status, only: last_reason, exit_done, reason_names, reason_settled
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectories, only: block_size, describe_all, journey_t
@@ -29,7 +33,8 @@ module basin_driver
   public :: run_basin
 
   !> Bytes of a point in the working file.
-  integer, parameter, public :: bytes_per_point = 1 + 2 + 1 + 2 + 8 + 8*4
+  integer, parameter, public :: bytes_per_point = 1 + 4 + 1 + 2 + 8 + 8*4
+  integer, parameter :: bytes_per_refined_point = 1 + 4 + 1 + 2 + 8 + 1
   !> Slices up to which a dry run builds the catalogues.
   integer, parameter :: most_dry_slices = 16
 
@@ -42,11 +47,17 @@ module basin_driver
     !> Points per regime, per reason, and per entry of the catalogue.
     integer(int64) :: regimes(0:last_regime) = 0, reasons(0:last_reason) = 0
     integer(int64), allocatable :: captured(:)
+    !> Points of a refined map per origin.
+    integer(int64) :: origins(0:last_origin) = 0
+    !> The slice whose drive period [s] was last asked for.
+    integer(int64) :: period_slice = -1
+    real(wp) :: period = 1
     !> Entries of the catalogue before each slice.
     integer, allocatable :: offset(:)
   contains
     procedure :: compute => compute_basin_points
     procedure :: note => note_basin_point
+    procedure :: tell_apart => tell_apart_basin_points
   end type basin_work_t
 
 contains
@@ -70,7 +81,9 @@ contains
     work%grid = grid_of(session%the_case, session%the_case%axes)
     work%span = span_of(session%the_case)
     work%max_period = session%the_case%attractors%max_period
+    call prepare_refinement(session%the_case, work)
     tile = automatic_tile(work%grid, session%the_case%tile)
+    if (work%refine%active) tile = tile_of_blocks(work%grid, work%refine, session%the_case%tile)
     if (command%validate) then
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
@@ -93,13 +106,19 @@ contains
     call report_catalogue(session, work)
     call describe_file(session, 'basin', schema)
     call add_axes(schema, work%grid%axes, dimensions)
-    call add_map_variables(schema, '', dimensions)
+    if (work%refine%active) then
+      call add_refined_variables(schema, dimensions)
+    else
+      call add_map_variables(schema, '', dimensions)
+    end if
     call open_tiles(session, path, schema, dimensions, tile, file)
     call run_tiles(session, file, work, complete)
     call sum_counts(session, work)
     call add_catalogue(extra, work%catalogues, work%captured)
+    if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
     call finish_tiles(session, file, complete, extra)
     call report_shares(session, work)
+    if (work%refine%active) call report_refinement(session, work, work%grid%shape, work%origins)
     call session%end_with(exit_done)
   end subroutine run_basin
 
@@ -112,6 +131,16 @@ contains
     call open_journey(work%grid, work%span, 0_int64, describe_all, journey, error)
     if (.not. allocated(error)) work%block = block_size(journey)
   end subroutine choose_block
+
+  subroutine prepare_refinement(the_case, work)
+    type(case_t), intent(in) :: the_case
+    type(basin_work_t), intent(inout) :: work
+    work%refine = the_case%refine
+    work%refined_axes = two_axes(work%grid)
+    work%refine%block = automatic_block(work%refine, work%grid%shape(work%refined_axes), layers_of(work%grid%shape, &
+                                                                                                   work%refined_axes))
+    work%marks = marks_of_attractor
+  end subroutine prepare_refinement
 
   subroutine prepare_counts(work)
     type(basin_work_t), intent(inout) :: work
@@ -132,6 +161,27 @@ contains
     call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
   end subroutine compute_basin_points
 
+  !> Points of one cell are to have the same attractor, and to settle about equally fast.
+  subroutine tell_apart_basin_points(self, index, values, marks, settling, error)
+    class(basin_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(in) :: values(:, :)
+    real(wp), intent(out) :: marks(:, :), settling(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: slice
+    integer :: i
+    marks = values(:, :marks_of_attractor)
+    settling = 0
+    do i = 1, size(settling)
+      if (nint(values(i, 3)) /= reason_settled) cycle
+      slice = point_slice(self%grid, index(:, i))
+      if (slice /= self%period_slice) call slice_period(self%grid, slice, self%period, error)
+      if (allocated(error)) return
+      self%period_slice = slice
+      settling(i) = values(i, settling_value)/self%period
+    end do
+  end subroutine tell_apart_basin_points
+
   subroutine note_basin_point(self, index, values)
     class(basin_work_t), intent(inout) :: self
     integer, intent(in) :: index(:)
@@ -141,6 +191,11 @@ contains
     associate (regime => nint(values(1)), label => nint(values(2)), reason => nint(values(3)))
       self%regimes(regime) = self%regimes(regime) + 1
       self%reasons(reason) = self%reasons(reason) + 1
+      if (self%refine%active) then
+        associate (origin => nint(values(marks_of_attractor + 1)))
+          self%origins(origin) = self%origins(origin) + 1
+        end associate
+      end if
       if (label == 0 .or. size(self%catalogues) == 0) return
       slice = point_slice(self%grid, index) + 1
       do k = 1, size(self%catalogues(slice)%attractors)
@@ -156,6 +211,7 @@ contains
     type(basin_work_t), intent(inout) :: work
     call session%team%sum(work%regimes)
     call session%team%sum(work%reasons)
+    call session%team%sum(work%origins)
     if (size(work%captured) > 0) call session%team%sum(work%captured)
   end subroutine sum_counts
 
@@ -165,10 +221,17 @@ contains
     type(basin_work_t), intent(inout) :: work
     integer, intent(in) :: tile(:)
     type(error_t), allocatable :: error
-    real(wp) :: seconds
-    call pilot_seconds(work, work%grid%shape, seconds, error)
-    call session%stop_if(error)
-    call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_point, seconds))
+    real(wp) :: seconds, share
+    if (work%refine%active) then
+      call pilot_share(work, work%grid%shape, seconds, share, error)
+      call session%stop_if(error)
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_refined_point, seconds))
+      call session%journal%line('plan', 'about '//to_text(100*share, 2)//' % of the points computed (from a few blocks)')
+    else
+      call pilot_seconds(work, work%grid%shape, seconds, error)
+      call session%stop_if(error)
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_point, seconds))
+    end if
     call session%end_with(exit_done)
   end subroutine report_plan
 

@@ -5,18 +5,22 @@
 module case_setup
   use axis, only: axis_t
   use case_type, only: case_t
-  use grid, only: grid_t, make_grid
+  use grid, only: grid_t, make_grid, two_axes
   use kinds, only: int64, wp
   use lanes, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
+  use refinement, only: refine_t
   use trajectory, only: span_t
   implicit none
   private
 
-  public :: options_of, span_of, grid_of, output_path, automatic_tile
+  public :: options_of, span_of, grid_of, output_path, automatic_tile, tile_of_blocks
 
   !> Doubles per vector, to try a narrower kernel than the processor allows (2, 4, 8). The results are the same.
   character(len=*), parameter :: width_variable = 'SEPARATRIX_LANE_WIDTH'
+
+  !> Most tiles of a grid where the case leaves their shape open.
+  real(wp), parameter :: most_tiles = 2.0_wp**20
 
 contains
 
@@ -83,14 +87,17 @@ contains
     path = path//'.h5'
   end function output_path
 
-  !> Tile shape where the case leaves it open: about a thousand trajectories of one slice.
+  !> Tile shape where the case leaves it open: about a thousand trajectories of one slice, more on a grid that would have
+  !> more than `most_tiles`, because every rank keeps a list of the tiles.
   pure function automatic_tile(grid, asked) result(tile)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: asked(:)
     integer :: tile(size(grid%shape))
+    logical :: free(size(grid%shape))
     integer :: i, starts
     starts = count(grid%start_axis > 0)
     do i = 1, size(tile)
+      free(i) = any(grid%start_axis == i) .or. starts == 0
       if (any(grid%start_axis == i)) then
         tile(i) = max(1, nint(1024.0_wp**(1.0_wp/starts)))
       else if (starts == 0) then
@@ -99,10 +106,32 @@ contains
         tile(i) = 1
       end if
       if (i <= size(asked)) then
-        if (asked(i) > 0) tile(i) = asked(i)
+        if (asked(i) > 0) then
+          tile(i) = asked(i)
+          free(i) = .false.
+        end if
       end if
       tile(i) = min(tile(i), grid%shape(i))
     end do
+    do while (product(ceiling(real(grid%shape, wp)/tile)*1.0_wp) > most_tiles)
+      free = free .and. tile < grid%shape
+      if (.not. any(free)) exit
+      i = minloc(tile, dim=1, mask=free)
+      tile(i) = min(2*tile(i), grid%shape(i))
+    end do
   end function automatic_tile
+
+  !> Tile shape of a refined map: whole blocks, one unless more are asked for.
+  pure function tile_of_blocks(grid, refine, asked) result(tile)
+    type(grid_t), intent(in) :: grid
+    type(refine_t), intent(in) :: refine
+    integer, intent(in) :: asked(:)
+    integer :: tile(size(grid%shape)), axes(2)
+    tile = 1
+    tile(:size(asked)) = max(1, asked)
+    axes = two_axes(grid)
+    tile(axes) = (tile(axes) + refine%block - 1)/refine%block*refine%block
+    tile = min(tile, grid%shape)
+  end function tile_of_blocks
 
 end module case_setup

@@ -1,18 +1,21 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Builds the catalogues of all slices of a grid on a team: every rank discovers its share of the slices, then all
-!> are known to all. The result does not depend on the number of ranks.
+!> Builds the catalogues of all slices of a grid on a team: slices are handed out to the ranks, for their costs differ,
+!> then all are known to all. The result does not depend on the number of ranks.
 module catalogue_search
   use attractors, only: attractor_t, pack_attractor, packed_size, unpack_attractor
   use basin, only: catalogue_t, label_slices, open_slice, search_starts
   use case_type, only: attractors_t
   use discover, only: discover_attractors, sort_attractors
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use grid, only: grid_t, slice_neighbours
   use journal, only: journal_t
   use kinds, only: int64, wp
   use motion, only: motion_t
+  use parallel, only: make_scheduler
+  use scheduler, only: scheduler_options_t, scheduler_t
+  use status, only: exit_resumable
   use stop_check, only: check_stop
   use team, only: team_t
   use trajectory, only: span_t
@@ -20,7 +23,6 @@ module catalogue_search
   private
 
   public :: search_catalogues
-
 
 contains
 
@@ -37,37 +39,74 @@ contains
     type(catalogue_t), allocatable, intent(out) :: catalogues(:)
     type(error_t), allocatable, intent(out) :: error
     type(catalogue_t), allocatable :: first_round(:)
-    real(wp), allocatable :: starts(:, :)
-    integer(int64) :: slice
+    logical, allocatable :: mine(:)
     integer :: round, rounds
     allocate (catalogues(merge(grid%slices, 0_int64, any(grid%start_axis > 0))))
     if (size(catalogues) == 0) return
     rounds = merge(2, 1, grid%slices > 1)
     call journal%begin('slices', rounds*grid%slices, 0_int64)
+    allocate (first_round(0))
     do round = 1, rounds
       if (round == 2) first_round = catalogues
-      do slice = team%rank(), grid%slices - 1, team%size()
-        if (round == 1) then
-          starts = search_starts(grid, settings%sample, settings%seed)
-        else
-          starts = search_starts(grid, settings%sample, settings%seed, &
-                                 attractors_of(first_round, slice_neighbours(grid, slice, .true.)))
-        end if
-        call search_slice(journal, grid, span, slice, starts, settings%max_period, time_limit, &
-                          catalogues(slice + 1), error)
-        if (allocated(error)) exit
-        call journal%progress((round - 1)*grid%slices + slice + 1)
-      end do
-      call team%agree(error)
+      call search_round(team, journal, grid, span, settings, time_limit, first_round, catalogues, mine, error)
       if (allocated(error)) return
-      call exchange(team, catalogues)
+      ! Large where the slices are many.
+      if (round == rounds) deallocate (first_round)
+      call exchange(team, mine, catalogues)
     end do
     call label_slices(grid, catalogues)
   end subroutine search_catalogues
 
+  !> Every slice once: from the sample, or from the attractors of its neighbours in the `first_round` if that has any.
+  !> `mine`: the slices that this rank searched.
+  subroutine search_round(team, journal, grid, span, settings, time_limit, first_round, catalogues, mine, error)
+    class(team_t), intent(in) :: team
+    type(journal_t), intent(inout) :: journal
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    type(attractors_t), intent(in) :: settings
+    real(wp), intent(in) :: time_limit
+    type(catalogue_t), intent(in) :: first_round(:)
+    type(catalogue_t), intent(inout) :: catalogues(:)
+    logical, allocatable, intent(out) :: mine(:)
+    type(error_t), allocatable, intent(out) :: error
+    class(scheduler_t), allocatable :: slices
+    real(wp), allocatable :: starts(:, :)
+    integer(int64) :: slice
+    integer :: position
+    allocate (mine(size(catalogues)), source=.false.)
+    call make_scheduler(team, scheduler_options_t(), slices, error)
+    if (.not. allocated(error)) call slices%start(size(catalogues), error)
+    call team%agree(error)
+    if (allocated(error)) return
+    do
+      call slices%next(position)
+      if (position == 0) exit
+      slice = position - 1
+      if (size(first_round) == 0) then
+        starts = search_starts(grid, settings%sample, settings%seed)
+      else
+        starts = search_starts(grid, settings%sample, settings%seed, &
+                               attractors_of(first_round, slice_neighbours(grid, slice, .true.)))
+      end if
+      call search_slice(journal, slices, grid, span, slice, starts, settings%max_period, time_limit, &
+                        catalogues(position), error)
+      if (allocated(error)) call slices%request_stop()
+      if (slices%stop_requested()) exit
+      mine(position) = .true.
+      call journal%progress(merge(0_int64, grid%slices, size(first_round) == 0) + slices%done_count() + 1)
+    end do
+    call slices%finish()
+    call team%agree(error)
+    if (allocated(error)) return
+    if (slices%stop_requested()) call fail(error, exit_resumable, 'stopped while searching for attractors; nothing '// &
+      'was written yet, the same command starts again')
+  end subroutine search_round
+
   !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is heard between them.
-  subroutine search_slice(journal, grid, span, slice, starts, max_period, time_limit, catalogue, error)
+  subroutine search_slice(journal, slices, grid, span, slice, starts, max_period, time_limit, catalogue, error)
     type(journal_t), intent(in) :: journal
+    class(scheduler_t), intent(inout) :: slices
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer(int64), intent(in) :: slice
@@ -82,7 +121,9 @@ contains
     do i = 1, size(starts, 2)
       call discover_attractors(moving, span, starts(:, i:i), max_period, catalogue%attractors)
       call check_stop(journal, time_limit, 'searching for attractors', error)
+      call slices%poll()
       if (allocated(error)) return
+      if (slices%stop_requested()) return
     end do
     call sort_attractors(catalogue%attractors)
   end subroutine search_slice
@@ -100,18 +141,21 @@ contains
   end function attractors_of
 
   !> Every rank gets the catalogues of the slices that the others searched: slice, number of attractors, and these.
-  subroutine exchange(team, catalogues)
+  subroutine exchange(team, searched, catalogues)
     class(team_t), intent(in) :: team
+    logical, intent(in) :: searched(:)
     type(catalogue_t), intent(inout) :: catalogues(:)
     real(wp), allocatable :: mine(:), all_values(:)
     integer :: slice, i, position, count
     count = 0
-    do slice = team%rank() + 1, size(catalogues), team%size()
+    do slice = 1, size(catalogues)
+      if (.not. searched(slice)) cycle
       count = count + 2 + packed_size*size(catalogues(slice)%attractors)
     end do
     allocate (mine(count))
     position = 0
-    do slice = team%rank() + 1, size(catalogues), team%size()
+    do slice = 1, size(catalogues)
+      if (.not. searched(slice)) cycle
       mine(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
       position = position + 2
       do i = 1, size(catalogues(slice)%attractors)

@@ -24,7 +24,7 @@ module command_line
     character(len=:), allocatable :: name
     !> The case, or the file of `info` and `verify`.
     character(len=:), allocatable :: path
-    character(len=:), allocatable :: output, list, csv, record
+    character(len=:), allocatable :: output, list, csv, record, tile_times
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -49,6 +49,7 @@ contains
     command%list = ''
     command%csv = ''
     command%record = ''
+    command%tile_times = ''
     allocate (command%overrides(0))
     position = 0
     do while (position < command_argument_count())
@@ -90,6 +91,8 @@ contains
       call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
     else if (len(command%record) > 0 .and. command%name /= 'trajectory') then
       call fail(error, exit_usage, '--record belongs to the command trajectory')
+    else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
+      call fail(error, exit_usage, '--tile-times belongs to the commands '//join(resumable, ', '))
     else if (command%resume .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
     else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
@@ -114,6 +117,9 @@ contains
     else if (len(command%record) > 0 .and. (command%record == command%path .or. command%record == command%output .or. &
                                             command%record == command%csv)) then
       call fail(error, exit_usage, "--record '"//command%record//"' would replace another file of the command")
+    else if (len(command%tile_times) > 0 .and. any([command%path == command%tile_times, command%list == command%tile_times, &
+                                                    command%output == command%tile_times, command%csv == command%tile_times])) then
+      call fail(error, exit_usage, "--tile-times '"//command%tile_times//"' is another file of the run")
     end if
   end subroutine check_outputs
 
@@ -145,8 +151,8 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--time-limit', '--ranks-per-node', '--sample', &
-          '--seed')
+    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--tile-times', '--time-limit', '--ranks-per-node', &
+          '--sample', '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -171,7 +177,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv', '--record')
+    case ('-o', '--output', '--list', '--csv', '--record', '--tile-times')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -195,6 +201,8 @@ contains
     select case (name)
     case ('--list')
       command%list = value
+    case ('--tile-times')
+      command%tile_times = value
     case ('--csv')
       command%csv = value
     case ('--record')
@@ -296,6 +304,7 @@ contains
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
+      '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &
       '  --json             log as JSON lines'//nl// &
       '  -q, --quiet        errors only'//nl// &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &

@@ -11,11 +11,12 @@ module file_layout
     type_int64, type_int8
   use motion_state, only: event_names
   use status, only: last_reason, reason_names
+  use refinement, only: last_origin, origin_names
   use text, only: join, replace_all
   implicit none
   private
 
-  public :: axis_dimension, add_axes, add_map_variables, add_catalogue, add_regime, add_reason, add_events
+  public :: axis_dimension, add_axes, add_map_variables, add_refined_variables, add_catalogue, add_regime, add_reason, add_events
 
   character(len=*), parameter :: coded_unit = '1'
 
@@ -91,30 +92,58 @@ contains
   subroutine add_map_variables(schema, prefix, dimensions)
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: prefix, dimensions(:)
-    call add_regime(schema, prefix//'regime', dimensions, .true.)
-    call add(2, type_int32, '1', 'label of the attractor in the catalogue, 0 = none')
-    call add_reason(schema, prefix//'reason', dimensions, .true.)
-    call add(4, type_int16, '1', 'period in drive periods, 0 = not periodic')
-    call add(5, type_int64, '1', 'events of one period of the motion, three bits each')
-    call add(6, type_float32, '1', 'impacts per drive period')
-    call add(7, type_float32, 'm/s', 'mean speed just before impact')
-    call add(8, type_float32, 'm', 'half the range of the position')
-    call add(9, type_float32, 'm', 'largest position')
-    call add(10, type_float32, 'm', 'smallest position')
-    call add(11, type_float32, 'm/s', 'largest velocity towards the upper barrier')
-    call add(12, type_float32, 's', 'time from the start to capture by the attractor')
-    call add(13, type_float32, 'm', 'smallest distance to a barrier at a turning point that missed it')
+    call add_marks(schema, prefix, dimensions)
+    call add(6, '1', 'impacts per drive period')
+    call add(7, 'm/s', 'mean speed just before impact')
+    call add(8, 'm', 'half the range of the position')
+    call add(9, 'm', 'largest position')
+    call add(10, 'm', 'smallest position')
+    call add(11, 'm/s', 'largest velocity towards the upper barrier')
+    call add(12, 's', 'time from the start to capture by the attractor')
+    call add(13, 'm', 'smallest distance to a barrier at a turning point that missed it')
 
   contains
 
-    subroutine add(number, type, units, long_name)
-      integer, intent(in) :: number, type
+    subroutine add(number, units, long_name)
+      integer, intent(in) :: number
       character(len=*), intent(in) :: units, long_name
-      call schema%add_variable(prefix//trim(map_variables(number)), type, dimensions, units=units, &
+      call schema%add_variable(prefix//trim(map_variables(number)), type_float32, dimensions, units=units, &
                                long_name=long_name, tiled=.true.)
     end subroutine add
 
   end subroutine add_map_variables
+
+  !> The first variables, by which points are told apart.
+  subroutine add_marks(schema, prefix, dimensions)
+    type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in) :: prefix, dimensions(:)
+    call add_regime(schema, prefix//'regime', dimensions, .true.)
+    call add(2, type_int32, 'label of the attractor in the catalogue, 0 = none')
+    call add_reason(schema, prefix//'reason', dimensions, .true.)
+    call add(4, type_int16, 'period in drive periods, 0 = not periodic')
+    call add(5, type_int64, 'events of one period of the motion, three bits each')
+
+  contains
+
+    subroutine add(number, type, long_name)
+      integer, intent(in) :: number, type
+      character(len=*), intent(in) :: long_name
+      call schema%add_variable(prefix//trim(map_variables(number)), type, dimensions, units=coded_unit, &
+                               long_name=long_name, tiled=.true.)
+    end subroutine add
+
+  end subroutine add_marks
+
+  !> The variables of a refined map's points: those that all points of a cell share, and where they come from.
+  subroutine add_refined_variables(schema, dimensions)
+    type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in) :: dimensions(:)
+    integer :: i
+    call add_marks(schema, '', dimensions)
+    call schema%add_variable('origin', type_int8, dimensions, units=coded_unit, &
+      long_name='whether the point was computed, or inferred from the corners of a cell of at most so many points', &
+      flag_values=[(i, i=0, last_origin)], flag_meanings=join(origin_names, ' '), tiled=.true.)
+  end subroutine add_refined_variables
 
   !> The catalogue as a table; `counts(entry)` = points captured.
   subroutine add_catalogue(schema, catalogues, counts)

@@ -44,6 +44,7 @@ contains
     if (.not. allocated(error)) call add_variables(variables, json, body)
     if (.not. allocated(error)) call add_codes(reader, json, 'regime', regime_names, body, error)
     if (.not. allocated(error)) call add_codes(reader, json, 'reason', reason_names, body, error)
+    if (.not. allocated(error)) call add_refinement(reader, json, body, error)
     if (.not. allocated(error)) call add_catalogue(reader, json, body, error)
     if (.not. allocated(error)) call add_limits(reader, json, body, error)
     if (allocated(error)) return
@@ -179,6 +180,50 @@ contains
       end do
     end do
   end subroutine count_codes
+
+  !> How much of a refined map was computed, and how much of it can be wrong.
+  subroutine add_refinement(reader, json, body, error)
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: json
+    character(len=:), allocatable, intent(inout) :: body
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: names(6) = [character(len=23) :: 'points_computed', 'points_inferred', &
+      'probes_drawn', 'probes_contradicted', 'wrong_share_upper_limit', 'confidence']
+    real(wp) :: values(size(names))
+    integer :: i
+    do i = 1, size(names)
+      if (.not. reader%has_attribute('/refinement', trim(names(i)))) return
+      call reader%number_attribute('/refinement', trim(names(i)), values(i), error)
+      if (allocated(error)) return
+    end do
+    if (json) then
+      body = body//', "refinement": {'
+      do i = 1, size(names)
+        body = body//json_text(trim(names(i)))//': '//number_text(i)//', '
+      end do
+      body = body//'"percent_computed": '//to_text(100*values(1)/(values(1) + values(2)))//'}'
+    else
+      body = body//new_line('a')//'  refined:'// &
+        new_line('a')//'    computed: '//number_text(1)//' points, '//to_text(100*values(1)/(values(1) + values(2)), 4)//' %'// &
+        new_line('a')//'    inferred: '//number_text(2)//' points'// &
+        new_line('a')//'    probes: '//number_text(3)//' drawn, '//number_text(4)//' found something else (mended)'// &
+        new_line('a')//'    wrong: at most '//to_text(100*values(5), 3)//' % of the points, with '// &
+        to_text(100*values(6), 2)//' % confidence'
+    end if
+
+  contains
+
+    function number_text(i) result(text)
+      integer, intent(in) :: i
+      character(len=:), allocatable :: text
+      if (i <= 4) then
+        text = to_text(nint(values(i), int64))
+      else
+        text = to_text(values(i))
+      end if
+    end function number_text
+
+  end subroutine add_refinement
 
   subroutine add_catalogue(reader, json, body, error)
     type(reader_t), intent(in) :: reader

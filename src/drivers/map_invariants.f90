@@ -46,6 +46,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=*), parameter :: names(7) = [character(len=18) :: 'regime', 'reason', 'attractor', &
       'impacts_per_period', 'amplitude', 'x_max', 'x_min']
+    integer :: known
     integer(int64), allocatable :: lengths(:), lower(:), extent(:)
     real(wp), allocatable :: column(:), block(:, :)
     real(wp), allocatable :: labels(:), regimes(:)
@@ -60,11 +61,13 @@ contains
     end if
     if (allocated(error)) return
     allocate (lower(size(lengths)), extent(size(lengths)))
+    ! A refined map has no more.
+    known = merge(3, size(names), reader%has('/origin'))
     do k = 1, slab_count(lengths)
       call slab(lengths, k, lower, extent)
       if (allocated(block)) deallocate (block)
-      allocate (block(product(extent), size(names)))
-      do i = 1, size(names)
+      allocate (block(product(extent), known))
+      do i = 1, known
         call reader%read_block('/'//prefix//trim(names(i)), lower, extent, column, error)
         if (allocated(error)) return
         block(:, i) = column
@@ -92,17 +95,15 @@ contains
               ' with the label of attractor '//to_text(label)//', which has no such regime in the catalogue')
   end subroutine check_label
 
-  !> One point: regime, reason, attractor, impacts per period, amplitude, x_max, x_min.
+  !> One point: regime, reason, attractor, and unless the map is refined impacts per period, amplitude, x_max, x_min.
   subroutine check_point(path, number, values, error)
     character(len=*), intent(in) :: path
     integer(int64), intent(in) :: number
-    real(wp), intent(in) :: values(7)
+    real(wp), intent(in) :: values(:)
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: problem
-    real(wp) :: rounding
     problem = ''
     associate (regime => nint(values(1)), reason => nint(values(2)), attractor => nint(values(3)))
-      rounding = 1e-6_wp*(abs(values(6)) + abs(values(7)))
       if (reason <= reason_not_run .or. reason > last_reason) then
         problem = 'reason code '//to_text(reason)
       else if (regime < 0 .or. regime > last_regime) then
@@ -111,16 +112,28 @@ contains
         problem = 'regime '//trim(regime_names(regime))//' with reason '//trim(reason_names(reason))
       else if (attractor /= 0 .and. regime == regime_unresolved) then
         problem = 'an attractor without a regime'
-      else if ((values(4) > 0) .neqv. any(regime == [regime_impact, regime_mixed, regime_chattering])) then
-        problem = to_text(values(4))//' impacts per period with regime '//trim(regime_names(regime))
-      else if (regime /= regime_unresolved .and. .not. abs(2*values(5) - (values(6) - values(7))) <= rounding) then
-        problem = 'the amplitude is not half the range of the position'
-      else if (regime == regime_at_rest .and. values(5) > 0) then
-        problem = 'a body at rest with an amplitude'
+      else if (size(values) == 7) then
+        problem = problem_of_motion(regime, values(4), values(5), values(6), values(7))
       end if
     end associate
     if (len(problem) > 0) call fail(error, exit_io, "'"//path//"', point "//to_text(number)//': '//problem)
   end subroutine check_point
+
+  !> What is wrong with the description of a motion; '' if nothing is.
+  pure function problem_of_motion(regime, impacts, amplitude, x_max, x_min) result(problem)
+    integer, intent(in) :: regime
+    real(wp), intent(in) :: impacts, amplitude, x_max, x_min
+    character(len=:), allocatable :: problem
+    problem = ''
+    if ((impacts > 0) .neqv. any(regime == [regime_impact, regime_mixed, regime_chattering])) then
+      problem = to_text(impacts)//' impacts per period with regime '//trim(regime_names(regime))
+    else if (regime /= regime_unresolved .and. .not. &
+             abs(2*amplitude - (x_max - x_min)) <= 1e-6_wp*(abs(x_max) + abs(x_min))) then
+      problem = 'the amplitude is not half the range of the position'
+    else if (regime == regime_at_rest .and. amplitude > 0) then
+      problem = 'a body at rest with an amplitude'
+    end if
+  end function problem_of_motion
 
   !> The counts of the catalogue add up to the points with a label.
   subroutine check_counts(reader, error)

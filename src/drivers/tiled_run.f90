@@ -12,48 +12,34 @@ module tiled_run
   use map_final, only: finalise
   use map_schema, only: schema_t
   use parallel, only: make_scheduler
+  use point_work, only: compute_list, point_work_t, watch_t
+  use refined_tile, only: refine_tile
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
+  use tile_times, only: write_tile_times
   use tiles, only: new_tiling, tiling_t
   implicit none
   private
 
+  public :: point_work_t
   public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds
 
   !> Points of the small sample from which a dry run estimates the time.
   integer, parameter :: pilot_points = 64
 
-  !> What is computed at the points of a grid.
-  type, abstract, public :: point_work_t
-    integer :: variables = 0
-    !> Most points computed at a time: as many as a stop signal may wait for.
-    integer :: block = 1
+  !> Asks for signals and the time limit between pieces of a tile, and says how far the run is.
+  type, extends(watch_t) :: tile_watch_t
+    class(scheduler_t), pointer :: scheduler => null()
+    type(session_t), pointer :: session => null()
+    !> Points of the map, those done before this run, and the tiles that this run has to do.
+    integer(int64) :: total = 0, before = 0
+    integer :: unfinished = 0
   contains
-    procedure(compute_points), deferred :: compute
-    procedure(note_point), deferred :: note
-  end type point_work_t
-
-  abstract interface
-    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis.
-    subroutine compute_points(self, index, values, error)
-      import :: error_t, point_work_t, wp
-      class(point_work_t), intent(inout) :: self
-      integer, intent(in) :: index(:, :)
-      real(wp), intent(out) :: values(:, :)
-      type(error_t), allocatable, intent(out) :: error
-    end subroutine compute_points
-
-    !> Counts a point that is done, computed now or read back after an interruption.
-    subroutine note_point(self, index, values)
-      import :: point_work_t, wp
-      class(point_work_t), intent(inout) :: self
-      integer, intent(in) :: index(:)
-      real(wp), intent(in) :: values(:)
-    end subroutine note_point
-  end interface
+    procedure :: look => look_at_run
+  end type tile_watch_t
 
 contains
 
@@ -83,35 +69,40 @@ contains
 
   !> Computes every tile that is not yet done. `complete` is false after a stop.
   subroutine run_tiles(session, file, work, complete)
-    type(session_t), intent(inout) :: session
+    type(session_t), intent(inout), target :: session
     type(map_file_t), intent(inout) :: file
     class(point_work_t), intent(inout) :: work
     logical, intent(out) :: complete
-    class(scheduler_t), allocatable :: scheduler
+    class(scheduler_t), allocatable, target :: scheduler
+    type(tile_watch_t) :: watch
     type(error_t), allocatable :: error
     integer, allocatable :: unfinished(:)
-    integer(int64) :: total, before, computed(1)
+    integer(int64) :: computed(1)
     integer :: tile, position
     logical :: whole
     unfinished = pack([(tile, tile=1, file%tile_count())], [(.not. file%tile_done(tile), tile=1, file%tile_count())])
-    total = product(file%tiling%lengths)
-    before = note_earlier(session, file, work)
+    watch%total = product(file%tiling%lengths)
+    watch%before = note_earlier(session, file, work)
+    watch%unfinished = size(unfinished)
     if (session%command%resume) call session%journal%line('resumed', to_text(file%tile_count() - size(unfinished))// &
       ' of '//to_text(file%tile_count())//' tiles were done before')
-    call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node), &
-                        scheduler, error)
+    call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
+                        len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
     call session%stop_if(error)
+    watch%scheduler => scheduler
+    watch%session => session
     computed = 0
-    call session%journal%begin('points', total, before)
+    call session%journal%begin('points', watch%total, watch%before)
     do
       call scheduler%next(position)
       if (position == 0) exit
-      call run_tile(session, file, work, unfinished(position), scheduler, total, before, size(unfinished), whole)
+      call run_tile(session, file, work, unfinished(position), watch, whole)
       if (.not. whole) exit
       computed = computed + 1
     end do
     call scheduler%finish()
+    call write_tile_times(session, scheduler, unfinished)
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles
@@ -124,45 +115,49 @@ contains
   end function time_left
 
   !> One tile; left unwritten if a stop is requested on the way.
-  subroutine run_tile(session, file, work, tile, scheduler, total, before, unfinished, whole)
+  subroutine run_tile(session, file, work, tile, watch, whole)
     type(session_t), intent(inout) :: session
     type(map_file_t), intent(inout) :: file
     class(point_work_t), intent(inout) :: work
-    integer, intent(in) :: tile, unfinished
-    class(scheduler_t), intent(inout) :: scheduler
-    integer(int64), intent(in) :: total, before
+    integer, intent(in) :: tile
+    type(tile_watch_t), intent(inout) :: watch
     logical, intent(out) :: whole
     type(error_t), allocatable :: error
     real(wp), allocatable :: values(:, :)
     integer, allocatable :: index(:, :)
-    integer :: point, points, first, last
-    integer(int64) :: lower(size(file%tiling%lengths)), extent(size(file%tiling%lengths)), done
+    integer :: point, points
+    integer(int64) :: lower(size(file%tiling%lengths)), extent(size(file%tiling%lengths))
     call file%tiling%block_of(tile, lower, extent)
     points = int(product(extent))
-    allocate (values(points, work%variables), index(size(lower), points))
+    allocate (index(size(lower), points))
     do point = 1, points
       index(:, point) = index_in_block(lower, extent, point)
     end do
-    whole = .true.
-    do first = 1, points, work%block
-      last = min(first + work%block - 1, points)
-      call work%compute(index(:, first:last), values(first:last, :), error)
-      call session%abort_if(error)
-      call scheduler%poll()
-      if (scheduler%stop_requested()) then
-        whole = .false.
-        return
-      end if
-      if (.not. session%journal%active) cycle
-      done = before + nint(real(total - before, wp)*scheduler%done_count()/max(unfinished, 1), int64)
-      call session%journal%progress(done)
-    end do
+    if (work%refine%active) then
+      allocate (values(points, work%marks + 1))
+      call refine_tile(work, int(file%tiling%lengths), int(lower), int(extent), values, whole, error, watch)
+    else
+      allocate (values(points, work%variables))
+      call compute_list(work, index, values, whole, error, watch)
+    end if
+    call session%abort_if(error)
+    if (.not. whole) return
     call file%write_tile(tile, values, error)
     call session%abort_if(error)
     do point = 1, points
       call work%note(index(:, point), values(point, :))
     end do
   end subroutine run_tile
+
+  subroutine look_at_run(self, stop_now)
+    class(tile_watch_t), intent(inout) :: self
+    logical, intent(out) :: stop_now
+    call self%scheduler%poll()
+    stop_now = self%scheduler%stop_requested()
+    if (stop_now .or. .not. self%session%journal%active) return
+    call self%session%journal%progress(self%before + nint(real(self%total - self%before, wp) &
+      *self%scheduler%done_count()/max(self%unfinished, 1), int64))
+  end subroutine look_at_run
 
   !> Counts the points of tiles that an interrupted run had done, shared among the ranks; returns their number.
   integer(int64) function note_earlier(session, file, work) result(points)
@@ -229,18 +224,16 @@ contains
     real(wp), intent(out) :: seconds
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: values(pilot_points, work%variables), start
-    integer :: index(size(lengths), pilot_points), first, last, i, k
+    integer :: index(size(lengths), pilot_points), i, k
+    logical :: whole
     do i = 1, pilot_points
       do k = 1, size(lengths)
         index(k, i) = 1 + int(modulo(0.5_wp + i*sqrt(real(4*k + 1, wp)), 1.0_wp)*lengths(k))
       end do
     end do
     start = monotonic_seconds()
-    do first = 1, pilot_points, work%block
-      last = min(first + work%block - 1, pilot_points)
-      call work%compute(index(:, first:last), values(first:last, :), error)
-      if (allocated(error)) return
-    end do
+    call compute_list(work, index, values, whole, error)
+    if (allocated(error)) return
     seconds = (monotonic_seconds() - start)/pilot_points
   end subroutine pilot_seconds
 

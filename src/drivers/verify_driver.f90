@@ -24,6 +24,7 @@ module verify_driver
   use points_driver, only: open_list_journey
   use random, only: uniform
   use reference, only: run_reference
+  use refinement, only: origin_contradicted
   use serial_team, only: serial_team_t
   use statistics, only: share_upper_limit
   use status, only: exit_io, reason_settled
@@ -40,6 +41,8 @@ module verify_driver
   !> What the rerun of the sample showed.
   type :: audit_t
     integer :: points = 0, differing = 0, flips = 0, impact_count_differs = 0
+    !> Of a refined map: points that were inferred, and those of them that were inferred wrongly.
+    integer :: inferred = 0, inferred_differing = 0
     real(wp) :: x_deviation = 0, v_deviation = 0
     character(len=:), allocatable :: first_difference
   end type audit_t
@@ -144,15 +147,27 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: stored(:)
     integer :: k
-    logical :: same
+    logical :: same, inferred
     audit%points = audit%points + 1
+    inferred = .false.
+    if (reader%has('/origin')) then
+      call reader%read_block('/origin', place, spread(1_int64, 1, size(place)), stored, error)
+      if (allocated(error)) return
+      inferred = nint(stored(1)) > origin_contradicted
+      if (inferred) audit%inferred = audit%inferred + 1
+    end if
     do k = 1, size(map_variables)
+      if (.not. reader%has('/'//prefix//trim(map_variables(k)))) cycle
       call reader%read_block('/'//prefix//trim(map_variables(k)), place, spread(1_int64, 1, size(place)), stored, error)
       if (allocated(error)) return
       if (k <= 5) same = nint(stored(1), int64) == nint(values(k), int64)
       if (k > 5) same = real(stored(1), real32) == real(values(k), real32) &
                         .or. (stored(1) /= stored(1) .and. values(k) /= values(k))
       if (same) cycle
+      if (inferred) then
+        audit%inferred_differing = audit%inferred_differing + 1
+        return
+      end if
       audit%differing = audit%differing + 1
       if (audit%differing == 1) audit%first_difference = trim(map_variables(k))//' at '//place_text(place)//': the file has '// &
         to_text(stored(1))//', rerun gives '//to_text(values(k))
@@ -271,15 +286,21 @@ contains
         ', "differing": '//to_text(audit%differing)//', "label_flips": '//to_text(audit%flips)// &
         ', "label_flip_share_upper_95": '//to_text(share_upper_limit(audit%flips, audit%points, 0.95_wp))// &
         ', "impact_counts_differ": '//to_text(audit%impact_count_differs)//', "x_deviation": '// &
-        to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//'}'
+        to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//', "inferred": '// &
+        to_text(audit%inferred)//', "inferred_differing": '//to_text(audit%inferred_differing)//'}'
       return
     end if
     write (output_unit, '(a)') command%path//': '//kind, &
       '  checksums of '//to_text(datasets)//' datasets agree', &
       '  invariants hold at '//to_text(points)//' points'
     if (audit%points == 0) return
+    if (audit%inferred > 0) write (output_unit, '(a)') &
+      '  '//to_text(audit%inferred)//' inferred points computed: '//to_text(audit%inferred_differing)// &
+      ' differ; so, with 95 % confidence, at most '// &
+      to_text(100*share_upper_limit(audit%inferred_differing, audit%inferred, 0.95_wp), 3)//' % of the inferred ones are wrong'
     write (output_unit, '(a)') &
-      '  '//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file', &
+      '  '//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file'// &
+      trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
       to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s', &

@@ -5,6 +5,7 @@
 module build_motion
   use constants, only: two_pi
   use errors, only: error_t, fail
+  use kinds, only: wp
   use law_table, only: law_choice_t
   use motion, only: motion_t, prepare_motion
   use motion_state, only: flight_adaptive, options_t
@@ -15,7 +16,7 @@ module build_motion
   implicit none
   private
 
-  public :: machine_of
+  public :: machine_of, period_of
 
 contains
 
@@ -47,5 +48,22 @@ contains
     allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%pair)
     call prepare_pair(pair, options, moving%pair)
   end subroutine machine_of
+
+  !> Period of the section of the machine that `laws` describe [s].
+  pure subroutine period_of(laws, period, error)
+    type(law_choice_t), intent(in) :: laws(:)
+    real(wp), intent(out) :: period
+    type(error_t), allocatable, intent(out) :: error
+    type(oscillator_t) :: machine
+    type(pair_t) :: pair
+    period = 0
+    if (is_pair(laws)) then
+      call build_pair(laws, pair, error)
+      if (.not. allocated(error)) period = pair%period
+    else
+      call build_oscillator(laws, machine, error)
+      if (.not. allocated(error)) period = machine%period
+    end if
+  end subroutine period_of
 
 end module build_motion

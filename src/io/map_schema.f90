@@ -64,8 +64,9 @@ module map_schema
     procedure :: add_text
     procedure, private :: add_text_attribute
     procedure, private :: add_integer_attribute
+    procedure, private :: add_long_attribute
     procedure, private :: add_real_attribute
-    generic :: add_attribute => add_text_attribute, add_integer_attribute, add_real_attribute
+    generic :: add_attribute => add_text_attribute, add_integer_attribute, add_long_attribute, add_real_attribute
     procedure :: append
     procedure :: length_of
     procedure :: lengths_of
@@ -147,14 +148,22 @@ contains
     class(schema_t), intent(inout) :: self
     character(len=*), intent(in) :: group, name
     integer, intent(in) :: value
+    call self%add_long_attribute(group, name, int(value, int64))
+  end subroutine add_integer_attribute
+
+  !> As `add_text_attribute`.
+  subroutine add_long_attribute(self, group, name, value)
+    class(schema_t), intent(inout) :: self
+    character(len=*), intent(in) :: group, name
+    integer(int64), intent(in) :: value
     type(attribute_t) :: attribute
     attribute%group = group
     attribute%name = name
     attribute%type = type_int64
-    attribute%number = value
+    attribute%number = real(value, real64)
     call complete(self)
     call push_attribute(self%attributes, attribute)
-  end subroutine add_integer_attribute
+  end subroutine add_long_attribute
 
   !> As `add_text_attribute`.
   subroutine add_real_attribute(self, group, name, value)

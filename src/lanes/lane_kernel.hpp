@@ -19,7 +19,7 @@ namespace {
 
 typedef lane_fields<vec> lane_group;
 
-enum { members = sizeof(lane_batch) / sizeof(double[lanes]), most_rounds = 10 };
+enum { members = sizeof(lane_batch) / sizeof(double[lanes]), most_rounds = 10, most_pieces = 8 };
 
 inline void load(const lane_batch &batch, int first, lane_group &g) {
   for (int i = 0; i < members; i++)
@@ -195,23 +195,33 @@ inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barri
   return seek;
 }
 
+// Is each of so many equal pieces of the flights proven to have no event on the way?
+template <bool damping>
+inline mask prove_pieces(const lane_machine &m, int pieces, vec bound, const lane_group &g) {
+  vec h = (1.0 / pieces) * g.span, d = g.direction;
+  vec w = d * g.start_v, rate = d * g.start_a, curl = d * g.start_j;
+  mask proven = ~mask{};
+  for (int i = 1; i < pieces; i++) {
+    kinematics k = evaluate<damping>(m, g, i * h);
+    proven = proven & positive_between(h, w, rate, curl, d * k.v, d * k.a, d * k.j, bound);
+    w = d * k.v;
+    rate = d * k.a;
+    curl = d * k.j;
+  }
+  vec end_w = g.hits > 0.5 ? d * g.end_v : vec{};
+  return proven & positive_between(h, w, rate, curl, end_w, d * g.end_a, d * g.end_j, bound);
+}
+
 // Of the flights `found` just now: which are proven to have no event on the way?
 template <bool damping> inline mask prove(const lane_machine &m, mask found, const lane_group &g) {
   vec re = magnitude(g.z_re), im = magnitude(g.z_im);
   // At least |Z|, at most 8 % more.
   vec size = re + im - 0.5857864376269049 * (re < im ? re : im);
-  vec bound = m.bound_periodic + m.bound_free * size, d = g.direction;
-  vec end_w = g.hits > 0.5 ? d * g.end_v : vec{};
-  mask proven = positive_between(g.span, d * g.start_v, d * g.start_a, d * g.start_j, end_w, d * g.end_a,
-                                 d * g.end_j, bound);
-  if (!any(found & ~proven))
-    return proven;
-  vec half = 0.5 * g.span;
-  kinematics k = evaluate<damping>(m, g, half);
-  mask first =
-      positive_between(half, d * g.start_v, d * g.start_a, d * g.start_j, d * k.v, d * k.a, d * k.j, bound);
-  mask second = positive_between(half, d * k.v, d * k.a, d * k.j, end_w, d * g.end_a, d * g.end_j, bound);
-  return proven | (first & second);
+  vec bound = m.bound_periodic + m.bound_free * size;
+  mask proven = prove_pieces<damping>(m, 1, bound, g);
+  for (int pieces = 2; pieces <= most_pieces && any(found & ~proven); pieces *= 2)
+    proven = proven | prove_pieces<damping>(m, pieces, bound, g);
+  return proven;
 }
 
 // The events of the lanes `due`: Newton's impact or the reversal of friction, and the flight that follows.

@@ -104,7 +104,7 @@ contains
       m%bound_free = from%natural**7/from%damped
       fastest = max(from%natural, from%harmonics*from%drive_frequency)
       ! Taylor's remainder after four terms is below rounding.
-      m%close = 1e-4_wp/fastest
+      m%close = 2.5e-4_wp/fastest
       m%stride = 0.15_wp*law%period
     end associate
     call set_response(moving%flow, flow)

@@ -23,6 +23,8 @@ module basin
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13
+  !> The first of them are the same wherever an attractor captures; where the settling time is.
+  integer, parameter, public :: marks_of_attractor = 5, settling_value = 12
 
   !> The attractors of one slice.
   type, public :: catalogue_t

@@ -5,7 +5,7 @@
 !> A slice is one combination of the parameters: one machine, one catalogue of attractors.
 module grid
   use axis, only: axis_t
-  use build_motion, only: machine_of
+  use build_motion, only: machine_of, period_of
   use errors, only: error_t
   use kinds, only: int64, wp
   use law_table, only: change_parameter, law_choice_t
@@ -14,7 +14,8 @@ module grid
   implicit none
   private
 
-  public :: make_grid, point_start, point_slice, slice_motion, slice_laws, slice_starts, slice_neighbours, machine_with
+  public :: make_grid, two_axes, point_start, point_slice, slice_motion, slice_laws, slice_period, slice_starts
+  public :: slice_neighbours, machine_with
 
   type, public :: grid_t
     type(axis_t), allocatable :: axes(:)
@@ -94,6 +95,26 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call machine_of(slice_laws(grid, slice), grid%options, moving, error)
   end subroutine slice_motion
+
+  !> Drive period of a slice's machine [s].
+  pure subroutine slice_period(grid, slice, period, error)
+    type(grid_t), intent(in) :: grid
+    integer(int64), intent(in) :: slice
+    real(wp), intent(out) :: period
+    type(error_t), allocatable, intent(out) :: error
+    call period_of(slice_laws(grid, slice), period, error)
+  end subroutine slice_period
+
+  !> The two axes along which a map is refined: of starts if there are as many, otherwise also of parameters, the first
+  !> ones first. 0 if there are no two.
+  pure function two_axes(grid) result(axes)
+    type(grid_t), intent(in) :: grid
+    integer :: axes(2), i
+    integer, allocatable :: starts(:), candidates(:)
+    starts = pack([(i, i=1, size(grid%axes))], [(any(grid%start_axis == i), i=1, size(grid%axes))])
+    candidates = [starts, grid%parameter_axes, 0, 0]
+    axes = [minval(candidates(:2)), maxval(candidates(:2))]
+  end function two_axes
 
   !> The laws of a slice's machine.
   pure function slice_laws(grid, slice) result(laws)

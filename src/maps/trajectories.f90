@@ -73,7 +73,7 @@ contains
   !> Trajectories worth asking for at a time: enough to keep the lanes full, or one by one.
   pure integer function block_size(journey)
     type(journey_t), intent(in) :: journey
-    block_size = merge(32*lane_count, 1, journey%flow%available)
+    block_size = merge(4*lane_count, 1, journey%flow%available)
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.

@@ -17,6 +17,7 @@ module scheduler
   use kinds, only: real64
   use signals, only: signal_count
   use system, only: monotonic_seconds
+  use work_log, only: work_log_t
   implicit none
   private
 
@@ -25,11 +26,15 @@ module scheduler
     real(real64) :: time_limit = 0
     !> Splits the ranks of a host into nodes of at most this many ranks; 0 = as the hosts are.
     integer :: ranks_per_node = 0
+    !> Keeps a log of the positions: 32 bytes for each that this rank does.
+    logical :: logged = .false.
   end type scheduler_options_t
 
   type, abstract, public :: scheduler_t
     type(scheduler_options_t) :: options
     real(real64) :: started = 0
+    !> What this rank did and when, if `options%logged`.
+    type(work_log_t) :: log
   contains
     procedure(start_with), deferred :: start
     procedure(next_of), deferred :: next
@@ -39,6 +44,8 @@ module scheduler
     procedure(count_of), deferred :: done_count
     procedure(act), deferred :: finish
     procedure :: stop_is_due
+    procedure :: begin_log
+    procedure :: elapsed
   end type scheduler_t
 
   abstract interface
@@ -88,5 +95,20 @@ contains
     if (stop_is_due .or. self%options%time_limit <= 0) return
     stop_is_due = monotonic_seconds() - self%started >= self%options%time_limit
   end function stop_is_due
+
+  !> Starts the clock and an empty log.
+  subroutine begin_log(self)
+    class(scheduler_t), intent(inout) :: self
+    type(work_log_t) :: empty
+    self%log = empty
+    self%log%on = self%options%logged
+    self%started = monotonic_seconds()
+  end subroutine begin_log
+
+  !> Seconds since `start`.
+  real(real64) function elapsed(self)
+    class(scheduler_t), intent(in) :: self
+    elapsed = monotonic_seconds() - self%started
+  end function elapsed
 
 end module scheduler

@@ -1,17 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The scheduler of one process: the positions in their order.
+!> The scheduler of one process: the positions in the order that ranks would get them.
 module serial_scheduler
   use errors, only: error_t, fail
   use scheduler, only: scheduler_t
+  use spread_order, only: new_spread_order, spread_order_t
   use status, only: exit_internal
-  use system, only: monotonic_seconds
   implicit none
   private
 
   type, extends(scheduler_t), public :: serial_scheduler_t
     integer, private :: total = 0, handed_out = 0, done = 0
+    type(spread_order_t), private :: order
     logical, private :: busy = .false., stop = .false.
   contains
     procedure :: start
@@ -35,11 +36,12 @@ contains
       return
     end if
     self%total = n
+    self%order = new_spread_order(n)
     self%handed_out = 0
     self%done = 0
     self%busy = .false.
     self%stop = .false.
-    self%started = monotonic_seconds()
+    call self%begin_log()
   end subroutine start
 
   !> The next position; 0 = none left, or a stop was requested.
@@ -47,13 +49,15 @@ contains
     class(serial_scheduler_t), intent(inout) :: self
     integer, intent(out) :: position
     if (self%busy) self%done = self%done + 1
+    call self%log%end(self%elapsed())
     self%busy = .false.
     position = 0
     call self%poll()
     if (self%stop .or. self%handed_out == self%total) return
     self%handed_out = self%handed_out + 1
     self%busy = .true.
-    position = self%handed_out
+    position = self%order%position(self%handed_out)
+    call self%log%begin(position, self%elapsed())
   end subroutine next
 
   !> Looks for signals and the time limit.

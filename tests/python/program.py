@@ -77,6 +77,7 @@ KINDS = {
     "map": ["basin", "case.toml"],
     "stack": ["basin", "case.toml", "--set", STACK],
     "plane": ["basin", "case.toml", "--set", PLANE],
+    "refined": ["basin", "case.toml", "--set", "refine.step=4", "--set", "refine.block=8"],
     "sweep": ["sweep", "case.toml"],
     "points": ["points", "case.toml", "--list", "starts.csv"],
     "trajectory": ["trajectory", "case.toml"],

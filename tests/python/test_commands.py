@@ -28,7 +28,7 @@ OPTIONS = [
     "--quiet",
 ]
 COLUMNS = ["x0", "v0", "ratio", "x", "v", "impacts", "last_impact_speed", "reason"]
-KIND_OF = {"map": "basin", "stack": "basin", "plane": "basin"}
+KIND_OF = {"map": "basin", "stack": "basin", "plane": "basin", "refined": "basin"}
 
 
 def program_without_mpirun(separatrix: Path, *arguments: str, folder: Path) -> Outcome:

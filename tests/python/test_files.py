@@ -20,6 +20,7 @@ COORDINATES = {
     "map": {"x0": (19, "m"), "v0": (31, "m/s")},
     "stack": {"drive_ratio": (3, "1"), "x0": (7, "m"), "v0": (11, "m/s")},
     "plane": {"drive_ratio": (13, "1"), "friction_kinetic_coefficient": (9, "1")},
+    "refined": {"x0": (19, "m"), "v0": (31, "m/s")},
     "sweep": {"drive_ratio": (7, "1")},
     "trajectory": {"time": (18001, "s")},
     "points": {},
@@ -36,6 +37,7 @@ INTEGERS = {
     "reason": "int8",
     "period": "int16",
     "event_word": "int64",
+    "origin": "int8",
 }
 
 
@@ -60,7 +62,7 @@ def test_xarray_has_names_units_and_integers(results, kind):
                 assert flags.dtype == variable.dtype
                 assert len(variable.attrs["flag_meanings"].split()) == len(flags)
                 assert np.isin(variable.values, flags).all()
-        if kind in ("map", "stack", "plane"):
+        if kind in ("map", "stack", "plane", "refined"):
             assert data["regime"].dims == tuple(COORDINATES[kind])
 
 
@@ -239,7 +241,9 @@ def test_the_trajectory_has_a_history_and_its_events(results):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_verify_names_a_changed_dataset(separatrix, tmp_path, results, kind):
-    name = {"trajectory": "x", "points": "x", "sweep": "branch_amplitude"}.get(kind, "amplitude")
+    name = {"trajectory": "x", "points": "x", "sweep": "branch_amplitude", "refined": "origin"}.get(
+        kind, "amplitude"
+    )
     path = tmp_path / "file.h5"
     shutil.copy(results[kind], path)
     with h5py.File(path, "r+") as file:

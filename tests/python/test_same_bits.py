@@ -9,11 +9,19 @@ import h5py
 import pytest
 from program import CASE, KINDS, contents, differences, succeed, write_case
 
-RANKS = {"map": [2, 3, 4, 7], "sweep": [2, 3, 4, 7], "points": [2, 7], "stack": [3, 7], "plane": [2, 4]}
+RANKS = {
+    "map": [2, 3, 4, 7],
+    "sweep": [2, 3, 4, 7],
+    "points": [2, 7],
+    "stack": [3, 7],
+    "plane": [2, 4],
+    "refined": [2, 7],
+}
 TILES = {
     "map": ["[1, 31]", "[4, 5]", "[19, 31]"],
     "stack": ["[3, 7, 11]", "[2, 1, 5]"],
     "plane": ["[13, 9]", "[5, 2]"],
+    "refined": ["[8, 16]", "[16, 31]"],
 }
 
 

@@ -2,8 +2,9 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Work for the ranks of an MPI team on two levels. Each node has a pool of positions in shared
-!> memory. That of rank 0's node is the work list itself; the others are refilled from it in blocks that
-!> shrink with what is left, by messages which rank 0 answers in `poll` and in `finish`.
+!> memory. That of rank 0's node is the work list itself, in an order in which every block is a fair
+!> sample of it; the others are refilled from it in blocks that shrink with what is left, by messages
+!> which rank 0 answers in `poll` and in `finish`.
 module mpi_scheduler
   use errors, only: error_t, fail
   use kinds, only: int64
@@ -13,8 +14,9 @@ module mpi_scheduler
   use mpi_node, only: new_node, node_t
   use mpi_team, only: mpi_team_t
   use scheduler, only: scheduler_options_t, scheduler_t
+  use spread_order, only: new_spread_order, spread_order_t
   use status, only: exit_internal
-  use system, only: monotonic_seconds, sleep_microseconds
+  use system, only: sleep_microseconds
   implicit none
   private
 
@@ -28,6 +30,8 @@ module mpi_scheduler
     type(MPI_Comm), private :: comm
     integer, private :: rank = 0, ranks = 1
     type(node_t), private :: node
+    !> Pools hold numbers of this order.
+    type(spread_order_t), private :: order
     !> Between `start` and `finish`.
     logical, private :: active = .false.
     logical, private :: busy = .false., stopped = .false.
@@ -76,6 +80,7 @@ contains
       return
     end if
     call new_node(self%comm, self%options%ranks_per_node, n, self%node)
+    self%order = new_spread_order(n)
     self%active = .true.
     self%busy = .false.
     self%stopped = .false.
@@ -89,31 +94,33 @@ contains
     if (allocated(self%sending)) deallocate (self%sending)
     allocate (self%reported(size(self%node%leaders)), source=0)
     allocate (self%sending(0))
-    self%started = monotonic_seconds()
+    call self%begin_log()
   end subroutine start
 
   !> The next position; 0 = none left, or a stop was requested.
   subroutine next(self, position)
     class(mpi_scheduler_t), intent(inout) :: self
     integer, intent(out) :: position
-    integer :: last
+    integer :: number, last
     if (self%busy) then
       self%my_done = self%my_done + 1
       call self%node%count_done()
+      call self%log%end(self%elapsed())
       self%busy = .false.
     end if
     do
       position = 0
       call self%poll()
       if (self%node%is_stopped()) return
-      call self%node%take(1, position, last)
-      if (last >= position) exit
-      position = 0
+      call self%node%take(1, number, last)
+      if (last >= number) exit
       if (self%node%number == 1) return
       if (self%node%is_exhausted()) return
       call refill_pool(self)
     end do
     self%busy = .true.
+    position = self%order%position(number)
+    call self%log%begin(position, self%elapsed())
   end subroutine next
 
   !> Looks for signals, the time limit and messages.
@@ -210,6 +217,7 @@ contains
     needed = .not. self%node%has_work()
     if (needed) needed = .not. self%node%is_exhausted()
     if (needed) then
+      self%log%questions = self%log%questions + 1
       question = [self%node%number, self%node%size, self%node%done()]
       call MPI_Send(question, size(question), MPI_INTEGER, 0, tag_request, self%comm)
       do

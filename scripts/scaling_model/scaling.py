@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measures scaling here, simulates it beyond, writes a page."""
+
+import argparse
+import os
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import plots
+import report
+from costs import stretched
+from memory import Memory, measure
+from model import Model, setting
+from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
+from simulation import TRAJECTORIES_PER_TILE, Simulated, Simulation
+
+BAR = 0.9
+MOST_SECONDS = 240.0
+"""Of all repetitions."""
+REPLAY_POLLS = 16
+
+
+@dataclass
+class Sizes:
+    """How much of everything."""
+
+    repetitions: int = 3
+    ratios: int = 41
+    seconds: float = 24.0
+    """Of the map on one rank."""
+    replay_seconds: float = 24.0
+    whole: tuple[int, ...] = (256, 1024)
+    """Rows of maps run as a whole."""
+    started: tuple[int, ...] = (2048, 4096, 8192)
+    tiles: tuple[int, ...] = (32, 8, 4, 2)
+    """Sides, on the first of the maps stopped early."""
+    slices: tuple[int, ...] = (128, 4096)
+
+
+QUICK = Sizes(1, 21, 4.0, 8.0, (256, 512), (2048, 4096), (32, 4), (128, 1024))
+
+
+@dataclass
+class Check:
+    """A run beside the model's prediction for the costs of that run."""
+
+    what: str
+    ranks: int
+    per_node: int
+    measured: Replay
+    predicted: Replay
+
+
+@dataclass
+class Results:
+    """Everything that the page shows."""
+
+    sizes: Sizes
+    ranks: list[int] = field(default_factory=list)
+    v0_count: int = 0
+    strong: dict[int, list[Run]] = field(default_factory=dict)
+    weak: dict[int, list[Run]] = field(default_factory=dict)
+    copies: dict[int, list[float]] = field(default_factory=dict)
+    checks: list[Check] = field(default_factory=list)
+    simulated: Simulated | None = None
+    memory: Memory | None = None
+    version: dict[str, str] = field(default_factory=dict)
+    load: tuple[float, float] = (0.0, 0.0)
+    seconds: float = 0.0
+
+    @property
+    def base(self) -> Run:
+        """The run on one rank whose tile phase is the median."""
+        return sorted(self.strong[1], key=lambda run: run.tile_phase)[(len(self.strong[1]) - 1) // 2]
+
+
+def say(text: str) -> None:
+    """One line of progress."""
+    print(f"scaling: {text}", flush=True)
+
+
+def ranks_here() -> list[int]:
+    """1, 2, 4, ... and all cores."""
+    cores = os.cpu_count() or 1
+    powers = [2**k for k in range(cores.bit_length()) if 2**k <= cores]
+    return sorted({*powers, cores, 2})
+
+
+def measure_here(program: Program, results: Results) -> None:
+    """Strong and weak scaling, all in turn."""
+    sizes = results.sizes
+    small = 2 * TILE
+    pilot = program.uneven(1, sizes.ratios, small)
+    widths = round(small / TILE * sizes.seconds / pilot.tile_phase / 2)
+    half = TILE * min(max(widths, 1), 64)
+    results.v0_count = 2 * half
+    began = time.perf_counter()
+    for number in range(sizes.repetitions):
+        # a busy machine gets fewer repetitions
+        if number > 0 and (time.perf_counter() - began) * (number + 1) / number > MOST_SECONDS:
+            break
+        for ranks in results.ranks:
+            say(f"repetition {number + 1} of {sizes.repetitions}, {ranks} ranks")
+            strong = program.uneven(ranks, sizes.ratios, results.v0_count)
+            results.strong.setdefault(ranks, []).append(strong)
+            # the map on two ranks is already there
+            weak = strong if ranks == 2 else program.uneven(ranks, sizes.ratios, ranks * half)
+            results.weak.setdefault(ranks, []).append(weak)
+            results.copies.setdefault(ranks, []).append(program.copies(ranks, sizes.ratios, TILE))
+
+
+def predict(model: Model, ranks: int, per_node: int, costs: np.ndarray, polls: int) -> Replay:
+    """What the model says about these tiles on this machine."""
+    found = model.run(setting(ranks, per_node, polls_per_tile=polls), costs)
+    return Replay(found.tiles, found.questions, found.makespan, 1 - found.efficiency)
+
+
+def check_model(program: Program, model: Model, results: Results) -> None:
+    """The model beside the bare scheduler and the program."""
+    costs = stretched(results.base.costs, 4 * 84)
+    costs *= results.sizes.replay_seconds / costs.sum()
+    for ranks, per_node in ((2, 1), (4, 1), (4, 2), (8, 2), (8, 4), (16, 4)):
+        say(f"the scheduler on {ranks} sleeping ranks, {per_node} to a node")
+        found = program.replay(ranks, per_node, costs, REPLAY_POLLS)
+        expected = predict(model, ranks, per_node, costs, REPLAY_POLLS)
+        results.checks.append(Check("scheduler", ranks, per_node, found, expected))
+    for ranks, per_node in ((2, 1), (4, 2), (8, 4)):
+        say(f"the program on {ranks} ranks, {per_node} to a node")
+        run = program.uneven(ranks, results.sizes.ratios, 2 * TILE, "--ranks-per-node", per_node)
+        found = Replay(run.tiles, np.zeros(0, int), run.tile_phase, run.idle)
+        expected = predict(model, ranks, per_node, run.costs, POINTS_PER_TILE)
+        results.checks.append(Check("program", ranks, per_node, found, expected))
+
+
+def main() -> None:
+    """Run everything."""
+    parser = argparse.ArgumentParser(prog="scaling")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--build", type=Path, default=SOURCE / "build")
+    parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "scaling.md")
+    options = parser.parse_args()
+    began = time.perf_counter()
+    results = Results(QUICK if options.quick else Sizes(), ranks_here())
+    before = os.getloadavg()[0]
+    with tempfile.TemporaryDirectory(prefix="scaling-") as name:
+        folder = Path(name)
+        program = Program(options.build, folder)
+        if program.version["mpi"] == "none":
+            parser.error(f"{options.build} was built without MPI")
+        results.version = program.version
+        measure_here(program, results)
+        model = Model(folder)
+        check_model(program, model, results)
+        say("simulating up to 100 000 ranks")
+        base = results.base
+        mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
+        results.simulated = Simulation(model, base.costs, mean).everything(BAR)
+        say("memory")
+        sizes = results.sizes
+        results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)
+        results.load = before, os.getloadavg()[0]
+    results.seconds = time.perf_counter() - began
+    plots.draw(options.output.parent / "figures", results.simulated, base, results.sizes.ratios, BAR)
+    text = report.page(results, options.quick)
+    options.output.write_text(text)
+    print(text)
+    say(f"wrote {options.output}")
+
+
+if __name__ == "__main__":
+    main()

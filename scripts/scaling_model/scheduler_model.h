@@ -1,0 +1,29 @@
+/* SPDX-FileCopyrightText: The Separatrix developers */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef SCHEDULER_MODEL_H
+#define SCHEDULER_MODEL_H
+
+struct scheduler_setting {
+  int ranks, ranks_per_node;
+  double share;          /* of the node's fair share of what is left that a block is */
+  double latency;        /* of a message, seconds */
+  double service;        /* time of rank 0 for a question, seconds */
+  double pause;          /* between two looks of a rank that waits, seconds */
+  double polls_per_tile; /* looks of rank 0 during a tile: trajectories of a tile */
+  unsigned long long seed;
+};
+
+/* Arrays over the ranks, zeroed by the caller. */
+struct outcome {
+  double *busy, *finish; /* time in tiles; end of the last tile, or of the wait for one more */
+  long *tiles, *questions;
+  double service; /* time of rank 0 spent on questions */
+  int longest_queue;
+};
+
+/* `cost`: seconds of each tile in the order of handing out. 1 if memory is short. */
+int simulate(const struct scheduler_setting *setting, long tiles, const double *cost,
+             struct outcome *outcome);
+
+#endif

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the model says about ranks that this machine lacks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from costs import tiles_for
+from model import Model, setting
+
+RANKS_PER_NODE = 128
+SPREADS = (1, 10, 100, 1000)
+RANKS = (16, 128, 1000, 10_000, 100_000)
+TILES_PER_RANK = (3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200)
+MANY_RANKS = 10_000
+BAR_SPREAD = 100
+USUAL = 100
+"""Tiles per rank where nothing else is said."""
+CANDIDATES = (200, 150, 100, 80, 70, 60, 50, 45, 40, 35, 30, 25, 20, 15, 10, 5)
+TRAJECTORIES_PER_TILE = 1024
+TILE_SECONDS = (0.01, 0.1, 1.0, 10.0)
+LOOKS = (1024, 16, 1)
+SLOW = 50e-6
+
+
+@dataclass
+class Simulated:
+    """Efficiencies."""
+
+    mean: float
+    """Seconds of a tile, mean."""
+    by_ranks: dict[int, list[float]]
+    """spread: for each of RANKS"""
+    neighbours: list[float]
+    """With blocks of neighbouring tiles, spread BAR_SPREAD, for each of RANKS."""
+    by_tiles: dict[int, list[float]]
+    """spread: for each of TILES_PER_RANK on MANY_RANKS"""
+    by_looks: dict[int, list[float]]
+    """looks of rank 0 per tile: for each of TILE_SECONDS on MANY_RANKS"""
+    slow: float
+    """With SLOW messages and answers."""
+    questions: int
+    longest_queue: int
+    least_tiles: int | None
+    """Tiles per rank from which on the bar holds."""
+
+
+class Simulation:
+    """The model with the measured costs."""
+
+    def __init__(self, model: Model, costs: np.ndarray, mean: float) -> None:
+        self.model, self.costs, self.mean = model, costs, mean
+
+    def efficiency(self, ranks: int, per_rank: int, spread: float, *, mean: float = 0, **more) -> float:
+        """Efficiency of a map with so many tiles per rank."""
+        machine, tiles = self.problem(ranks, per_rank, spread, mean or self.mean, **more)
+        return self.model.run(machine, tiles).efficiency
+
+    def problem(self, ranks: int, per_rank: int, spread: float, mean: float, **more):
+        """Return the machine and the tiles."""
+        machine = setting(ranks, RANKS_PER_NODE, **({"polls_per_tile": TRAJECTORIES_PER_TILE} | more))
+        return machine, tiles_for(self.costs, ranks * per_rank, spread, mean)
+
+    def least_tiles(self, bar: float) -> int | None:
+        """Return the fewest of CANDIDATES from which on the bar holds."""
+        found = None
+        for per_rank in CANDIDATES:
+            if self.efficiency(MANY_RANKS, per_rank, BAR_SPREAD) < bar:
+                break
+            found = per_rank
+        return found
+
+    def everything(self, bar: float) -> Simulated:
+        """All that the page shows."""
+        machine, tiles = self.problem(MANY_RANKS, USUAL, BAR_SPREAD, self.mean)
+        many = self.model.run(machine, tiles)
+        neighbours = [
+            self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, self.mean), spread=False).efficiency
+            for ranks in RANKS
+        ]
+        return Simulated(
+            mean=self.mean,
+            by_ranks={s: [self.efficiency(ranks, USUAL, s) for ranks in RANKS] for s in SPREADS},
+            neighbours=neighbours,
+            by_tiles={s: [self.efficiency(MANY_RANKS, n, s) for n in TILES_PER_RANK] for s in SPREADS},
+            by_looks={
+                looks: [
+                    self.efficiency(MANY_RANKS, USUAL, BAR_SPREAD, mean=seconds, polls_per_tile=looks)
+                    for seconds in TILE_SECONDS
+                ]
+                for looks in LOOKS
+            },
+            slow=self.efficiency(MANY_RANKS, USUAL, BAR_SPREAD, latency=SLOW, service=SLOW),
+            questions=int(many.questions.sum()),
+            longest_queue=many.longest_queue,
+            least_tiles=self.least_tiles(bar),
+        )

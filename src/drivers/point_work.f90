@@ -1,0 +1,102 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What is computed at the points of a grid, and lists of points computed piece by piece.
+module point_work
+  use errors, only: error_t
+  use kinds, only: int64, wp
+  use refinement, only: refine_t
+  implicit none
+  private
+
+  public :: compute_list
+
+  type, abstract, public :: point_work_t
+    integer :: variables = 0
+    !> Most points computed at a time: as many as a stop signal may wait for.
+    integer :: block = 1
+    !> Where not all points are computed: how they are chosen, and along which two axes.
+    type(refine_t) :: refine
+    integer :: refined_axes(2) = 0
+    !> Values by which its points are told apart, which are those that are kept.
+    integer :: marks = 0
+    !> Points computed by this process, with those that several blocks have asked for.
+    integer(int64) :: computed = 0
+  contains
+    procedure(compute_points), deferred :: compute
+    procedure(note_point), deferred :: note
+    procedure :: tell_apart => by_all_values
+  end type point_work_t
+
+  abstract interface
+    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis.
+    subroutine compute_points(self, index, values, error)
+      import :: error_t, point_work_t, wp
+      class(point_work_t), intent(inout) :: self
+      integer, intent(in) :: index(:, :)
+      real(wp), intent(out) :: values(:, :)
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine compute_points
+
+    !> Counts a point that is done, computed now or read back after an interruption.
+    subroutine note_point(self, index, values)
+      import :: point_work_t, wp
+      class(point_work_t), intent(inout) :: self
+      integer, intent(in) :: index(:)
+      real(wp), intent(in) :: values(:)
+    end subroutine note_point
+  end interface
+
+  !> Looks up between pieces of work.
+  type, abstract, public :: watch_t
+  contains
+    procedure(look_up), deferred :: look
+  end type watch_t
+
+  abstract interface
+    !> Whether to stop.
+    subroutine look_up(self, stop_now)
+      import :: watch_t
+      class(watch_t), intent(inout) :: self
+      logical, intent(out) :: stop_now
+    end subroutine look_up
+  end interface
+
+contains
+
+  !> What tells the points at `index` (axes, points) apart, of their values (points, variables): `marks` (points, marks) and
+  !> how long they take to settle, in drive periods.
+  subroutine by_all_values(self, index, values, marks, settling, error)
+    class(point_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(in) :: values(:, :)
+    real(wp), intent(out) :: marks(:, :), settling(:)
+    type(error_t), allocatable, intent(out) :: error
+    marks = values(:, :self%marks)
+    settling(:size(index, 2)) = 0
+  end subroutine by_all_values
+
+  !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch says stop.
+  subroutine compute_list(work, index, values, whole, error, watch)
+    class(point_work_t), intent(inout) :: work
+    integer, intent(in) :: index(:, :)
+    real(wp), intent(out) :: values(:, :)
+    logical, intent(out) :: whole
+    type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
+    logical :: stop_now
+    integer :: first, last
+    whole = .true.
+    do first = 1, size(index, 2), work%block
+      last = min(first + work%block - 1, size(index, 2))
+      call work%compute(index(:, first:last), values(first:last, :), error)
+      if (allocated(error)) return
+      work%computed = work%computed + last - first + 1
+      if (.not. present(watch)) cycle
+      call watch%look(stop_now)
+      whole = .not. stop_now
+      if (stop_now) return
+    end do
+  end subroutine compute_list
+
+end module point_work

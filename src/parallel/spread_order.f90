@@ -1,0 +1,54 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The order in which positions are handed out. Neighbouring tiles of a map cost alike, so a block of
+!> neighbours may cost a multiple of the mean. Every run of this order lies evenly over the whole list:
+!> steps near the golden section of its length, which meet each position once.
+module spread_order
+  use kinds, only: int64, real64
+  implicit none
+  private
+
+  public :: new_spread_order
+
+  type, public :: spread_order_t
+    integer(int64), private :: length = 0, step = 1
+  contains
+    procedure :: position
+  end type spread_order_t
+
+  real(real64), parameter :: golden = 0.6180339887498949_real64
+
+contains
+
+  !> The order of the positions 1..n.
+  pure function new_spread_order(n) result(order)
+    integer, intent(in) :: n
+    type(spread_order_t) :: order
+    order%length = n
+    order%step = max(1_int64, int(golden*n, int64))
+    do while (common_divisor(order%step, order%length) > 1)
+      order%step = order%step + 1
+    end do
+  end function new_spread_order
+
+  !> The position that is handed out as number `number` (from 1).
+  pure integer function position(self, number)
+    class(spread_order_t), intent(in) :: self
+    integer, intent(in) :: number
+    position = 1 + int(modulo((number - 1)*self%step, self%length))
+  end function position
+
+  pure integer(int64) function common_divisor(a, b)
+    integer(int64), intent(in) :: a, b
+    integer(int64) :: rest, other
+    common_divisor = a
+    other = b
+    do while (other > 0)
+      rest = modulo(common_divisor, other)
+      common_divisor = other
+      other = rest
+    end do
+  end function common_divisor
+
+end module spread_order
