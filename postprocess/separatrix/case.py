@@ -43,7 +43,8 @@ def resolved_case(result: xr.Dataset) -> dict:
 def describe_case(result: xr.Dataset) -> list[str]:
     """Return short pieces of a caption: friction, contact and drive ratio.
 
-    A parameter that is an axis of the map or of the sweep, or differs between the points, is left out.
+    A parameter that is an axis of the map or of the sweep, or differs between the points, is left out; so is
+    the ratio of a machine without a drive.
     """
     case = resolved_case(result)
     axes = _axes(result, case)
@@ -102,7 +103,7 @@ def _drive_ratio(result: xr.Dataset, case: dict) -> float | None:
     value = result.attrs.get("drive_ratio", drive.get("ratio") if isinstance(drive, dict) else None)
     if "ratio" in result:
         value = float(result["ratio"].values[0])
-    return float(value) if isinstance(value, int | float) else None
+    return float(value) if isinstance(value, int | float) and value > 0 else None
 
 
 def _values(section: dict, symbols: dict, family: str, axes: set) -> list[str]:

@@ -31,6 +31,7 @@ REGIMES = {
     "mixed": OKABE_ITO[3],
     "chattering": OKABE_ITO[4],
     "at_rest": OKABE_ITO[6],
+    "stuck": OKABE_ITO[5],
 }
 RUN_UP = OKABE_ITO[0]
 RUN_DOWN = OKABE_ITO[1]

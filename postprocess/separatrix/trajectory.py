@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from separatrix import style
+from separatrix import contact, pair, style
 from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
@@ -26,7 +26,13 @@ _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 
 def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
     """Return the figures of a trajectory file by name."""
-    return {"history": time_history(result, title), "phase": phase_portrait(result, title)}
+    if "driver_x" in result:
+        made = {"history": pair.history(result, title), "energy": pair.energy(result, title)}
+    else:
+        made = {"history": time_history(result, title)}
+    if "contact_force" in result:
+        made["contact"] = contact.loops(result, title)
+    return {**made, "phase": phase_portrait(result, title)}
 
 
 def time_history(result: xr.Dataset, title: str) -> Figure:

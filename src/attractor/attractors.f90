@@ -10,12 +10,13 @@ module attractors
 
   public :: regime_of, find_capture, find_box, pack_attractor, unpack_attractor
 
-  !> Regimes of a motion.
+  !> Regimes of a motion; stuck are two bodies that move as one.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
     regime_sticking = 3, regime_mixed = 4, regime_chattering = 5, regime_at_rest = 6, &
-    last_regime = 6
+    regime_stuck = 7, last_regime = 7
   character(len=*), parameter, public :: regime_names(0:last_regime) = [character(len=10) :: 'unresolved', &
-    'non_impact', 'impact', 'sticking', 'mixed', 'chattering', 'at_rest']
+    'non_impact', 'impact', 'sticking', 'mixed', 'chattering', 'at_rest', &
+    'stuck']
 
   !> Longest period in drive periods that is looked for.
   integer, parameter, public :: longest_period = 64

@@ -36,6 +36,7 @@ contains
     integer :: i, regime
     logical :: known, ok
     if (.not. allocated(catalogue)) allocate (catalogue(0))
+    if (allocated(moving%pair)) return
     do i = 1, size(starts, 2)
       state = start_state(moving, starts(1, i), starts(2, i), starts(3, i))
       patience = span%duration

@@ -4,10 +4,14 @@
 !> One trajectory from its start to its label: a pure function of the machine, the frozen catalogue and
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
-  use attractors, only: attractor_t, features_t, find_box, find_capture, regime_of
+  use attractors, only: attractor_t, features_t, find_box, find_capture, regime_at_rest, regime_of, &
+    regime_stuck
+  use energy, only: energy_of_body
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
+  use pair_flight, only: body_state
+  use pair_trajectory, only: pair_course_t, run_pair
   use status, only: reason_settled, reason_time_over
   implicit none
   private
@@ -73,8 +77,13 @@ contains
     type(log_t), intent(inout), optional :: log
     type(course_t) :: course
     logical :: slipped, described
+    if (allocated(moving%pair)) then
+      call run_two_bodies(moving, span, x, v, crank_angle, outcome, log)
+      return
+    end if
     call begin_course(moving, span, x, v, crank_angle, course)
     if (present(log)) then
+      log%book%at_start = energy_of_body(moving%machine, course%state)
       log%origin = -course%state%time
       if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
     end if
@@ -83,6 +92,7 @@ contains
       call pass_stop(moving, catalogue, span, slipped, course, outcome)
     end do
     if (present(log)) then
+      log%book%at_end = energy_of_body(moving%machine, course%state)
       described = log%sample_interval > 0 .and. course%elapsed >= span%duration
       if (described) call record_sample(log, course%state)
     end if
@@ -92,6 +102,29 @@ contains
     end do
     call conclude(catalogue, course, outcome)
   end subroutine run_trajectory
+
+  !> The same for two bodies, which no attractor captures.
+  pure subroutine run_two_bodies(moving, span, x, v, angle, outcome, log)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    real(wp), intent(in) :: x, v, angle
+    type(outcome_t), intent(inout) :: outcome
+    type(log_t), intent(inout), optional :: log
+    type(pair_course_t) :: course
+    type(state_t) :: body
+    call run_pair(moving%pair, span%duration, span%window, x, v, angle, course, log)
+    body = body_state(course%state)
+    outcome%x = body%x
+    outcome%v = body%v
+    outcome%impacts = course%impacts
+    outcome%last_impact_speed = course%last_impact_speed
+    outcome%reason = merge(course%reason, reason_time_over, course%reason /= 0)
+    if (course%reason /= 0) return
+    outcome%window = regime_of(course%tally, span%window/moving%machine%period)
+    if (outcome%window%regime == regime_at_rest) outcome%window%regime = regime_stuck
+    outcome%features = outcome%window
+    outcome%features%word = 0
+  end subroutine run_two_bodies
 
   !> A body set off from `x` [m], `v` [m/s], with the crank at `crank_angle` [rad].
   pure subroutine begin_course(moving, span, x, v, crank_angle, course)

@@ -11,6 +11,8 @@ module case_check
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
   use lever_reach, only: check_assembly
+  use oscillator, only: refuse_pair
+  use pair, only: build_pair, is_pair, pair_t
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -65,8 +67,9 @@ contains
       call report(source, 'friction.static_coefficient', 'found '//to_text(static)// &
                   ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
     end if
-    if (laws(contact_law)%name == 'newton') call check_barriers(source, laws(contact_law), at)
-    if (laws(drive_law)%name /= 'none' .and. laws(restoring_law)%name /= 'linear') then
+    if (laws(contact_law)%name /= 'none') call check_barriers(source, laws(contact_law), at)
+    call check_bodies(source, laws)
+    if (needs_spring(laws(drive_law)%name) .and. laws(restoring_law)%name /= 'linear') then
       call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
                   '", allowed with "linear": the ratio refers to its natural frequency')
     end if
@@ -78,6 +81,26 @@ contains
     end select
   end subroutine check_laws
 
+  pure logical function needs_spring(drive)
+    character(len=*), intent(in) :: drive
+    needs_spring = drive == 'harmonic' .or. drive == 'fourier' .or. drive == 'crank_lever_rod'
+  end function needs_spring
+
+  !> One body and two have laws of their own.
+  subroutine check_bodies(source, laws)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: laws(:)
+    type(pair_t) :: pair
+    type(error_t), allocatable :: error
+    if (is_pair(laws)) then
+      call build_pair(laws, pair, error)
+    else
+      call refuse_pair(laws, error)
+    end if
+    if (.not. allocated(error)) return
+    call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:))
+  end subroutine check_bodies
+
   subroutine check_barriers(source, contact, at)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: contact
@@ -86,7 +109,7 @@ contains
     upper = value_of(contact, 'upper')
     lower = value_of(contact, 'lower')
     if (upper >= huge(upper) .and. lower <= -huge(lower)) then
-      call report(source, 'contact.law', 'found "newton" without a barrier, allowed with upper, lower or both')
+      call report(source, 'contact.law', 'found "'//trim(contact%name)//'" without a barrier, allowed with upper, lower or both')
     else if (lower > upper) then
       call report(source, 'contact.lower', 'found '//to_text(lower)//' m, allowed at most upper = '// &
                   to_text(upper)//' m'//at)
@@ -263,8 +286,10 @@ contains
     type(axis_t), intent(in) :: axes(:)
     real(wp), intent(in) :: x
     character(len=:), allocatable :: problem
-    real(wp) :: upper, lower
+    real(wp) :: upper, lower, driver
     integer :: i
+    driver = 0
+    if (the_case%laws(1)%name == 'backlash_pair') driver = parameter_value(the_case%laws, 'body.driver_x0', 0.0_wp)
     upper = parameter_value(the_case%laws, 'contact.upper', huge(1.0_wp))
     lower = parameter_value(the_case%laws, 'contact.lower', -huge(1.0_wp))
     do i = 1, size(axes)
@@ -272,10 +297,10 @@ contains
       if (axes(i)%name == 'contact.lower') lower = maxval(axes(i)%values)
     end do
     problem = ''
-    if (x > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier contact.upper = '// &
-                             to_text(upper)//' m'
-    if (x < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier contact.lower = '// &
-                             to_text(lower)//' m'
+    if (x - driver > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier contact.upper = '// &
+                                      to_text(upper)//' m'
+    if (x - driver < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier contact.lower = '// &
+                                      to_text(lower)//' m'
   end function beyond
 
   !> A basin needs two axes or more. Code 65.
@@ -292,7 +317,10 @@ contains
   subroutine require_sweep(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    if (.not. the_case%sweep%present) then
+    if (is_pair(the_case%laws)) then
+      call fail(error, exit_bad_case, the_case%path//': key ''body.law'': found "'//trim(the_case%laws(1)%name)// &
+                '", allowed for a sweep point_mass; a basin over parameters shows the regimes of two bodies')
+    else if (.not. the_case%sweep%present) then
       call fail(error, exit_bad_case, the_case%path//': a sweep needs a table [sweep]')
     else
       call allow_start(the_case, [the_case%sweep%swept], error)

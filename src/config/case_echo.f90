@@ -27,12 +27,17 @@ contains
     text = '# The resolved case: SI units, defaults filled in.'//newline
     if (len(the_case%title) > 0) text = text//'title = '//quoted(the_case%title)//newline
     text = text//deciding_text(the_case, '')
+    associate (record => the_case%record)
+      text = text//newline//'[record]'//newline//line('rate', to_text(record%rate))//line('noise', to_text(record%noise))// &
+             line('resolution', to_text(record%resolution))//line('delay', to_text(record%delay))// &
+             line('seed', to_text(record%seed))
+    end associate
     if (size(the_case%axes) > 0) then
       text = text//newline//'[grid]'//newline//'tile = '//integers(the_case%tile)//newline
     end if
   end function echo_case
 
-  !> Checksum of what decides the results: everything but the title, the shape of the tiles, and what the command
+  !> Checksum of what decides the results: everything but the title, the sensor, the shape of the tiles, and what the command
   !> `kind` ('' = any) does not read.
   pure function case_identity(the_case, kind) result(identity)
     type(case_t), intent(in) :: the_case

@@ -57,6 +57,7 @@ contains
     call read_refine(source, the_case)
     call read_sweep(source, the_case)
     call read_trajectory(source, the_case)
+    call read_record(source, the_case)
     call report_unknown(source)
     if (.not. has_problems(source)) call check_case(source, the_case)
     call problems_of(source, error)
@@ -137,5 +138,19 @@ contains
     call enter_table(source, 'trajectory', found)
     call take_integer(source, 'trajectory.samples_per_period', 2, the_case%trajectory%samples_per_period)
   end subroutine read_trajectory
+
+  subroutine read_record(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(inout) :: the_case
+    logical :: found
+    call enter_table(source, 'record', found)
+    associate (record => the_case%record)
+      call take_real(source, 'record.rate', more_than(0.0_wp, 'Hz'), record%rate)
+      call take_real(source, 'record.noise', at_least(0.0_wp, 'm'), record%noise)
+      call take_real(source, 'record.resolution', at_least(0.0_wp, 'm'), record%resolution)
+      call take_real(source, 'record.delay', at_least(0.0_wp, 's'), record%delay)
+      call take_integer(source, 'record.seed', 0, record%seed)
+    end associate
+  end subroutine read_record
 
 end module case_reader

@@ -34,7 +34,7 @@ module case_type
     !> 'auto', 'exact' or 'adaptive'.
     character(len=8) :: flight = 'auto'
     !> Whether many trajectories fly at once, in vectors, where the machine allows: auto or off.
-    character(len=4) :: lanes = 'auto'
+    character(len=8) :: lanes = 'auto'
     !> Relative tolerance of the adaptive flight.
     real(wp) :: tolerance = 1e-13_wp
     !> Most events of one trajectory.
@@ -70,6 +70,12 @@ module case_type
     integer :: samples_per_period = 200
   end type trajectory_t
 
+  !> A sensor: samples per second, noise (one sigma), resolution and delay.
+  type, public :: record_t
+    real(wp) :: rate = 2000, noise = 0, resolution = 0, delay = 0
+    integer :: seed = 1
+  end type record_t
+
   type, public :: case_t
     character(len=:), allocatable :: title
     !> Name of the file and its text as read.
@@ -87,6 +93,7 @@ module case_type
     type(refine_t) :: refine
     type(sweep_t) :: sweep
     type(trajectory_t) :: trajectory
+    type(record_t) :: record
   end type case_t
 
 end module case_type

@@ -20,7 +20,7 @@ module units
     real(wp) :: multiplier, divisor
   end type unit_row_t
 
-  type(unit_row_t), parameter :: rows(36) = [ &
+  type(unit_row_t), parameter :: rows(40) = [ &
     unit_row_t('m', 'm', 1.0_wp, 1.0_wp), &
     unit_row_t('mm', 'm', 1.0_wp, 1e3_wp), &
     unit_row_t('cm', 'm', 1.0_wp, 1e2_wp), &
@@ -37,6 +37,10 @@ module units
     unit_row_t('mrad', 'rad', 1.0_wp, 1e3_wp), &
     unit_row_t('deg', 'rad', pi, 180.0_wp), &
     unit_row_t('turn', 'rad', 2*pi, 1.0_wp), &
+    unit_row_t('rad/s', 'rad/s', 1.0_wp, 1.0_wp), &
+    unit_row_t('Hz', 'rad/s', 2*pi, 1.0_wp), &
+    unit_row_t('Hz', 'Hz', 1.0_wp, 1.0_wp), &
+    unit_row_t('kHz', 'Hz', 1e3_wp, 1.0_wp), &
     unit_row_t('s', 's', 1.0_wp, 1.0_wp), &
     unit_row_t('ms', 's', 1.0_wp, 1e3_wp), &
     unit_row_t('us', 's', 1.0_wp, 1e6_wp), &

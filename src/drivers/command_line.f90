@@ -28,7 +28,7 @@ module command_line
     character(len=longest_argument), allocatable :: shards(:)
     !> Which share of the tiles to compute, and of how many; 0 = all.
     integer :: shard = 0, shard_count = 0
-    character(len=:), allocatable :: output, list, csv, log, tile_times
+    character(len=:), allocatable :: output, list, csv, record, log, tile_times
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -53,6 +53,7 @@ contains
     command%output = ''
     command%list = ''
     command%csv = ''
+    command%record = ''
     command%tile_times = ''
     command%log = ''
     allocate (command%overrides(0), command%shards(0))
@@ -101,6 +102,8 @@ contains
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. command%name /= 'points' .and. command%name /= 'trajectory') then
       call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
+    else if (len(command%record) > 0 .and. command%name /= 'trajectory') then
+      call fail(error, exit_usage, '--record belongs to the command trajectory')
     else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--tile-times belongs to the commands '//join(resumable, ', '))
     else if (command%resume .and. .not. any(command%name == resumable)) then
@@ -129,6 +132,9 @@ contains
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
     else if (len(command%csv) > 0 .and. command%csv == command%output) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' is the file of -o")
+    else if (len(command%record) > 0 .and. (command%record == command%path .or. command%record == command%output .or. &
+                                            command%record == command%csv)) then
+      call fail(error, exit_usage, "--record '"//command%record//"' would replace another file of the command")
     else if (len(command%tile_times) > 0 .and. any([command%path == command%tile_times, command%list == command%tile_times, &
                                                     command%output == command%tile_times, command%csv == command%tile_times])) then
       call fail(error, exit_usage, "--tile-times '"//command%tile_times//"' is another file of the run")
@@ -163,7 +169,7 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--log', '--tile-times', '--shard', '--time-limit', &
+    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--time-limit', &
           '--ranks-per-node', '--sample', '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
@@ -189,7 +195,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv', '--log', '--tile-times')
+    case ('-o', '--output', '--list', '--csv', '--record', '--log', '--tile-times')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -235,6 +241,8 @@ contains
       command%csv = value
     case ('--log')
       command%log = value
+    case ('--record')
+      command%record = value
     case default
       command%output = value
     end select
@@ -292,8 +300,9 @@ contains
         '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
         '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl
     case ('trajectory')
-      lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE]: one motion with all its events'//nl// &
-        '  --csv FILE      also write the events as a table'//nl
+      lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
+        '  --csv FILE      also write the events as a table'//nl// &
+        '  --record FILE   also write the position as the sensor of the table [record] would measure it'//nl
     case ('points')
       lines = 'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
         '  --list FILE     table with the columns x0,v0 and optionally ratio; replaces the grid of the case'//nl// &

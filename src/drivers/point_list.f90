@@ -3,7 +3,7 @@
 
 !> Reads a list of starts: CSV with a header of x0, v0 and optionally ratio, in any order.
 module point_list
-  use contact_law, only: contact_t
+  use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use output_check, only: is_folder
@@ -136,6 +136,7 @@ contains
     real(wp), intent(in) :: default_ratio
     type(contact_t), intent(in) :: contact
     real(wp), intent(out) :: row(3)
+    real(wp) :: barriers(2)
     type(error_t), allocatable, intent(out) :: error
     character(len=*), parameter :: names(3) = [character(len=5) :: 'x0', 'v0', 'ratio']
     character(len=:), allocatable :: where_found, word
@@ -157,24 +158,27 @@ contains
         return
       end if
     end do
-    if (row(1) > contact%upper .or. row(1) < contact%lower) then
+    barriers = barrier_positions(contact)
+    if (row(1) > barriers(1) .or. row(1) < barriers(2)) then
       call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))// &
                 ' m, allowed is '//between_barriers(contact))
     else if (columns(3) > 0 .and. .not. row(3) > 0) then
       call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed is a number above 0')
     else if (columns(3) > 0 .and. .not. default_ratio > 0) then
-      call fail(error, exit_bad_case, where_found//'ratio: the case has no drive')
+      call fail(error, exit_bad_case, where_found//'ratio: the drive of the case has no ratio')
     end if
   end subroutine read_row
 
   pure function between_barriers(contact) result(words)
     type(contact_t), intent(in) :: contact
     character(len=:), allocatable :: words
+    real(wp) :: barriers(2)
+    barriers = barrier_positions(contact)
     words = ''
-    if (contact%lower > -sqrt(huge(1.0_wp))) words = 'at least the lower barrier '//to_text(contact%lower)//' m'
-    if (contact%upper > sqrt(huge(1.0_wp))) return
+    if (barriers(2) > -sqrt(huge(1.0_wp))) words = 'at least the lower barrier '//to_text(barriers(2))//' m'
+    if (barriers(1) > sqrt(huge(1.0_wp))) return
     if (len(words) > 0) words = words//', '
-    words = words//'at most the upper barrier '//to_text(contact%upper)//' m'
+    words = words//'at most the upper barrier '//to_text(barriers(1))//' m'
   end function between_barriers
 
   pure integer function count_fields(line)

@@ -111,6 +111,7 @@ contains
       call check_result(path, command%force, error)
     end if
     if (.not. allocated(error) .and. len(command%csv) > 0) call check_table(command%csv, command%force, error)
+    if (.not. allocated(error) .and. len(command%record) > 0) call check_table(command%record, command%force, error)
     if (.not. allocated(error) .and. len(command%tile_times) > 0) then
       call check_table(command%tile_times, command%force .or. command%resume, error)
     end if

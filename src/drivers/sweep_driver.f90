@@ -11,7 +11,7 @@ module sweep_driver
   use case_type, only: case_t, contact_position => contact_law
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
-  use contact_law, only: contact_of, contact_t
+  use contact_law, only: barrier_positions, contact_of
   use errors, only: error_t
   use file_layout, only: add_axes, add_map_variables, add_reason, add_regime, axis_dimension
   use grid, only: grid_t
@@ -243,9 +243,7 @@ contains
   function barriers_of(session) result(barriers)
     type(session_t), intent(in) :: session
     real(wp) :: barriers(2)
-    type(contact_t) :: law
-    law = contact_of(session%the_case%laws(contact_position))
-    barriers = [law%upper, law%lower]
+    barriers = barrier_positions(contact_of(session%the_case%laws(contact_position), mass=1.0_wp))
   end function barriers_of
 
   subroutine add_limits(schema, unit, limits)

@@ -8,6 +8,7 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use contact_law, only: barrier_positions, force_on_body
   use drive_law, only: foot_motion
   use errors, only: error_t
   use file_layout, only: add_events
@@ -17,7 +18,8 @@ module trajectory_driver
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
-  use motion_state, only: event_names, log_t, open_log
+  use motion_state, only: book_t, closing_error, event_names, log_t, open_log
+  use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
   use status, only: exit_done, reason_name, reason_time_over
@@ -65,13 +67,18 @@ contains
     call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
     call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
     call describe_file(session, 'trajectory', schema)
-    call describe_motion(moving, span, outcome, schema)
+    call describe_motion(moving, span, outcome, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
+    if (allocated(moving%pair)) call add_pair(log, schema)
+    call add_book(log%book, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
       if (.not. allocated(error) .and. len(command%csv) > 0) call write_events(command%csv, log, error)
+      if (.not. allocated(error) .and. len(command%record) > 0) then
+        call write_record(command%record, session%the_case, moving, grid%start, error)
+      end if
     end if
     call session%stop_if(error)
     call report(session, moving, outcome, log, path)
@@ -79,20 +86,23 @@ contains
   end subroutine run_trajectory_command
 
   !> Attributes: the drive, the barriers, and the steady values over the window.
-  subroutine describe_motion(moving, span, outcome, schema)
+  subroutine describe_motion(moving, span, outcome, log, schema)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(outcome_t), intent(in) :: outcome
+    type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: unreachable
+    real(wp) :: unreachable, barriers(2)
     unreachable = sqrt(huge(1.0_wp))
+    barriers = barrier_positions(moving%machine%contact)
     call schema%add_attribute('', 'drive_period', moving%machine%period)
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
-    if (moving%machine%contact%upper < unreachable) then
-      call schema%add_attribute('', 'barrier_upper', moving%machine%contact%upper)
-    end if
-    if (moving%machine%contact%lower > -unreachable) then
-      call schema%add_attribute('', 'barrier_lower', moving%machine%contact%lower)
+    if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
+    if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
+    if (moving%machine%contact%soft) then
+      call schema%add_attribute('', 'peak_force', log%peak_force)
+      call schema%add_attribute('', 'peak_penetration', log%peak_penetration)
+      call schema%add_attribute('', 'contact_work', log%contact_work)
     end if
     call schema%add_attribute('', 'window', span%window)
     associate (f => outcome%window)
@@ -113,11 +123,6 @@ contains
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: foot(log%samples)
-    integer :: i
-    do i = 1, log%samples
-      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
-    end do
     call schema%add_dimension('time', int(log%samples, int64))
     call schema%add_variable('time', type_float64, ['time'], units='s', long_name='time since the start', &
                              data=log%sample_data(1, :log%samples))
@@ -125,12 +130,78 @@ contains
                              data=log%sample_data(2, :log%samples))
     call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
                              data=log%sample_data(3, :log%samples))
-    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
-                             data=foot)
-    call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5], &
-      flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier', &
+    if (allocated(moving%pair)) then
+      call schema%add_variable('driver_x', type_float64, ['time'], units='m', long_name='position of the driving body', &
+                               data=log%sample_driver(1, :log%samples))
+      call schema%add_variable('driver_v', type_float64, ['time'], units='m/s', long_name='velocity of the driving body', &
+                               data=log%sample_driver(2, :log%samples))
+    else
+      call add_foot(moving, crank_angle, log, schema)
+    end if
+    if (moving%machine%contact%soft) then
+      call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
+        long_name='force of the barriers on the body', &
+        data=force_on_body(moving%machine%contact, log%sample_data(2, :log%samples), log%sample_data(3, :log%samples)))
+    end if
+    call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5, 6], &
+      flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
       data=real(log%sample_mode(:log%samples), wp))
   end subroutine add_history
+
+  subroutine add_foot(moving, crank_angle, log, schema)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: crank_angle
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: foot(log%samples)
+    integer :: i
+    do i = 1, log%samples
+      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
+    end do
+    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
+                             data=foot)
+  end subroutine add_foot
+
+  !> Where the energy went by the end.
+  subroutine add_book(book, schema)
+    type(book_t), intent(in) :: book
+    type(schema_t), intent(inout) :: schema
+    call schema%add_attribute('', 'energy_start', book%at_start)
+    call schema%add_attribute('', 'energy_end', book%at_end)
+    call schema%add_attribute('', 'energy_lost_to_friction', book%friction)
+    call schema%add_attribute('', 'energy_lost_to_damping', book%damping)
+    call schema%add_attribute('', 'energy_lost_to_contacts', book%contact)
+    call schema%add_attribute('', 'energy_put_in', book%work)
+    call schema%add_attribute('', 'energy_closing_error', closing_error(book))
+  end subroutine add_book
+
+  !> What only two bodies have: the driving one at the events, and where the energy went over time.
+  subroutine add_pair(log, schema)
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: driver(2, log%events)
+    driver = 0
+    if (log%events > 0) driver = log%event_driver(:, :log%events)
+    call schema%add_variable('event_driver_x', type_float64, ['event'], units='m', &
+                             long_name='position of the driving body', data=driver(1, :))
+    call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
+                             long_name='velocity of the driving body', data=driver(2, :))
+    call add('energy', 5, 'energy of spring and bodies')
+    call add('friction_loss', 1, 'energy lost to dry friction since the start')
+    call add('damping_loss', 2, 'energy lost to viscous damping since the start')
+    call add('contact_loss', 3, 'energy lost to impacts since the start')
+    call add('drive_work', 4, 'work of drive and blows since the start')
+
+  contains
+
+    subroutine add(name, row, long_name)
+      character(len=*), intent(in) :: name, long_name
+      integer, intent(in) :: row
+      call schema%add_variable(name, type_float64, ['time'], units='J', long_name=long_name, &
+                               data=log%sample_book(row, :log%samples))
+    end subroutine add
+
+  end subroutine add_pair
 
   !> The events as a table at full precision.
   subroutine write_events(path, log, error)

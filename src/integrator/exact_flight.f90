@@ -8,7 +8,8 @@ module exact_flight
   use certified_step, only: departure_step, positive_step, single_root_limit, taylor_root
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_plus, record_sample, state_t, tally_t
+  use motion_state, only: log_t, mode_slip_plus, record_sample, sample_due, sample_time, state_t, &
+    tally_t
   implicit none
   private
 
@@ -193,8 +194,8 @@ contains
     if (log%sample_interval <= 0) return
     do
       sample = state
-      sample%time = log%next_sample*log%sample_interval
-      if (sample%time >= state%time + elapsed) exit
+      sample%time = sample_time(log)
+      if (.not. sample_due(log, state%time + elapsed)) exit
       if (sample%time > state%time) then
         call evaluate(flow, segment, sample%time - state%time, now)
         sample%x = now%x

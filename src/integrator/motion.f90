@@ -6,7 +6,9 @@
 module motion
   use adaptive_flight, only: fly_adaptive
   use constants, only: two_pi
+  use contact_flight, only: contact_side, fly_contact
   use contact_law, only: velocity_after_impact
+  use energy, only: book_exact, book_rest
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
@@ -14,12 +16,13 @@ module motion
   use kinds, only: wp
   use layer_transit, only: cross_layer, prepare_transit, transit_t
   use motion_state, only: append_word, event_barrier_release, event_chatter_lower, &
-    event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_stick, &
-    event_turning_point, flight_adaptive, flight_exact, log_t, mode_lower_barrier, mode_slip_minus, &
-    mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
-    record_sample, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+    event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_separation, event_stick, &
+    event_touch_lower, event_touch_upper, event_turning_point, flight_adaptive, flight_exact, log_t, &
+    mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
+    record_sample, sample_due, sample_time, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
+  use pair_modes, only: pair_motion_t
   use rest, only: chatter_time, hold, mode_from_rest
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
     reason_step_failed
@@ -47,6 +50,8 @@ module motion
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
     real(wp) :: layer = 0
+    !> Two bodies, which have an event loop of their own.
+    type(pair_motion_t), allocatable :: pair
   end type motion_t
 
 contains
@@ -137,17 +142,27 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
+    type(state_t) :: start
     real(wp) :: barrier, before
     integer :: outcome, direction
     logical :: inside
     direction = merge(1, -1, state%mode == mode_slip_plus)
     barrier = merge(moving%machine%contact%upper, moving%machine%contact%lower, direction > 0)
+    if (moving%machine%contact%soft) then
+      if (contact_side(moving%machine%contact, state%x, direction) /= 0) then
+        call press_on(moving, state, time_end, tally, reason, log)
+        return
+      end if
+      barrier = merge(moving%machine%contact%soft_upper, moving%machine%contact%soft_lower, direction > 0)
+    end if
     before = state%time
     inside = moving%layer > 0 .and. abs(state%v) <= moving%layer
     outcome = flight_barrier
     if (direction*(state%x - barrier) < 0) then
       if (moving%exact .and. .not. inside) then
+        start = state
         call fly_exact(moving%flow, state, time_end, moving%layer, barrier, tally, outcome, log)
+        if (present(log)) call book_exact(moving%machine, moving%flow, start, direction, state%time, log%book)
         if (outcome == flight_speed_reached .and. moving%layer > 0) outcome = flight_layer_left
       else
         call cross(moving, state, direction, time_end, barrier, tally, outcome, log)
@@ -160,7 +175,11 @@ contains
     select case (outcome)
     case (flight_barrier)
       tally%v_max = max(tally%v_max, state%v)
-      call collide(moving, state, direction, time_end, tally, log)
+      if (moving%machine%contact%soft) then
+        call touch(state, direction, tally, log)
+      else
+        call collide(moving, state, direction, time_end, tally, log)
+      end if
     case (flight_speed_reached)
       tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
       call come_to_rest(moving, state, event_turning_point, tally, log)
@@ -168,6 +187,42 @@ contains
       reason = reason_step_failed
     end select
   end subroutine slip_on
+
+  !> A soft barrier is reached: nothing changes but the forces from here on.
+  pure subroutine touch(state, direction, tally, log)
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: direction
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    call count_impact(tally, state, direction)
+    if (present(log)) call record_event(log, merge(event_touch_upper, event_touch_lower, direction > 0), state, state%v)
+  end subroutine touch
+
+  !> One slip against a soft barrier.
+  pure subroutine press_on(moving, state, time_end, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(inout) :: reason
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: before
+    integer :: outcome, direction
+    before = state%time
+    direction = merge(1, -1, state%mode == mode_slip_plus)
+    call fly_contact(moving%machine, moving%options, contact_side(moving%machine%contact, state%x, direction), state, &
+                     time_end, tally, outcome, log)
+    if (state%time > before) tally%slips = tally%slips + 1
+    call note_position(tally, state)
+    select case (outcome)
+    case (flight_barrier)
+      if (present(log)) call record_event(log, event_separation, state, state%v)
+    case (flight_speed_reached)
+      call come_to_rest(moving, state, event_turning_point, tally, log)
+    case (flight_failed)
+      reason = reason_step_failed
+    end select
+  end subroutine press_on
 
   !> A slip within the Stribeck layer, or of a machine without closed form: in one stroke if the body passes straight
   !> through the layer, else by the adaptive flight.
@@ -201,7 +256,7 @@ contains
     if (direction > 0) tally%v_max = max(tally%v_max, state%v)
   end subroutine cross
 
-  !> Writes down the samples that fall into a crossing, from a copy flown adaptively.
+  !> Writes down the samples and the energy of a crossing, from a copy flown adaptively.
   pure subroutine sample_crossing(moving, state, time_end, barrier, log)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(in) :: state
@@ -210,7 +265,6 @@ contains
     type(state_t) :: copy
     type(tally_t) :: unused
     integer :: outcome
-    if (log%sample_interval <= 0 .or. log%next_sample*log%sample_interval >= time_end) return
     copy = state
     call fly_adaptive(moving%machine, moving%options, copy, time_end, huge(1.0_wp), barrier, unused, outcome, log)
   end subroutine sample_crossing
@@ -223,14 +277,14 @@ contains
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
+    type(state_t) :: before
     real(wp) :: after, left
     after = velocity_after_impact(moving%machine%contact, state%v)
-    tally%impacts = tally%impacts + 1
-    tally%last_impact_speed = abs(state%v)
-    tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)
-    call append_word(tally, merge(word_upper, word_lower, direction > 0))
-    if (present(log)) call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), &
-                                        state, after)
+    call count_impact(tally, state, direction)
+    if (present(log)) then
+      log%book%contact = log%book%contact + 0.5_wp*moving%machine%mass*(state%v**2 - after**2)
+      call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), state, after)
+    end if
     state%v = after
     state%mode = merge(mode_slip_minus, mode_slip_plus, direction > 0)
     if (.not. abs(after) > 0) then
@@ -242,6 +296,8 @@ contains
     tally%chatters = tally%chatters + 1
     tally%sticks = tally%sticks + 1
     ! The log has the instant of accumulation even where the clock stops before it.
+    if (present(log)) log%book%contact = log%book%contact + 0.5_wp*moving%machine%mass*after**2
+    before = state
     state%time = state%time + left
     state%v = 0
     state%mode = merge(mode_upper_barrier, mode_lower_barrier, direction > 0)
@@ -249,7 +305,18 @@ contains
     if (present(log)) call record_event(log, merge(event_chatter_upper, event_chatter_lower, direction > 0), &
                                         state, 0.0_wp)
     state%time = min(state%time, time_end)
+    if (present(log)) call book_rest(moving%machine, before, state, log%book)
   end subroutine collide
+
+  pure subroutine count_impact(tally, state, direction)
+    type(tally_t), intent(inout) :: tally
+    type(state_t), intent(in) :: state
+    integer, intent(in) :: direction
+    tally%impacts = tally%impacts + 1
+    tally%last_impact_speed = abs(state%v)
+    tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)
+    call append_word(tally, merge(word_upper, word_lower, direction > 0))
+  end subroutine count_impact
 
   !> Zero velocity: the forces choose the next mode. `passing` is the event written down if the body does not stay.
   pure subroutine come_to_rest(moving, state, passing, tally, log)
@@ -283,11 +350,12 @@ contains
     tally%v_max = max(tally%v_max, 0.0_wp)
     call hold(moving%machine, state, time_end)
     if (.not. present(log)) return
+    call book_rest(moving%machine, start, state, log%book)
     if (log%sample_interval > 0) then
       sample = start
       do
-        sample%time = log%next_sample*log%sample_interval
-        if (sample%time >= state%time) exit
+        sample%time = sample_time(log)
+        if (.not. sample_due(log, state%time)) exit
         call record_sample(log, sample)
       end do
     end if

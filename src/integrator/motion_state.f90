@@ -8,19 +8,21 @@ module motion_state
   implicit none
   private
 
-  public :: reset_tally, note_position, append_word, open_log, record_event, record_sample
+  public :: sample_time, sample_due, closing_error, reset_tally, note_position, append_word, open_log, record_event, record_sample
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
     mode_upper_barrier = 4, mode_lower_barrier = 5
+  !> Of two bodies only: both at rest, the driven one on its stop. Slips are those of the driving body over the driven one.
+  integer, parameter, public :: mode_held = 6
 
   !> Events.
   integer, parameter, public :: event_impact_upper = 1, event_impact_lower = 2, event_stick = 3, &
     event_release = 4, event_turning_point = 5, event_chatter_upper = 6, event_chatter_lower = 7, &
-    event_barrier_release = 8
-  character(len=*), parameter, public :: event_names(8) = [character(len=15) :: 'impact_upper', &
+    event_barrier_release = 8, event_touch_upper = 9, event_touch_lower = 10, event_separation = 11, event_blow = 12
+  character(len=*), parameter, public :: event_names(12) = [character(len=15) :: 'impact_upper', &
     'impact_lower', 'stick', 'release', 'turning_point', 'chatter_upper', 'chatter_lower', &
-    'barrier_release']
+    'barrier_release', 'touch_upper', 'touch_lower', 'separation', 'blow']
 
   !> Symbols of event words, three bits each.
   integer, parameter, public :: word_upper = 1, word_lower = 2, word_stick = 3, &
@@ -63,6 +65,13 @@ module motion_state
     logical :: wants_v_max = .false.
   end type tally_t
 
+  !> Where the energy went since the start [J]: lost to dry friction, to viscous damping, to contacts; put in by the drive.
+  type, public :: book_t
+    real(wp) :: friction = 0, damping = 0, contact = 0, work = 0
+    !> Energy of the machine then and now.
+    real(wp) :: at_start = 0, at_end = 0
+  end type book_t
+
   !> Every event and equidistant samples, in absolute time. Storage grows as needed.
   type, public :: log_t
     !> Absolute time of the start of the current drive period [s].
@@ -77,9 +86,36 @@ module motion_state
     real(wp), allocatable :: event_data(:, :)
     !> Rows: time, x, v.
     real(wp), allocatable :: sample_data(:, :)
+    !> Soft barriers: largest force [N] and penetration [m], work done on them [J].
+    real(wp) :: peak_force = 0, peak_penetration = 0, contact_work = 0
+    !> Position and velocity of the driving body of two, at events and at samples.
+    real(wp), allocatable :: event_driver(:, :), sample_driver(:, :)
+    !> Where the energy went until now, and until each sample: rows as in `book_t`, `at_end` being the energy then.
+    type(book_t) :: book
+    real(wp), allocatable :: sample_book(:, :)
   end type log_t
 
 contains
+
+  !> Time of the next sample [s after the section].
+  pure real(wp) function sample_time(log)
+    type(log_t), intent(in) :: log
+    sample_time = log%next_sample*log%sample_interval
+  end function sample_time
+
+  !> Whether the next sample comes before `until` [s after the section] by more than rounding: the end of a period is the
+  !> first sample of the next.
+  pure logical function sample_due(log, until)
+    type(log_t), intent(in) :: log
+    real(wp), intent(in) :: until
+    sample_due = sample_time(log) < until*(1 - 8*epsilon(until))
+  end function sample_due
+
+  !> What is missing in a book [J].
+  pure elemental real(wp) function closing_error(book)
+    type(book_t), intent(in) :: book
+    closing_error = book%at_start + book%work - book%friction - book%damping - book%contact - book%at_end
+  end function closing_error
 
   !> Starts counting anew from a state; keeps what was asked for.
   pure subroutine reset_tally(tally, state)
@@ -131,12 +167,13 @@ contains
     allocate (log%event_kind(256), log%event_data(4, 256), log%sample_mode(4096), log%sample_data(3, 4096))
   end subroutine open_log
 
-  !> Writes an event down: state just before it and the velocity just after.
-  pure subroutine record_event(log, kind, state, v_after)
+  !> Writes an event down: state just before it and the velocity just after; `driver` is x, v of the driving body of two.
+  pure subroutine record_event(log, kind, state, v_after, driver)
     type(log_t), intent(inout) :: log
     integer, intent(in) :: kind
     type(state_t), intent(in) :: state
     real(wp), intent(in) :: v_after
+    real(wp), intent(in), optional :: driver(2)
     integer, allocatable :: kinds_grown(:)
     real(wp), allocatable :: data_grown(:, :)
     if (.not. allocated(log%event_kind)) allocate (log%event_kind(256), log%event_data(4, 256))
@@ -150,12 +187,15 @@ contains
     log%events = log%events + 1
     log%event_kind(log%events) = kind
     log%event_data(:, log%events) = [log%origin + state%time, state%x, state%v, v_after]
+    if (present(driver)) call put_column(log%event_driver, log%events, driver)
   end subroutine record_event
 
-  !> Writes one sample down and moves on to the next.
-  pure subroutine record_sample(log, state)
+  !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two, `book` the energy.
+  pure subroutine record_sample(log, state, driver, book)
     type(log_t), intent(inout) :: log
     type(state_t), intent(in) :: state
+    real(wp), intent(in), optional :: driver(2)
+    type(book_t), intent(in), optional :: book
     integer, allocatable :: modes_grown(:)
     real(wp), allocatable :: data_grown(:, :)
     if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
@@ -170,6 +210,24 @@ contains
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
     log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
+    if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
+    if (present(book)) call put_column(log%sample_book, log%samples, &
+                                       [book%friction, book%damping, book%contact, book%work, book%at_end])
   end subroutine record_sample
+
+  !> Puts values into column `column`, the one after the last.
+  pure subroutine put_column(columns, column, values)
+    real(wp), allocatable, intent(inout) :: columns(:, :)
+    integer, intent(in) :: column
+    real(wp), intent(in) :: values(:)
+    real(wp), allocatable :: grown(:, :)
+    if (.not. allocated(columns)) allocate (columns(size(values), 256))
+    if (column > size(columns, 2)) then
+      allocate (grown(size(values), 2*size(columns, 2)))
+      grown(:, :size(columns, 2)) = columns
+      call move_alloc(grown, columns)
+    end if
+    columns(:, column) = values
+  end subroutine put_column
 
 end module motion_state

@@ -5,6 +5,7 @@
 !> level), how long friction or a barrier holds it, and how a sequence of ever smaller impacts ends.
 module rest
   use certified_step, only: departure_step, positive_step
+  use contact_law, only: contact_constant, contact_force, restitution_at
   use friction_law, only: friction_t, power
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
@@ -18,6 +19,8 @@ module rest
   !> Relative change of the acceleration over what is left of a chatter sequence at which it is
   !> completed analytically.
   real(wp), parameter :: chatter_uniformity = 1e-6_wp
+  !> A bounce that takes less than this share of a period ends a chatter sequence whose restitution still changes.
+  real(wp), parameter :: briefest_bounce = 1e-12_wp
 
 contains
 
@@ -30,8 +33,8 @@ contains
     logical :: at_upper, at_lower, up, down
     call holding_force(machine, state%x, machine%drive_frequency*state%time, &
                        force, rate, curvature)
-    up = breaks_away(machine, force, rate)
-    down = breaks_away(machine, -force, -rate)
+    up = breaks_away(machine, state%x, force, rate)
+    down = breaks_away(machine, state%x, -force, -rate)
     at_upper = state%x >= machine%contact%upper
     at_lower = state%x <= machine%contact%lower
     if (up .and. .not. at_upper) then
@@ -48,18 +51,31 @@ contains
   end function mode_from_rest
 
   !> Whether a force and its rate overcome the break-away force in their own direction.
-  pure logical function breaks_away(machine, force, rate)
+  pure logical function breaks_away(machine, x, force, rate)
     type(oscillator_t), intent(in) :: machine
-    real(wp), intent(in) :: force, rate
+    real(wp), intent(in) :: x, force, rate
     real(wp) :: excess, rounding
     excess = force - machine%friction%break_away
     rounding = 32*epsilon(1.0_wp)*(machine%force_scale + abs(force))
+    if (machine%contact%soft) rounding = rounding + soft_rounding(machine, x)
     if (abs(excess) <= rounding) then
       breaks_away = rate > 0
     else
       breaks_away = excess > 0
     end if
   end function breaks_away
+
+  !> What the rounding of the position `x` [m] does to the force of a soft barrier [N].
+  pure real(wp) function soft_rounding(machine, x)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: x
+    real(wp) :: depth
+    associate (law => machine%contact)
+      depth = max(x - law%soft_upper, law%soft_lower - x)
+      soft_rounding = 0
+      if (depth >= 0) soft_rounding = contact_force(law, depth + 8*spacing(x), 0.0_wp) - contact_force(law, depth, 0.0_wp)
+    end associate
+  end function soft_rounding
 
   !> Keeps the body at rest until it is released or `time_end`. `state%mode` becomes the slip that follows;
   !> it stays as it is when the time is over.
@@ -75,10 +91,10 @@ contains
     do
       call holding_force(machine, state%x, machine%drive_frequency*state%time, &
                          force, rate, curvature)
-      if (up_open .and. breaks_away(machine, force, rate)) then
+      if (up_open .and. breaks_away(machine, state%x, force, rate)) then
         state%mode = mode_slip_plus
         return
-      else if (down_open .and. breaks_away(machine, -force, -rate)) then
+      else if (down_open .and. breaks_away(machine, state%x, -force, -rate)) then
         state%mode = mode_slip_minus
         return
       end if
@@ -115,7 +131,7 @@ contains
     type(state_t), intent(in) :: state
     integer, intent(in) :: direction
     real(wp), intent(in) :: speed
-    real(wp) :: force, rate, curvature, out, back, shrink, friction, change
+    real(wp) :: force, rate, curvature, out, back, shrink, friction, change, bounce
     left = -1
     call holding_force(machine, state%x, machine%drive_frequency*state%time, &
                        force, rate, curvature)
@@ -125,15 +141,27 @@ contains
       out = (direction*force + friction)/machine%mass
       back = (direction*force - friction)/machine%mass
       if (back <= 0) return
-      shrink = machine%contact%restitution*sqrt(back/out)
+      bounce = speed/out + speed/sqrt(back*out)
+      shrink = sqrt(back/out)*chatter_restitution(machine, speed, bounce)
       if (shrink >= 1) return
-      left = (speed/out + speed/sqrt(back*out))/(1 - shrink)
+      left = bounce/(1 - shrink)
       change = (abs(rate)*left + curvature*left**2/2 + law%damping*speed &
                 + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &
                + layer_change(law, speed)/machine%mass
       if (change > chatter_uniformity*back) left = -1
     end associate
   end function chatter_time
+
+  !> The restitution over what is left of a chatter sequence; huge where it is not yet uniform.
+  pure real(wp) function chatter_restitution(machine, speed, bounce) result(k)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: speed, bounce
+    k = machine%contact%restitution
+    if (machine%contact%kind == contact_constant) return
+    k = restitution_at(machine%contact, speed)
+    if (bounce <= briefest_bounce*machine%period) return
+    if (abs(k - machine%contact%restitution) > chatter_uniformity) k = huge(k)
+  end function chatter_restitution
 
   !> Speed [m/s] of rebound above which a chatter sequence is never completed: the acceleration changes too much on the
   !> way out alone, c v^2/(2 a_out m) > uniformity a_in, as both are at most the largest force over the mass.

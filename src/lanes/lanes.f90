@@ -5,6 +5,7 @@
 !> stops at its time, or is left to the event loop of module `motion` where something rare is due. What comes out of a lane does
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
+  use contact_law, only: contact_constant
   use exact_flow, only: flow_t
   use kinds, only: wp
   use motion, only: motion_t
@@ -73,13 +74,16 @@ contains
     widest_lanes = separatrix_lane_width()
   end function widest_lanes
 
-  !> Lanes for a machine with a closed form, no Stribeck layer and no harmonic at resonance, if its options ask for lanes.
+  !> Lanes for one body with a closed form, no Stribeck layer, no harmonic at resonance, and rigid barriers of constant
+  !> restitution, if its options ask for lanes.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     real(wp) :: fastest
     flow%width = moving%options%lane_width
     flow%available = flow%width > 0 .and. moving%exact .and. moving%layer <= 0 .and. moving%flow%harmonics <= most_harmonics
+    flow%available = flow%available .and. .not. allocated(moving%pair) .and. .not. moving%machine%contact%soft .and. &
+      moving%machine%contact%kind == contact_constant
     if (.not. flow%available) return
     associate (from => moving%flow, m => flow%machine, law => moving%machine)
       m%natural = from%natural

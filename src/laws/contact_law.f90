@@ -1,40 +1,196 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Rigid barriers with Newton's law of restitution.
+!> Barriers. A rigid one turns the velocity round at once, with a restitution that may depend on the speed. A
+!> soft one pushes back over the penetration p >= 0,
+!>   K p^n (1 + a p')  or  K p + D p',
+!> and never pulls unless the law says so.
 module contact_law
+  use contact_rows, only: restitution_formulas
+  use elementary, only: exponential, logarithm
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
+  use restitution_law, only: formula_damping, kelvin_voigt_ratio
   implicit none
   private
 
-  public :: contact_of, velocity_after_impact
+  public :: contact_of, barrier_positions, velocity_after_impact, restitution_at, contact_force, contact_margin, &
+    force_on_body
+
+  integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
+    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5
 
   type, public :: contact_t
-    !> Ratio of the speeds after and before an impact.
+    integer :: kind = contact_constant
+    !> Ratio of the speeds after and before an impact; at low speed where it depends on the speed.
     real(wp) :: restitution = 1
-    !> Positions of the barriers [m]; huge means none.
+    !> Positions of rigid barriers [m]; huge means none.
     real(wp) :: upper = huge(1.0_wp)
     real(wp) :: lower = -huge(1.0_wp)
+    !> Two coefficients of a restitution that depends on the speed.
+    real(wp) :: coefficients(2) = 0
+    !> A barrier with a force over penetration: positions of its surfaces [m], huge means none.
+    logical :: soft = .false.
+    real(wp) :: soft_upper = huge(1.0_wp)
+    real(wp) :: soft_lower = -huge(1.0_wp)
+    !> K [N/m^n], n, and a [s/m] or D [N s/m].
+    real(wp) :: stiffness = 0, exponent = 1, damping = 0
+    !> The force may pull.
+    logical :: tension = .false.
   end type contact_t
 
 contains
 
-  !> The law that a choice of the family `contact` names.
-  pure function contact_of(choice) result(law)
+  !> The law that a choice of the family `contact` names, for a body of `mass` [kg].
+  pure function contact_of(choice, mass) result(law)
     type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: mass
     type(contact_t) :: law
-    if (choice%name == 'newton') then
-      law = contact_t(value_of(choice, 'restitution'), value_of(choice, 'upper'), &
-                      value_of(choice, 'lower'))
-    end if
+    select case (choice%name)
+    case ('none')
+      return
+    case ('newton')
+      law%restitution = value_of(choice, 'restitution')
+    case ('newton_linear')
+      law%kind = contact_linear
+      law%coefficients(1) = value_of(choice, 'slope')
+    case ('newton_power')
+      law%kind = contact_power
+      law%restitution = value_of(choice, 'restitution')
+      law%coefficients = [value_of(choice, 'yield_speed'), value_of(choice, 'falloff')]
+    case ('newton_viscoelastic')
+      law%kind = contact_viscoelastic
+      law%coefficients = [value_of(choice, 'first'), value_of(choice, 'second')]
+    case default
+      law = soft_of(choice, mass)
+      law%soft_upper = value_of(choice, 'upper')
+      law%soft_lower = value_of(choice, 'lower')
+      return
+    end select
+    law%upper = value_of(choice, 'upper')
+    law%lower = value_of(choice, 'lower')
   end function contact_of
 
-  !> Newton: v+ = -k v- [m/s].
+  !> The part of a soft law that is not its position.
+  pure function soft_of(choice, mass) result(law)
+    type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: mass
+    type(contact_t) :: law
+    real(wp) :: zeta
+    law%soft = .true.
+    law%stiffness = value_of(choice, 'stiffness')
+    select case (choice%name)
+    case ('kelvin_voigt', 'kelvin_voigt_restitution')
+      law%kind = contact_kelvin_voigt
+      law%tension = value_of(choice, 'tension') > 0.5_wp
+      if (choice%name == 'kelvin_voigt') then
+        law%damping = value_of(choice, 'damping')
+      else
+        zeta = kelvin_voigt_ratio(value_of(choice, 'restitution'), law%tension)
+        law%damping = 2*zeta*sqrt(law%stiffness*mass)
+      end if
+    case default
+      law%kind = contact_hunt_crossley
+      law%exponent = value_of(choice, 'exponent')
+      if (any(restitution_formulas == choice%name)) then
+        law%damping = formula_damping(choice%name, value_of(choice, 'restitution'))/value_of(choice, 'speed')
+      else
+        law%damping = value_of(choice, 'damping')
+      end if
+    end select
+  end function soft_of
+
+  !> Upper and lower barrier, rigid or soft [m]; huge means none.
+  pure function barrier_positions(law) result(positions)
+    type(contact_t), intent(in) :: law
+    real(wp) :: positions(2)
+    positions = [min(law%upper, law%soft_upper), max(law%lower, law%soft_lower)]
+  end function barrier_positions
+
+  !> v+ = -k v- [m/s].
   pure elemental real(wp) function velocity_after_impact(law, v)
     type(contact_t), intent(in) :: law
     real(wp), intent(in) :: v
-    velocity_after_impact = -law%restitution*v
+    if (law%kind == contact_constant) then
+      velocity_after_impact = -law%restitution*v
+    else
+      velocity_after_impact = -restitution_at(law, abs(v))*v
+    end if
   end function velocity_after_impact
+
+  !> Restitution of a rigid barrier at an impact speed [m/s].
+  pure elemental real(wp) function restitution_at(law, speed) result(k)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: speed
+    real(wp) :: root
+    k = law%restitution
+    select case (law%kind)
+    case (contact_linear)
+      k = max(0.0_wp, 1 - law%coefficients(1)*speed)
+    case (contact_power)
+      if (speed > law%coefficients(1)) k = k*exponential(-law%coefficients(2)*logarithm(speed/law%coefficients(1)))
+    case (contact_viscoelastic)
+      if (speed > tiny(speed)) then
+        root = exponential(logarithm(speed)/5)
+        k = min(1.0_wp, max(0.0_wp, 1 - law%coefficients(1)*root + law%coefficients(2)*root**2))
+      end if
+    end select
+  end function restitution_at
+
+  !> Force of a soft barrier on the body [N], away from it, at the penetration `p` [m] that grows at `rate` [m/s], as the
+  !> formula has it: cut off where `contact_margin` is negative. Continued smoothly to p < 0, where a contact ends.
+  pure elemental real(wp) function contact_force(law, p, rate) result(force)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: p, rate
+    if (law%kind == contact_kelvin_voigt) then
+      force = law%stiffness*p + law%damping*rate
+    else
+      force = law%stiffness*signed_power(p, law%exponent)*(1 + law%damping*rate)
+    end if
+  end function contact_force
+
+  !> Force of soft barriers on a body at `x` [m] with `v` [m/s], in N.
+  pure elemental real(wp) function force_on_body(law, x, v) result(force)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: x, v
+    force = 0
+    if (.not. law%soft) return
+    if (x > law%soft_upper) force = -allowed_force(law, x - law%soft_upper, v)
+    if (x < law%soft_lower) force = allowed_force(law, law%soft_lower - x, -v)
+  end function force_on_body
+
+  pure elemental real(wp) function allowed_force(law, p, rate) result(force)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: p, rate
+    force = contact_force(law, p, rate)
+    if (.not. law%tension) force = max(0.0_wp, force)
+  end function allowed_force
+
+  !> A linear function of p and p' that is positive where the formula of a soft law pushes: its coefficients with
+  !> 1, p and p'.
+  pure function contact_margin(law) result(margin)
+    type(contact_t), intent(in) :: law
+    real(wp) :: margin(3)
+    margin = [1.0_wp, 0.0_wp, law%damping]
+    if (law%kind == contact_kelvin_voigt) margin = [0.0_wp, law%stiffness, law%damping]
+  end function contact_margin
+
+  !> |p|^n with the sign of p, in reproducible arithmetic.
+  pure elemental real(wp) function signed_power(p, n)
+    real(wp), intent(in) :: p, n
+    real(wp) :: size_p
+    size_p = abs(p)
+    if (n == 1) then
+      signed_power = p
+    else if (size_p < tiny(1.0_wp)) then
+      signed_power = 0
+    else if (n == 1.5_wp) then
+      signed_power = p*sqrt(size_p)
+    else if (n == 2) then
+      signed_power = p*size_p
+    else
+      signed_power = sign(exponential(n*logarithm(size_p)), p)
+    end if
+  end function signed_power
 
 end module contact_law

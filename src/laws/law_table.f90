@@ -5,44 +5,23 @@
 !> case reader, `separatrix laws` and the documentation all come from it. Adding a law means one
 !> pure procedure, rows here and a test.
 module law_table
+  use contact_rows, only: contact_laws, contact_parameters
   use kinds, only: wp
+  use law_row, only: family_length, law_length, law_row_t, none_above, none_below, parameter_row_t
+  use pair_rows, only: pair_laws, pair_parameters
   use text, only: join
   implicit none
   private
 
+  public :: law_row_t, parameter_row_t
   public :: find_law, law_names, parameters_of, law_choice, value_of, list_of, set_value, change_parameter
 
   !> The parts that a machine is composed of, one law each.
-  character(len=*), parameter, public :: families(5) = [character(len=9) :: &
+  character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
     'body', 'restoring', 'friction', 'contact', 'drive']
 
   !> Largest |angle| [rad]: beyond it the rounding of the angle shows in its sine.
   real(wp), parameter, public :: largest_angle = 1e4_wp
-
-  real(wp), parameter :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
-
-  type, public :: law_row_t
-    character(len=9) :: family
-    character(len=16) :: name
-    character(len=96) :: meaning
-    character(len=96) :: source
-  end type law_row_t
-
-  !> One parameter of one law. Values are in the SI unit given; bounds are closed unless open.
-  type, public :: parameter_row_t
-    character(len=9) :: family
-    character(len=16) :: law
-    character(len=20) :: name
-    character(len=6) :: unit
-    real(wp) :: lower, upper
-    logical :: lower_open
-    !> An optional parameter takes its default.
-    logical :: optional
-    real(wp) :: default
-    !> A list of any length instead of one number.
-    logical :: list
-    character(len=88) :: meaning
-  end type parameter_row_t
 
   !> The values of one parameter: one number, or a list.
   type, public :: parameter_value_t
@@ -51,14 +30,14 @@ module law_table
 
   !> A law with values for its parameters, in the order of `parameters_of`.
   type, public :: law_choice_t
-    character(len=9) :: family = ''
-    character(len=16) :: name = ''
+    character(len=family_length) :: family = ''
+    character(len=law_length) :: name = ''
     type(parameter_value_t), allocatable :: parameters(:)
   end type law_choice_t
 
   character(len=*), parameter :: lemes = 'Lemes et al., vibro-impact system with ideal excitation'
 
-  type(law_row_t), parameter, public :: laws(14) = [ &
+  type(law_row_t), parameter :: other_laws(12) = [ &
     law_row_t('body', 'point_mass', 'one body on a horizontal guide', lemes), &
     law_row_t('restoring', 'linear', 'force c (l0 + x_A - x)', lemes), &
     law_row_t('restoring', 'none', 'no restoring force', ''), &
@@ -68,8 +47,6 @@ module law_table
     law_row_t('friction', 'coulomb_viscous', '-mu m g sgn v - b v; sticks up to mu_s m g', 'sum of the two laws'), &
     law_row_t('friction', 'coulomb_stribeck', &
               '-(mu + (mu_s - mu) exp(-|v/v_s|^delta)) m g sgn v; sticks up to mu_s m g', lemes), &
-    law_row_t('contact', 'none', 'no barrier', ''), &
-    law_row_t('contact', 'newton', 'rigid barrier: v+ = -k v-', lemes), &
     law_row_t('drive', 'none', 'the foot of the spring is at rest at x_A = 0', ''), &
     law_row_t('drive', 'harmonic', 'x_A = mean + amplitude cos(phi + angle)', 'Den Hartog, Trans. ASME 53 (1931)'), &
     law_row_t('drive', 'fourier', 'x_A = mean + sum a_n cos n(phi + angle) + b_n sin n(phi + angle)', &
@@ -77,7 +54,7 @@ module law_table
     law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
               'geometry derived from '//lemes)]
 
-  type(parameter_row_t), parameter, public :: parameters(36) = [ &
+  type(parameter_row_t), parameter :: other_parameters(33) = [ &
     parameter_row_t('body', 'point_mass', 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'm'), &
     parameter_row_t('body', 'point_mass', 'gravity', 'm/s^2', 0.0_wp, none_above, .false., .true., 9.81_wp, .false., &
@@ -106,12 +83,6 @@ module law_table
                     .false., 'v_s'), &
     parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_exponent', '1', 0.0_wp, none_above, .true., .true., 1.0_wp, &
                     .false., 'delta'), &
-    parameter_row_t('contact', 'newton', 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
-                    'k, ratio of the speeds after and before an impact'), &
-    parameter_row_t('contact', 'newton', 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &
-                    'position of the barrier above the body; no barrier if absent'), &
-    parameter_row_t('contact', 'newton', 'lower', 'm', none_below, none_above, .false., .true., none_below, .false., &
-                    'position of the barrier below the body; no barrier if absent'), &
     parameter_row_t('drive', 'harmonic', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
     parameter_row_t('drive', 'harmonic', 'mean', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
@@ -150,6 +121,12 @@ module law_table
                     's, position of C on the axis of x'), &
     parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
                     'offset added to the crank angle')]
+
+  type(law_row_t), parameter, public :: laws(size(other_laws) + size(contact_laws) + size(pair_laws)) = &
+    [other_laws, contact_laws, pair_laws]
+  type(parameter_row_t), parameter, public :: parameters( &
+    size(other_parameters) + size(contact_parameters) + size(pair_parameters)) = &
+    [other_parameters, contact_parameters, pair_parameters]
 
 contains
 

@@ -5,12 +5,12 @@
 !> A slice is one combination of the parameters: one machine, one catalogue of attractors.
 module grid
   use axis, only: axis_t
+  use build_motion, only: machine_of, period_of
   use errors, only: error_t
   use kinds, only: int64, wp
   use law_table, only: change_parameter, law_choice_t
-  use motion, only: motion_t, prepare_motion
+  use motion, only: motion_t
   use motion_state, only: options_t
-  use oscillator, only: build_oscillator, oscillator_t
   implicit none
   private
 
@@ -102,10 +102,7 @@ contains
     integer(int64), intent(in) :: slice
     real(wp), intent(out) :: period
     type(error_t), allocatable, intent(out) :: error
-    type(oscillator_t) :: machine
-    period = 0
-    call build_oscillator(slice_laws(grid, slice), machine, error)
-    if (.not. allocated(error)) period = machine%period
+    call period_of(slice_laws(grid, slice), period, error)
   end subroutine slice_period
 
   !> The two axes along which a map is refined: of starts if there are as many, otherwise also of parameters, the first
@@ -150,17 +147,6 @@ contains
     call change_parameter(laws, path, value, known)
     call machine_of(laws, grid%options, moving, error)
   end subroutine machine_with
-
-  pure subroutine machine_of(laws, options, moving, error)
-    type(law_choice_t), intent(in) :: laws(:)
-    type(options_t), intent(in) :: options
-    type(motion_t), intent(out) :: moving
-    type(error_t), allocatable, intent(out) :: error
-    type(oscillator_t) :: machine
-    call build_oscillator(laws, machine, error)
-    if (allocated(error)) return
-    call prepare_motion(machine, options, moving, error)
-  end subroutine machine_of
 
   !> Slices next to `slice` along each parameter axis, last axis first: those before it, and with `both` those behind it.
   pure function slice_neighbours(grid, slice, both) result(neighbours)

@@ -5,7 +5,7 @@
 !> fixed positions, crank angle phi = Omega t + phi_0.
 module oscillator
   use constants, only: two_pi
-  use contact_law, only: contact_of, contact_t
+  use contact_law, only: contact_of, contact_t, force_on_body
   use drive_law, only: drive_of, drive_t, foot_motion
   use errors, only: error_t, fail
   use friction_law, only: friction_of, friction_t
@@ -16,7 +16,7 @@ module oscillator
   implicit none
   private
 
-  public :: build_oscillator, holding_force
+  public :: build_oscillator, refuse_pair, holding_force
 
   type, public :: oscillator_t
     !> Mass [kg].
@@ -50,6 +50,8 @@ contains
     real(wp) :: normal_force
     integer :: i, n
     normal_force = 0
+    call refuse_pair(choices, error)
+    if (allocated(error)) return
     do i = 1, size(choices)
       if (choices(i)%family /= 'body') cycle
       machine%mass = value_of(choices(i), 'mass')
@@ -62,7 +64,7 @@ contains
       case ('friction')
         machine%friction = friction_of(choices(i), normal_force)
       case ('contact')
-        machine%contact = contact_of(choices(i))
+        machine%contact = contact_of(choices(i), machine%mass)
       case ('drive')
         machine%drive = drive_of(choices(i))
       end select
@@ -98,6 +100,23 @@ contains
       + machine%friction%break_away
   end subroutine build_oscillator
 
+  !> One body has no place for the laws of two. The message begins with the key.
+  pure subroutine refuse_pair(choices, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    do i = 1, size(choices)
+      if (allocated(error)) return
+      select case (choices(i)%name)
+      case ('friction_pair', 'backlash_pair')
+        call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
+      case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')
+        call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with two bodies '// &
+                  '(body.law = "friction_pair" or "backlash_pair")')
+      end select
+    end do
+  end subroutine refuse_pair
+
   !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
   !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
   !> derivative [N/s^2] over all angles.
@@ -110,6 +129,7 @@ contains
     stretch = machine%restoring%free_length + foot - x
     force = restoring_force(machine%restoring, stretch)
     rate = restoring_stiffness(machine%restoring, stretch)*foot_rate*machine%drive_frequency
+    if (machine%contact%soft) force = force + force_on_body(machine%contact, x, 0.0_wp)
     curvature_bound = machine%restoring%stiffness*machine%foot_acceleration_bound
   end subroutine holding_force
 

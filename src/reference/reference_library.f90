@@ -6,12 +6,12 @@
 module reference_library
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use attractors, only: attractor_t, packed_size, unpack_attractor
+  use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: wp
   use law_table, only: families, law_choice, law_choice_t, laws
-  use motion, only: motion_t, prepare_motion
+  use motion, only: motion_t
   use motion_state, only: options_t
-  use oscillator, only: build_oscillator, oscillator_t
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
   private
@@ -35,7 +35,6 @@ contains
     real(c_double), intent(in) :: packed(packed_size, attractor_count), starts(3, points)
     real(c_double), intent(out) :: results(6, points)
     type(law_choice_t) :: choices(size(families))
-    type(oscillator_t) :: machine
     type(motion_t) :: moving
     type(attractor_t), allocatable :: catalogue(:)
     type(error_t), allocatable :: error
@@ -54,14 +53,12 @@ contains
         position = position + lengths(parameter)
       end do
     end do
-    call build_oscillator(choices, machine, error)
-    if (allocated(error)) return
     options%flight = flight
     options%event_budget = event_budget
     options%tolerance = numbers(1)
     options%domain = numbers(2)
     span = span_t(real(numbers(3), wp), real(numbers(4), wp), real(numbers(5), wp), numbers(6) > 0)
-    call prepare_motion(machine, options, moving, error)
+    call machine_of(choices, options, moving, error)
     if (allocated(error)) return
     allocate (catalogue(attractor_count))
     do i = 1, attractor_count

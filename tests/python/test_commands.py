@@ -325,7 +325,7 @@ def test_progress_in_a_log_is_sparse(separatrix, tmp_path):
         processes[name] = subprocess.Popen(command, cwd=tmp_path, **streams)
     said = {name: process.communicate(timeout=60) for name, process in processes.items()}
     assert [process.returncode for process in processes.values()] == [75, 75, 75]
-    assert re.fullmatch(r"\d+ of 9000000 points, \d %, [\d.]+ points/s, ETA .+\n", said["plain"][1])
+    assert re.fullmatch(r"\d+ of 9000000 points, \d+ %, [\d.]+ points/s, ETA .+\n", said["plain"][1])
     assert said["lines"][1] == ""
     events = [json.loads(line) for line in said["lines"][0].splitlines()]
     (progress,) = (event for event in events if event["event"] == "progress")

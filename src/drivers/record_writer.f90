@@ -1,0 +1,101 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A motion as a sensor would have measured it: sampled, delayed, noisy, quantised; a table that looks like a record.
+module record_writer
+  use case_type, only: case_t, record_t
+  use constants, only: two_pi
+  use elementary, only: logarithm, sine_cosine
+  use errors, only: error_t, fail
+  use kinds, only: int64, real64, wp
+  use motion, only: motion_t
+  use random, only: uniform
+  use sampling, only: sample_positions
+  use status, only: exit_bad_case, exit_io, reason_name
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: write_record
+
+contains
+
+  !> Writes the motion of a case from `start` = x0 [m], v0 [m/s], crank angle [rad] into the table `path`.
+  subroutine write_record(path, the_case, moving, start, error)
+    character(len=*), intent(in) :: path
+    type(case_t), intent(in) :: the_case
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: start(3)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: times(:), x(:), driver(:)
+    character(len=256) :: message
+    character(len=*), parameter :: row_format = '(*(es23.16, :, ","))'
+    integer :: count, i, unit, status, reason
+    count = floor(the_case%run%duration*the_case%record%rate) + 1
+    times = [(i/the_case%record%rate, i=0, count - 1)]
+    allocate (x(count), driver(count))
+    call sample_positions(moving, start, max(0.0_wp, times - the_case%record%delay), x, driver, reason)
+    if (reason /= 0) then
+      call fail(error, exit_bad_case, 'record: the motion was given up: '//reason_name(reason))
+      return
+    end if
+    call measure(the_case%record, 0_int64, x)
+    call measure(the_case%record, int(count, int64), driver)
+    open (newunit=unit, file=path, status='replace', action='write', iostat=status, iomsg=message)
+    associate (heading => heading_of(the_case, moving, start))
+      do i = 1, size(heading)
+        if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) trim(heading(i))
+      end do
+    end associate
+    do i = 1, count
+      if (status /= 0) exit
+      if (allocated(moving%pair)) then
+        write (unit, row_format, iostat=status, iomsg=message) times(i), x(i), driver(i)
+      else
+        write (unit, row_format, iostat=status, iomsg=message) times(i), x(i)
+      end if
+    end do
+    if (status == 0) close (unit, iostat=status, iomsg=message)
+    if (status /= 0) call fail(error, exit_io, "'"//path//"': "//trim(message))
+  end subroutine write_record
+
+  !> What the sensor and the start were, and the names of the columns.
+  function heading_of(the_case, moving, start) result(lines)
+    type(case_t), intent(in) :: the_case
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: start(3)
+    character(len=80), allocatable :: lines(:)
+    lines = [character(len=80) :: '# units: s, m', &
+      '# sampling_rate_hz: '//to_text(the_case%record%rate), &
+      '# sensor_noise_sigma_m: '//to_text(the_case%record%noise), &
+      '# sensor_resolution_m: '//to_text(the_case%record%resolution), &
+      '# sensor_delay_s: '//to_text(the_case%record%delay), &
+      '# x0_m: '//to_text(start(1)), &
+      '# v0_m_s: '//to_text(start(2)), &
+      '# phase: '//to_text(start(3))]
+    if (moving%machine%drive%ratio > 0) then
+      lines = [character(len=80) :: lines, '# drive_ratio: '//to_text(moving%machine%drive%ratio)]
+    end if
+    lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', allocated(moving%pair))]
+  end function heading_of
+
+  !> Adds the noise of the sensor and rounds to its resolution; `first` keeps signals apart.
+  pure subroutine measure(record, first, signal)
+    type(record_t), intent(in) :: record
+    integer(int64), intent(in) :: first
+    real(wp), intent(inout) :: signal(:)
+    real(real64) :: pair(2)
+    real(wp) :: sine, cosine
+    integer :: i
+    do i = 1, size(signal)
+      if (record%noise > 0) then
+        ! Box and Muller.
+        call uniform(int(record%seed, int64), first + i, pair)
+        call sine_cosine(two_pi*pair(2), sine, cosine)
+        signal(i) = signal(i) + record%noise*sqrt(-2*logarithm(1 - pair(1)))*cosine
+      end if
+      if (record%resolution > 0) signal(i) = record%resolution*anint(signal(i)/record%resolution)
+    end do
+  end subroutine measure
+
+end module record_writer

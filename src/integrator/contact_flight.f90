@@ -1,0 +1,247 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One slip against a soft barrier, in the penetration p and its rate, so that rounding does not grow with the
+!> stiffness: until the velocity falls to zero, the body leaves the barrier, or the time is over. Where the force
+!> formula would pull and may not, the force is nil; the surface counts as recovered as soon as it would push again.
+module contact_flight
+  use contact_law, only: contact_force, contact_margin, contact_t
+  use drive_law, only: foot_motion
+  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
+  use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
+  use friction_law, only: sliding_friction
+  use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
+    take_step
+  use kinds, only: wp
+  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, sample_due, &
+    sample_time, state_t, tally_t
+  use oscillator, only: oscillator_t
+  use polynomial, only: maximum_until, value_at
+  use restoring_law, only: restoring_force
+  implicit none
+  private
+
+  public :: contact_side, fly_contact
+
+  !> Guards: velocity zero, end of contact, change between pushing and not.
+  integer, parameter :: turning = 1, leaving = 2, cut = 3
+  !> Halvings of the golden section that finds a peak of the force.
+  integer, parameter :: most_sections = 40
+  real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
+
+  !> A body pressed on the barrier on `side` +1 (upper) or -1. Unknowns: p [m], p' [m/s], work done on the barrier [J].
+  type, extends(system_t) :: pressed_t
+    type(oscillator_t) :: machine
+    !> Time at which the march starts [s after the section], position of the surface [m].
+    real(wp) :: start = 0, surface = 0
+    integer :: side = 1, direction = 1
+    logical :: pushing = .true.
+  contains
+    procedure :: slope => pressed_slope
+  end type pressed_t
+
+contains
+
+  !> The soft barrier that a body at `x` [m] moving in `direction` +1 or -1 is in contact with: +1 upper, -1 lower, 0
+  !> none.
+  pure integer function contact_side(contact, x, direction) result(side)
+    type(contact_t), intent(in) :: contact
+    real(wp), intent(in) :: x
+    integer, intent(in) :: direction
+    side = 0
+    if (x < contact%soft_lower .or. (direction < 0 .and. x <= contact%soft_lower)) side = -1
+    if (x > contact%soft_upper .or. (direction > 0 .and. x >= contact%soft_upper)) side = 1
+  end function contact_side
+
+  !> Flies from `state` (mode slip_plus or slip_minus) up to `time_end` [s after the section], pressed on the barrier
+  !> on `side`. Ends as `fly_exact` does; `flight_barrier` is the end of the contact, with x on the surface.
+  pure subroutine fly_contact(machine, options, side, state, time_end, tally, outcome, log)
+    type(oscillator_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    integer, intent(in) :: side
+    type(state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: outcome
+    type(log_t), intent(inout), optional :: log
+    type(pressed_t) :: pressed
+    type(march_t) :: march
+    type(guard_t) :: guards(cut)
+    real(wp) :: y(3), scale(3), duration, time
+    integer :: fallen
+    pressed%machine = machine
+    pressed%side = side
+    pressed%start = state%time
+    pressed%surface = merge(machine%contact%soft_upper, machine%contact%soft_lower, side > 0)
+    pressed%direction = merge(1, -1, state%mode == mode_slip_plus)
+    y = [side*(state%x - pressed%surface), side*state%v, 0.0_wp]
+    pressed%pushing = machine%contact%tension .or. margin_at(machine%contact, y) >= 0
+    call sizes_of(pressed, y, scale, duration)
+    guards = guards_of(pressed)
+    call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
+    do
+      call take_step(march, pressed, guards, time_end - pressed%start, fallen)
+      call look_along(march, pressed, tally, log)
+      if (fallen == cut) then
+        pressed%pushing = .not. pressed%pushing
+        guards = guards_of(pressed)
+        y = march%y(:3)
+        time = march%time
+        call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, time, y)
+      else if (fallen /= march_goes_on) then
+        exit
+      end if
+    end do
+    if (present(log)) then
+      log%contact_work = log%contact_work + march%y(3)
+      log%book%contact = log%book%contact + march%y(3)
+    end if
+    state%time = merge(time_end, min(pressed%start + march%time, time_end), fallen == march_time_over)
+    state%x = pressed%surface + side*march%y(1)
+    state%v = side*march%y(2)
+    select case (fallen)
+    case (march_failed)
+      outcome = flight_failed
+    case (march_time_over)
+      outcome = flight_time_over
+    case (turning)
+      outcome = flight_speed_reached
+      state%v = 0
+    case default
+      outcome = flight_barrier
+      state%x = pressed%surface
+    end select
+    if (pressed%direction*state%v < 0) state%v = 0
+  end subroutine fly_contact
+
+  !> p', p'' and the power put into the barrier.
+  pure function pressed_slope(self, time, y) result(slope)
+    class(pressed_t), intent(in) :: self
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: slope(size(y)), foot, force, push
+    associate (machine => self%machine)
+      call foot_motion(machine%drive, machine%drive_frequency*(self%start + time), foot)
+      force = restoring_force(machine%restoring, machine%restoring%free_length + foot - (self%surface + self%side*y(1))) &
+              + sliding_friction(machine%friction, self%side*y(2), real(self%direction, wp))
+      push = 0
+      if (self%pushing) push = contact_force(machine%contact, y(1), y(2))
+      slope = [y(2), (self%side*force - push)/machine%mass, push*y(2)]
+    end associate
+  end function pressed_slope
+
+  pure real(wp) function margin_at(contact, y)
+    type(contact_t), intent(in) :: contact
+    real(wp), intent(in) :: y(:)
+    margin_at = sum(contact_margin(contact)*[1.0_wp, y(1), y(2)])
+  end function margin_at
+
+  pure function guards_of(pressed) result(guards)
+    type(pressed_t), intent(in) :: pressed
+    type(guard_t) :: guards(cut)
+    real(wp) :: margin(3)
+    integer :: inward
+    inward = pressed%side*pressed%direction
+    guards(turning)%coefficients(2) = inward
+    guards(leaving)%constant = 1
+    if (inward < 0) then
+      guards(leaving)%constant = 0
+      guards(leaving)%coefficients(1) = 1
+    end if
+    guards(cut)%constant = 1
+    if (.not. pressed%machine%contact%tension) then
+      margin = merge(1, -1, pressed%pushing)*contact_margin(pressed%machine%contact)
+      guards(cut)%constant = margin(1)
+      guards(cut)%coefficients(1:2) = margin(2:3)
+    end if
+  end function guards_of
+
+  !> Sizes of the unknowns in this contact and its duration, from the speed, the forces that press, and the penetration
+  !> itself.
+  pure subroutine sizes_of(pressed, y, scale, duration)
+    type(pressed_t), intent(in) :: pressed
+    real(wp), intent(in) :: y(3)
+    real(wp), intent(out) :: scale(3), duration
+    real(wp) :: unpressed(3), slope(3), pressing, depth, frequency
+    unpressed = [0.0_wp, y(2:)]
+    slope = pressed_slope(pressed, 0.0_wp, unpressed)
+    associate (machine => pressed%machine, law => pressed%machine%contact)
+      pressing = abs(machine%mass*slope(2)) + machine%force_scale + machine%mass*machine%foot_acceleration_bound
+      depth = max(abs(y(1)), power((law%exponent + 1)*machine%mass*y(2)**2/(2*law%stiffness), 1/(law%exponent + 1)))
+      if (depth <= 0) depth = power(pressing/law%stiffness, 1/law%exponent)
+      depth = max(depth, tiny(depth)**0.25_wp)
+      frequency = sqrt(law%stiffness*power(depth, law%exponent - 1)/machine%mass)
+      scale(1) = depth
+      scale(2) = max(abs(y(2)), depth*frequency)
+      scale(3) = machine%mass*scale(2)**2
+      duration = 3/frequency
+    end associate
+  end subroutine sizes_of
+
+  !> Samples and extremes of the step behind.
+  pure subroutine look_along(march, pressed, tally, log)
+    type(march_t), intent(in) :: march
+    type(pressed_t), intent(in) :: pressed
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: sample
+    real(wp) :: t
+    integer :: k
+    if (.not. march%fraction > 0) return
+    if (tally%wants_v_max .and. pressed%direction > 0) then
+      tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
+    end if
+    if (.not. present(log)) return
+    do k = 1, gauss_points
+      t = march%fraction*gauss_place(k)
+      call book_instant(pressed%machine, pressed%start + march%from + t*march%length, &
+                        pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
+                        pressed%side*value_at(march%path(:, 2), t), march%fraction*march%length*gauss_weight(k), log%book)
+    end do
+    log%peak_penetration = max(log%peak_penetration, march%y(1))
+    if (pressed%pushing) call raise_peak_force(march, pressed%machine%contact, log%peak_force)
+    if (log%sample_interval <= 0) return
+    sample%mode = merge(mode_slip_plus, mode_slip_minus, pressed%direction > 0)
+    do
+      sample%time = sample_time(log)
+      t = max(0.0_wp, (sample%time - pressed%start - march%from)/march%length)
+      if (t >= march%fraction .or. .not. sample_due(log, pressed%start + march%time)) exit
+      sample%x = pressed%surface + pressed%side*value_at(march%path(:, 1), t)
+      sample%v = pressed%side*value_at(march%path(:, 2), t)
+      call record_sample(log, sample)
+    end do
+  end subroutine look_along
+
+  !> Raises `peak` to the largest force within the step behind: a golden section around the largest of a few.
+  pure subroutine raise_peak_force(march, contact, peak)
+    type(march_t), intent(in) :: march
+    type(contact_t), intent(in) :: contact
+    real(wp), intent(inout) :: peak
+    integer, parameter :: parts = 8
+    real(wp) :: force(0:parts), low, high, a, b
+    integer :: i
+    force = [(force_at(i*march%fraction/parts), i=0, parts)]
+    i = maxloc(force, dim=1) - 1
+    low = max(i - 1, 0)*march%fraction/parts
+    high = min(i + 1, parts)*march%fraction/parts
+    if (2*maxval(force) < peak) return
+    do i = 1, most_sections
+      a = high - golden*(high - low)
+      b = low + golden*(high - low)
+      if (force_at(a) > force_at(b)) then
+        high = b
+      else
+        low = a
+      end if
+    end do
+    peak = max(peak, maxval(force), force_at(0.5_wp*(low + high)))
+
+  contains
+
+    pure real(wp) function force_at(t)
+      real(wp), intent(in) :: t
+      force_at = contact_force(contact, value_at(march%path(:, 1), t), value_at(march%path(:, 2), t))
+    end function force_at
+
+  end subroutine raise_peak_force
+
+end module contact_flight

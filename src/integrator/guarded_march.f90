@@ -1,0 +1,237 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A few ordinary differential equations, integrated step by step by the embedded Runge-Kutta pair of
+!> `dormand_prince_table` until a guard, a linear function of the state, falls to zero. Guards are isolated on the
+!> continuous extension of a step, which the caller may look at, then the step is taken again to the fall itself.
+module guarded_march
+  use dormand_prince_table, only: error_3, error_5, extension, node, stage
+  use kinds, only: wp
+  use polynomial, only: degree, first_fall
+  implicit none
+  private
+
+  public :: begin_march, take_step
+
+  integer, parameter, public :: most_equations = 8
+  !> How a step ended, where no guard fell; guards count from 1.
+  integer, parameter, public :: march_goes_on = 0, march_time_over = -1, march_failed = -2
+
+  integer, parameter :: most_polish = 6
+
+  !> What is integrated.
+  type, abstract, public :: system_t
+  contains
+    procedure(slope_function), deferred :: slope
+  end type system_t
+
+  abstract interface
+    !> Time derivative of `y` [SI].
+    pure function slope_function(self, time, y) result(slope)
+      import :: system_t, wp
+      class(system_t), intent(in) :: self
+      real(wp), intent(in) :: time, y(:)
+      real(wp) :: slope(size(y))
+    end function slope_function
+  end interface
+
+  !> constant + sum of coefficients times the state. Positive, or leaving zero upwards, at the start.
+  type, public :: guard_t
+    real(wp) :: constant = 0
+    real(wp) :: coefficients(most_equations) = 0
+  end type guard_t
+
+  type, public :: march_t
+    !> Number of equations.
+    integer :: n = 0
+    !> Now, and the state now.
+    real(wp) :: time = 0, y(most_equations) = 0
+    !> The step behind: its start, length, the fraction of the length that was gone, and the state over the fraction of
+    !> the length, by rising powers.
+    real(wp) :: from = 0, length = 0, fraction = 0, path(0:degree, most_equations) = 0
+    real(wp) :: tolerance = 0
+    !> Size of each unknown below which errors are absolute.
+    real(wp) :: scale(most_equations) = 1
+    !> Length of the next step, and slopes of the stages; the first is that now.
+    real(wp) :: next_length = 0, slopes(most_equations, 16) = 0
+  end type march_t
+
+contains
+
+  !> Starts at `time` [s] with the state `y`; errors are relative to |y| + `scale`. `longest` [s] bounds the trial of
+  !> the first step.
+  pure subroutine begin_march(march, system, tolerance, scale, longest, time, y)
+    type(march_t), intent(out) :: march
+    class(system_t), intent(in) :: system
+    real(wp), intent(in) :: tolerance, scale(:), longest, time, y(:)
+    real(wp) :: weight(size(y)), f(size(y)), d0, d1, d2, h
+    march%n = size(y)
+    march%time = time
+    march%y(:march%n) = y
+    march%tolerance = tolerance
+    march%scale(:march%n) = scale
+    f = system%slope(time, y)
+    march%slopes(:march%n, 1) = f
+    ! Starting step: Hairer, Norsett, Wanner, II.4.
+    weight = tolerance*(abs(y) + scale)
+    d0 = norm2(y/weight)
+    d1 = norm2(f/weight)
+    h = 1e-3_wp*longest
+    if (d0 > 0 .and. d1 > 0) h = min(h, 0.01_wp*d0/d1)
+    d2 = norm2((system%slope(time + h, y + h*f) - f)/weight)/h
+    march%next_length = min(100*h, (0.01_wp/max(d1, d2, tiny(d1)))**0.125_wp)
+  end subroutine begin_march
+
+  !> One step, to `time_end` [s] at most. `fallen` is the guard that fell first, and the state then is that at its fall;
+  !> or one of `march_goes_on`, `march_time_over`, `march_failed`.
+  pure subroutine take_step(march, system, guards, time_end, fallen)
+    type(march_t), intent(inout) :: march
+    class(system_t), intent(in) :: system
+    type(guard_t), intent(in) :: guards(:)
+    real(wp), intent(in) :: time_end
+    integer, intent(out) :: fallen
+    real(wp) :: h, remaining, error, next(march%n)
+    logical :: last
+    fallen = march_time_over
+    march%from = march%time
+    march%fraction = 0
+    remaining = time_end - march%time
+    if (remaining <= 0) return
+    do
+      last = march%next_length >= remaining
+      h = min(march%next_length, remaining)
+      fallen = march_failed
+      if (.not. h > 2*spacing(march%time + tiny(h))) return
+      call try_step(march, system, h, next, error)
+      if (error <= 1) exit
+      march%next_length = h*max(0.2_wp, 0.9_wp/sqrt(sqrt(sqrt(error))))
+      if (error /= error) march%next_length = 0.2_wp*h
+    end do
+    call extend(march, system, h, next)
+    march%length = h
+    call find_fall(march, guards, fallen)
+    if (fallen == march_goes_on) then
+      march%time = merge(time_end, march%from + h, last)
+      march%slopes(:, 1) = march%slopes(:, 13)
+      march%next_length = h*min(5.0_wp, 0.9_wp/sqrt(sqrt(sqrt(max(error, 1e-10_wp)))))
+    else
+      call land(march, system, guards(fallen), next)
+      march%time = min(march%from + march%fraction*h, time_end)
+      march%slopes(:march%n, 1) = system%slope(march%time, next)
+    end if
+    march%y(:march%n) = next
+    if (fallen == march_goes_on .and. last) fallen = march_time_over
+  end subroutine take_step
+
+  !> One step of order 8 and its error relative to the tolerance; slope 13 is that at the end.
+  pure subroutine try_step(march, system, h, next, error)
+    type(march_t), intent(inout) :: march
+    class(system_t), intent(in) :: system
+    real(wp), intent(in) :: h
+    real(wp), intent(out) :: next(march%n), error
+    real(wp) :: weight(march%n), e5(march%n), e3(march%n), size_5, size_3
+    integer :: i, n
+    n = march%n
+    associate (y => march%y(:n), slopes => march%slopes(:n, :))
+      do i = 2, 12
+        march%slopes(:n, i) = system%slope(march%time + node(i)*h, y + h*combine(march, i))
+      end do
+      next = y + h*combine(march, 13)
+      march%slopes(:n, 13) = system%slope(march%time + h, next)
+      weight = march%tolerance*(max(abs(y), abs(next)) + march%scale(:n))
+      e5 = matmul(slopes(:, 1:12), error_5)/weight
+      e3 = (combine(march, 13) - error_3(1)*slopes(:, 1) - error_3(2)*slopes(:, 9) - error_3(3)*slopes(:, 12))/weight
+    end associate
+    size_5 = sum(e5**2)
+    size_3 = sum(e3**2)
+    error = 0
+    if (size_5 > 0) error = abs(h)*size_5/sqrt(n*(size_5 + 0.01_wp*size_3))
+    if (size_5 /= size_5) error = size_5
+  end subroutine try_step
+
+  !> Weighted sum of the slopes before stage `i`.
+  pure function combine(march, i) result(total)
+    type(march_t), intent(in) :: march
+    integer, intent(in) :: i
+    real(wp) :: total(march%n)
+    integer :: k, offset
+    offset = ((i - 1)*(i - 2))/2
+    total = 0
+    do k = 1, i - 1
+      total = total + stage(offset + k)*march%slopes(:march%n, k)
+    end do
+  end function combine
+
+  !> Continuous extension of a step.
+  pure subroutine extend(march, system, h, next)
+    type(march_t), intent(inout) :: march
+    class(system_t), intent(in) :: system
+    real(wp), intent(in) :: h, next(march%n)
+    real(wp) :: nested(march%n, 7), p(0:degree)
+    integer :: i, k, n
+    n = march%n
+    do i = 14, 16
+      march%slopes(:n, i) = system%slope(march%time + node(i)*h, march%y(:n) + h*combine(march, i))
+    end do
+    nested(:, 1) = next - march%y(:n)
+    nested(:, 2) = h*march%slopes(:n, 1) - nested(:, 1)
+    nested(:, 3) = 2*nested(:, 1) - h*(march%slopes(:n, 13) + march%slopes(:n, 1))
+    nested(:, 4:7) = h*matmul(march%slopes(:n, :), extension)
+    do k = 1, n
+      p = 0
+      do i = 7, 1, -1
+        p(0) = p(0) + nested(k, i)
+        if (modulo(i, 2) == 1) then
+          p = eoshift(p, -1)
+        else
+          p = p - eoshift(p, -1)
+        end if
+      end do
+      p(0) = p(0) + march%y(k)
+      march%path(:, k) = p
+    end do
+  end subroutine extend
+
+  !> The first guard that falls within the step; of several at one instant the first in the list.
+  pure subroutine find_fall(march, guards, fallen)
+    type(march_t), intent(inout) :: march
+    type(guard_t), intent(in) :: guards(:)
+    integer, intent(out) :: fallen
+    real(wp) :: p(0:degree), t, first
+    integer :: i
+    fallen = march_goes_on
+    first = 1
+    do i = 1, size(guards)
+      p = matmul(march%path(:, :march%n), guards(i)%coefficients(:march%n))
+      p(0) = p(0) + guards(i)%constant
+      t = first_fall(p)
+      if (t < first .or. (fallen == march_goes_on .and. t <= first)) then
+        first = t
+        fallen = i
+      end if
+    end do
+    march%fraction = first
+  end subroutine find_fall
+
+  !> Takes the step again up to the fall of a guard, corrected by Newton.
+  pure subroutine land(march, system, guard, next)
+    type(march_t), intent(inout) :: march
+    class(system_t), intent(in) :: system
+    type(guard_t), intent(in) :: guard
+    real(wp), intent(out) :: next(march%n)
+    real(wp) :: error, miss, rate, correction
+    integer :: i, n
+    n = march%n
+    do i = 1, most_polish
+      call try_step(march, system, march%fraction*march%length, next, error)
+      miss = -guard%constant - sum(guard%coefficients(:n)*next)
+      rate = sum(guard%coefficients(:n)*march%slopes(:n, 13))
+      correction = 0
+      if (abs(miss) < 0.01_wp*abs(rate)*march%length) correction = miss/(rate*march%length)
+      if (march%fraction + correction <= 0 .or. march%fraction + correction > 1) exit
+      if (abs(correction) <= 2*epsilon(1.0_wp)) exit
+      march%fraction = march%fraction + correction
+    end do
+  end subroutine land
+
+end module guarded_march

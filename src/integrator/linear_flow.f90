@@ -1,0 +1,196 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Linear motions y' = A y in closed form, exp(A t) y, forcing and constants being unknowns of their own. Over a stretch
+!> no longer than 1/rate, the rate being that of the fastest of them, the exponential series is rounded at `order`: the
+!> motion then is a polynomial, whose derivatives certify the zeros of any linear function of y.
+module linear_flow
+  use certified_step, only: departure_step, positive_step, single_root_limit, taylor_root
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: prepare_linear, expand, state_at, series_of, series_value, first_zero, product_integral
+
+  integer, parameter, public :: most_unknowns = 10
+  !> 1/21! is below the rounding of doubles by far; quadruple precision takes more terms.
+  integer, parameter, public :: order = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)
+
+  integer, parameter :: most_polish = 60
+  integer, parameter :: squarings = 4
+
+  type, public :: linear_t
+    real(wp) :: matrix(most_unknowns, most_unknowns) = 0
+    !> Bound on how fast the unknowns change [1/s], 0 for motions that are polynomials in time.
+    real(wp) :: rate = 0
+  end type linear_t
+
+  !> A stretch of the motion: its length [s] and the unknowns by rising powers of the fraction of the length.
+  type, public :: stretch_t
+    real(wp) :: length = 0
+    real(wp) :: path(0:order, most_unknowns) = 0
+  end type stretch_t
+
+contains
+
+  !> The motion with the matrix `matrix` [SI].
+  pure function prepare_linear(matrix) result(linear)
+    real(wp), intent(in) :: matrix(most_unknowns, most_unknowns)
+    type(linear_t) :: linear
+    real(wp) :: power(most_unknowns, most_unknowns), size_of_matrix, size_of_power
+    integer :: i
+    linear%matrix = matrix
+    size_of_matrix = maxval(sum(abs(matrix), dim=1))
+    if (size_of_matrix <= 0) return
+    ! Gelfand: |A^k|^(1/k) falls to the spectral radius as k grows, whatever the units of the unknowns.
+    power = matrix/size_of_matrix
+    do i = 1, squarings
+      power = matmul(power, power)
+    end do
+    size_of_power = maxval(sum(abs(power), dim=1))
+    do i = 1, squarings
+      size_of_power = sqrt(size_of_power)
+    end do
+    linear%rate = size_of_matrix*size_of_power
+  end function prepare_linear
+
+  !> The stretch from the state `y`, `longest` [s] at most.
+  pure subroutine expand(linear, y, longest, stretch)
+    type(linear_t), intent(in) :: linear
+    real(wp), intent(in) :: y(most_unknowns), longest
+    type(stretch_t), intent(out) :: stretch
+    integer :: k, j
+    stretch%length = longest
+    if (linear%rate*longest > 1) stretch%length = 1/linear%rate
+    stretch%path(0, :) = y
+    do k = 1, order
+      do j = 1, most_unknowns
+        if (abs(stretch%path(k - 1, j)) > 0) stretch%path(k, :) = &
+          stretch%path(k, :) + linear%matrix(:, j)*(stretch%path(k - 1, j)*(stretch%length/k))
+      end do
+    end do
+  end subroutine expand
+
+  !> The unknowns at a fraction of a stretch.
+  pure function state_at(stretch, fraction) result(y)
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: fraction
+    real(wp) :: y(most_unknowns)
+    integer :: k
+    y = stretch%path(order, :)
+    do k = order - 1, 0, -1
+      y = y*fraction + stretch%path(k, :)
+    end do
+  end function state_at
+
+  !> A linear function of the unknowns along a stretch, by rising powers of the fraction.
+  pure function series_of(stretch, row) result(p)
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: row(most_unknowns)
+    real(wp) :: p(0:order)
+    integer :: j
+    p = 0
+    do j = 1, most_unknowns
+      if (abs(row(j)) > 0) p = p + row(j)*stretch%path(:, j)
+    end do
+  end function series_of
+
+  !> Value of a series at a fraction, and its first two derivatives.
+  pure subroutine series_value(p, t, value, rate, curvature)
+    real(wp), intent(in) :: p(0:order), t
+    real(wp), intent(out) :: value
+    real(wp), intent(out), optional :: rate, curvature
+    real(wp) :: first, half_second
+    integer :: k
+    value = p(order)
+    first = 0
+    half_second = 0
+    do k = order - 1, 0, -1
+      half_second = half_second*t + first
+      first = first*t + value
+      value = value*t + p(k)
+    end do
+    if (present(rate)) rate = first
+    if (present(curvature)) curvature = 2*half_second
+  end subroutine series_value
+
+  !> First fraction in (0, 1] at which a series that is positive at 0, or leaves zero upwards there, has fallen to zero;
+  !> 2 if it stays positive, 0 if it falls at once. Nothing can hide: the steps are certified by bounds on the second
+  !> and third derivative over the stretch.
+  pure real(wp) function first_zero(p) result(t)
+    real(wp), intent(in) :: p(0:order)
+    real(wp) :: value, rate, curvature, second_bound, third_bound, step, limit
+    integer :: k
+    real(wp), parameter :: smallest = 4*epsilon(1.0_wp)
+    second_bound = 0
+    third_bound = 0
+    do k = 2, order
+      second_bound = second_bound + k*(k - 1)*abs(p(k))
+      third_bound = third_bound + k*(k - 1)*(k - 2)*abs(p(k))
+    end do
+    t = 0
+    call series_value(p, t, value, rate, curvature)
+    if (value > 0) then
+      step = positive_step(value, rate, second_bound)
+    else
+      step = departure_step(rate, curvature, second_bound, third_bound)
+      if (value < 0 .or. .not. (rate > 0 .or. curvature > 0 .or. second_bound <= 0)) step = 0
+    end if
+    do
+      if (step <= smallest) return
+      if (value > 0) then
+        limit = single_root_limit(value, rate, second_bound)
+        if (t + limit <= 1) then
+          call polish(p, t, t + limit)
+          return
+        end if
+      end if
+      if (t >= 1) exit
+      t = min(t + step, 1.0_wp)
+      call series_value(p, t, value, rate, curvature)
+      step = 0
+      if (value > 0) step = positive_step(value, rate, second_bound)
+    end do
+    t = 2
+  end function first_zero
+
+  !> The one root between `t`, where the series is positive, and `last`.
+  pure subroutine polish(p, t, last)
+    real(wp), intent(in) :: p(0:order), last
+    real(wp), intent(inout) :: t
+    real(wp) :: low, high, next, step, value, rate, curvature
+    integer :: i
+    low = t
+    high = last
+    do i = 1, most_polish
+      call series_value(p, t, value, rate, curvature)
+      if (value > 0) then
+        low = t
+      else
+        high = t
+      end if
+      next = t + taylor_root(value, rate, curvature)
+      if (.not. (next >= low .and. next <= high)) next = 0.5_wp*(low + high)
+      step = next - t
+      t = next
+      if (abs(step) <= epsilon(1.0_wp)*t .or. high - low <= 0) exit
+    end do
+  end subroutine polish
+
+  !> Integral of the product of two series from 0 to a fraction, in units of the stretch.
+  pure real(wp) function product_integral(p, q, fraction) result(total)
+    real(wp), intent(in) :: p(0:order), q(0:order), fraction
+    real(wp) :: coefficient
+    integer :: i, k
+    total = 0
+    do k = 2*order, 0, -1
+      coefficient = 0
+      do i = max(0, k - order), min(k, order)
+        coefficient = coefficient + p(i)*q(k - i)
+      end do
+      total = total*fraction + coefficient/(k + 1)
+    end do
+    total = total*fraction
+  end function product_integral
+
+end module linear_flow

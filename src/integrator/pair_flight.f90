@@ -1,0 +1,280 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One flight of two bodies in one mode, in closed form, up to the first guard that falls: relative velocity zero, a
+!> stop, the break-away of the interface, or the release from the stop.
+module pair_flight
+  use kinds, only: wp
+  use linear_flow, only: expand, first_zero, most_unknowns, order, product_integral, series_of, series_value, state_at, &
+    stretch_t
+  use motion_state, only: book_t, log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
+    sample_due, sample_time, state_t, tally_t
+  use pair, only: driven_by_motion
+  use pair_modes, only: at_one, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of
+  implicit none
+  private
+
+  public :: fly_pair, body_state, driver_of, energy_of
+
+  !> Guards.
+  integer, parameter, public :: guard_none = 0, guard_upper = 1, guard_lower = 2, guard_slip = 3, guard_plus = 4, &
+    guard_minus = 5, guard_press = 6, guard_leave = 7
+  integer, parameter :: guards = 7
+  !> Twice what `mode_together` takes for a tie, which it decides by the rate.
+  real(wp), parameter :: tie_allowance = 64*epsilon(1.0_wp)
+
+  !> A linear function of the unknowns that is positive as long as the mode lasts.
+  type :: watch_t
+    logical :: active = .false.
+    real(wp) :: row(most_unknowns) = 0
+    !> It has just been zero: it is so at the start, whatever rounding says.
+    logical :: starts_at_zero = .false.
+    !> A force falls when it is below zero by more than rounding.
+    real(wp) :: allowance = 0
+  end type watch_t
+
+contains
+
+  !> Flies from `state` up to `time_end` [s after the section] in its mode. `fallen` is the guard that fell, or
+  !> `guard_none` at the end of the time. `hold`: nothing ends the mode.
+  pure subroutine fly_pair(moving, state, time_end, hold, fallen, tally, log)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    logical, intent(in) :: hold
+    integer, intent(out) :: fallen
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(watch_t) :: watches(guards)
+    type(stretch_t) :: stretch
+    real(wp) :: p(0:order), t, first
+    integer :: i
+    logical :: begins
+    call refresh(moving, state)
+    watches = watches_of(moving, state, hold)
+    begins = .true.
+    do
+      call expand(moving%modes(state%mode), state%y, time_end - state%time, stretch)
+      fallen = guard_none
+      first = 1
+      do i = 1, guards
+        if (.not. watches(i)%active) cycle
+        p = series_of(stretch, watches(i)%row)
+        if (begins .and. watches(i)%starts_at_zero) then
+          p(0) = 0
+          if (p(1) >= -moving%negligible_speed*stretch%length) p(1) = max(p(1), 0.0_wp)
+        end if
+        p(0) = p(0) + watches(i)%allowance
+        t = first_zero(p)
+        if (t < first .or. (t <= first .and. fallen == guard_none)) then
+          first = t
+          fallen = i
+        end if
+      end do
+      call look_along(moving, state, stretch, first, tally, log)
+      state%y = state_at(stretch, first)
+      if (fallen == guard_none .and. stretch%length >= time_end - state%time) then
+        state%time = time_end
+        exit
+      end if
+      state%time = min(state%time + first*stretch%length, time_end)
+      if (fallen /= guard_none) exit
+      begins = .false.
+    end do
+    call note_position(tally, body_state(state))
+  end subroutine fly_pair
+
+  !> What ends the mode of a state.
+  pure function watches_of(moving, state, hold) result(watches)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    logical, intent(in) :: hold
+    type(watch_t) :: watches(guards)
+    integer :: s
+    associate (machine => moving%machine)
+      s = sense_of(state%mode)
+      select case (state%mode)
+      case (mode_slip_plus, mode_slip_minus)
+        watches(guard_slip)%active = .true.
+        watches(guard_slip)%row(at_v1) = s
+        watches(guard_slip)%row(at_v2) = -s
+        call watch_stops(moving, state%touch, watches)
+      case (mode_stick)
+        if (.not. machine%carried) call watch_stops(moving, state%touch, watches)
+        call watch_interface(moving, watches(guard_plus), 1)
+        call watch_interface(moving, watches(guard_minus), -1)
+        if (machine%carried) then
+          watches(guard_plus)%active = state%touch /= -1 .and. .not. moving%clamped
+          watches(guard_minus)%active = state%touch /= 1 .and. .not. moving%clamped
+        end if
+      case (mode_held)
+        watches(guard_press)%active = .true.
+        watches(guard_press)%row = -state%touch*moving%push
+        watches(guard_press)%row(at_one) = watches(guard_press)%row(at_one) + moving%threshold
+        watches(guard_press)%allowance = tie_allowance*moving%push_scale
+        watches(guard_leave) = watches(guard_press)
+        watches(guard_leave)%row = state%touch*moving%push
+        if (moving%clamped) watches(guard_leave)%row(at_one) = watches(guard_leave)%row(at_one) + moving%threshold
+      case default
+        watches(guard_slip)%active = .true.
+        watches(guard_slip)%row(at_v1) = s
+      end select
+      if (hold) watches%active = .false.
+    end associate
+  end function watches_of
+
+  !> The stops, where m2 is not on them. From the one it has just left the distance is zero, whatever rounding says.
+  pure subroutine watch_stops(moving, touch, watches)
+    type(pair_motion_t), intent(in) :: moving
+    integer, intent(in) :: touch
+    type(watch_t), intent(inout) :: watches(guards)
+    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
+    associate (machine => moving%machine, upper => watches(guard_upper), lower => watches(guard_lower))
+      upper%active = machine%upper < unreachable
+      lower%active = machine%lower > -unreachable
+      if (machine%contact%soft) then
+        upper%active = .false.
+        lower%active = .false.
+      end if
+      upper%row(at_x2) = -1
+      lower%row(at_x2) = 1
+      if (machine%carried) then
+        upper%row(at_x1) = 1
+        lower%row(at_x1) = -1
+      end if
+      if (upper%active) upper%row(at_one) = machine%upper
+      if (lower%active) lower%row(at_one) = -machine%lower
+      upper%starts_at_zero = touch > 0
+      lower%starts_at_zero = touch < 0
+    end associate
+  end subroutine watch_stops
+
+  !> What the interface has left in `direction`.
+  pure subroutine watch_interface(moving, watch, direction)
+    type(pair_motion_t), intent(in) :: moving
+    type(watch_t), intent(inout) :: watch
+    integer, intent(in) :: direction
+    watch%active = .true.
+    watch%row = -direction*moving%interface
+    watch%row(at_one) = watch%row(at_one) + moving%machine%friction
+    watch%allowance = tie_allowance*moving%force_scale
+  end subroutine watch_interface
+
+  !> Extremes, samples and energy of a stretch up to a fraction of it.
+  pure subroutine look_along(moving, state, stretch, last, tally, log)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: last
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(pair_state_t) :: sample
+    type(book_t) :: book
+    real(wp) :: t
+    call note_extremes(stretch, last, tally)
+    if (.not. present(log)) return
+    book = log%book
+    call book_stretch(moving, state, stretch, last, log%book)
+    if (log%sample_interval <= 0) return
+    do
+      sample = state
+      sample%time = sample_time(log)
+      if (.not. sample_due(log, state%time + last*stretch%length)) exit
+      t = max(0.0_wp, (sample%time - state%time)/stretch%length)
+      sample%y = state_at(stretch, t)
+      call record_at(moving, state, stretch, t, book, sample, log)
+    end do
+  end subroutine look_along
+
+  !> Writes down a sample at a fraction of a stretch, `book` being that at its start.
+  pure subroutine record_at(moving, state, stretch, t, book, sample, log)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state, sample
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: t
+    type(book_t), intent(in) :: book
+    type(log_t), intent(inout) :: log
+    type(book_t) :: now
+    now = book
+    call book_stretch(moving, state, stretch, t, now)
+    now%at_end = energy_of(moving, sample)
+    call record_sample(log, body_state(sample), driver_of(sample), now)
+  end subroutine record_at
+
+  !> Turning points and largest velocity of m2.
+  pure subroutine note_extremes(stretch, last, tally)
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: last
+    type(tally_t), intent(inout) :: tally
+    real(wp) :: v(0:order), a(0:order), x, t
+    integer :: k
+    v = stretch%path(:, at_v2)
+    t = first_zero(sign(1.0_wp, v(0))*v)
+    if (t <= last) then
+      call series_value(stretch%path(:, at_x2), t, x)
+      tally%x_max = max(tally%x_max, x)
+      tally%x_min = min(tally%x_min, x)
+    end if
+    if (.not. tally%wants_v_max) return
+    a(order) = 0
+    a(:order - 1) = [((k + 1)*v(k + 1), k=0, order - 1)]
+    t = first_zero(sign(1.0_wp, a(0))*a)
+    call series_value(v, min(t, last), x)
+    tally%v_max = max(tally%v_max, v(0), x)
+    call series_value(v, last, x)
+    tally%v_max = max(tally%v_max, x)
+  end subroutine note_extremes
+
+  !> Where the energy of a stretch went.
+  pure subroutine book_stretch(moving, state, stretch, last, book)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: last
+    type(book_t), intent(inout) :: book
+    real(wp) :: change(most_unknowns), end_state(most_unknowns), v1(0:order)
+    integer :: s
+    end_state = state_at(stretch, last)
+    change = end_state - stretch%path(0, :)
+    s = sense_of(state%mode)
+    associate (machine => moving%machine)
+      book%friction = book%friction + s*machine%friction*(change(at_x1) - change(at_x2))
+      if (machine%drive == driven_by_motion) then
+        book%work = book%work + s*machine%friction*change(at_x1)
+        if (s == 0) book%work = book%work &
+          + 0.5_wp*machine%driven_mass*change(at_v2)*(end_state(at_v2) + stretch%path(0, at_v2))
+      else
+        v1 = stretch%path(:, at_v1)
+        if (machine%damping > 0) book%damping = book%damping &
+          + machine%damping*stretch%length*product_integral(v1, v1, last)
+        if (any(abs(moving%drive) > 0)) book%work = book%work &
+          + stretch%length*product_integral(series_of(stretch, moving%drive), v1, last)
+      end if
+    end associate
+  end subroutine book_stretch
+
+  !> The driven body as a single one, for tally and log.
+  pure type(state_t) function body_state(state)
+    type(pair_state_t), intent(in) :: state
+    body_state = state_t(x=state%y(at_x2), v=state%y(at_v2), time=state%time, mode=state%mode)
+  end function body_state
+
+  !> Position and velocity of the driving body.
+  pure function driver_of(state) result(driver)
+    type(pair_state_t), intent(in) :: state
+    real(wp) :: driver(2)
+    driver = state%y([at_x1, at_v1])
+  end function driver_of
+
+  !> Energy of spring and bodies [J]; of a body whose motion is given, none.
+  pure real(wp) function energy_of(moving, state) result(energy)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    associate (machine => moving%machine, y => state%y)
+      energy = 0.5_wp*machine%driven_mass*y(at_v2)**2
+      if (machine%drive == driven_by_motion) return
+      energy = energy + 0.5_wp*machine%mass*y(at_v1)**2 + 0.5_wp*machine%stiffness*(y(at_x1) - machine%free_length)**2
+    end associate
+  end function energy_of
+
+end module pair_flight

@@ -1,0 +1,258 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The modes of two bodies coupled by dry friction, each a linear motion: slip in either direction, stick, the driven
+!> body leaning on its stop while the driving one slides, and both held there. Which mode follows when the bodies move
+!> together is Filippov's rule with the acceleration that they have together.
+module pair_modes
+  use elementary, only: sine_cosine
+  use kinds, only: wp
+  use linear_flow, only: linear_t, most_unknowns, prepare_linear
+  use motion_state, only: mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
+    mode_upper_barrier, options_t
+  use pair, only: driven_by_controller, driven_by_force, driven_by_motion, pair_t
+  implicit none
+  private
+
+  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now
+
+  !> Unknowns: both bodies, cosine and sine of the drive, one, integral of the control error, velocity of the drive
+  !> times time, control held between samples.
+  integer, parameter, public :: at_x1 = 1, at_v1 = 2, at_x2 = 3, at_v2 = 4, at_cosine = 5, at_sine = 6, at_one = 7, &
+    at_integral = 8, at_ramp = 9, at_control = 10
+
+  !> A rebound that the forces end within this share of a period is none.
+  real(wp), parameter :: briefest_bounce = 1e-10_wp
+
+  type, public :: pair_state_t
+    real(wp) :: y(most_unknowns) = 0
+    !> Since the section [s].
+    real(wp) :: time = 0
+    integer :: mode = 0
+    !> The stop that m2 rests on, or has just left: +1 upper, -1 lower, 0 none.
+    integer :: touch = 0
+    !> The blow has fallen; the next sample of the controller [s], both in time since the start.
+    logical :: struck = .false.
+    real(wp) :: clock = 0
+    integer :: samples = 0
+  end type pair_state_t
+
+  !> A pair ready to move.
+  type, public :: pair_motion_t
+    type(pair_t) :: machine
+    type(options_t) :: options
+    type(linear_t) :: modes(mode_held)
+    !> As linear functions of the unknowns: force on m1 without the interface [N], or the acceleration of a given motion
+    !> [m/s^2]; acceleration that the bodies have together; interface force then; reference and its rate; control.
+    real(wp), dimension(most_unknowns) :: push = 0, together = 0, interface = 0, reference = 0, reference_rate = 0, &
+      control = 0
+    !> Force of the drive on m1 [N].
+    real(wp), dimension(most_unknowns) :: drive = 0
+    !> Rates of the two that decide, while the bodies move together or are held.
+    real(wp), dimension(most_unknowns) :: push_rate = 0, interface_rate = 0
+    !> What friction holds of `push` on the stop [as push]: b, or nothing where the motion of m1 is given.
+    real(wp) :: threshold = 0
+    !> Sizes of force and push, for the rounding of ties.
+    real(wp) :: force_scale = 0, push_scale = 0
+    !> Speed at which m2 meets a stop without rebound [m/s]: rounding.
+    real(wp) :: negligible_speed = 0
+    !> The stops leave no room.
+    logical :: clamped = .false.
+  end type pair_motion_t
+
+contains
+
+  !> Prepares a pair.
+  pure subroutine prepare_pair(machine, options, moving)
+    type(pair_t), intent(in) :: machine
+    type(options_t), intent(in) :: options
+    type(pair_motion_t), intent(out) :: moving
+    real(wp) :: bodies(most_unknowns, most_unknowns)
+    integer :: s
+    moving%machine = machine
+    moving%options = options
+    moving%clamped = machine%lower >= machine%upper
+    call set_rows(machine, moving)
+    moving%negligible_speed = briefest_bounce*machine%period*moving%push_scale
+    if (machine%drive /= driven_by_motion) moving%negligible_speed = moving%negligible_speed/(machine%mass + machine%driven_mass)
+    moving%negligible_speed = moving%negligible_speed + briefest_bounce*machine%period*machine%friction/machine%driven_mass
+    do s = -1, 1, 2
+      bodies = 0
+      call drive_body(moving, real(s, wp), bodies)
+      bodies(at_x2, at_v2) = 1
+      bodies(at_v2, at_one) = s*machine%friction/machine%driven_mass
+      moving%modes(mode_of_slip(s)) = prepare_linear(with_clocks(moving, bodies))
+      bodies = 0
+      call drive_body(moving, real(s, wp), bodies)
+      moving%modes(merge(mode_upper_barrier, mode_lower_barrier, s > 0)) = prepare_linear(with_clocks(moving, bodies))
+    end do
+    bodies = 0
+    bodies(at_x1, at_v1) = 1
+    bodies(at_x2, at_v2) = 1
+    bodies(at_v1, :) = moving%together
+    bodies(at_v2, :) = moving%together
+    moving%modes(mode_stick) = prepare_linear(with_clocks(moving, bodies))
+    bodies = 0
+    moving%modes(mode_held) = prepare_linear(with_clocks(moving, bodies))
+    moving%interface_rate = matmul(moving%interface, moving%modes(mode_stick)%matrix)
+    moving%push_rate = matmul(moving%push, moving%modes(mode_held)%matrix)
+  end subroutine prepare_pair
+
+  !> The linear functions that drive and decide.
+  pure subroutine set_rows(machine, moving)
+    type(pair_t), intent(in) :: machine
+    type(pair_motion_t), intent(inout) :: moving
+    real(wp) :: w
+    w = machine%frequency
+    associate (reference => moving%reference, rate => moving%reference_rate, push => moving%push)
+      reference(at_cosine) = machine%amplitude
+      reference(at_sine) = machine%quadrature
+      reference(at_one) = machine%mean
+      reference(at_ramp) = 1
+      rate(at_cosine) = w*machine%quadrature
+      rate(at_sine) = -w*machine%amplitude
+      rate(at_one) = machine%velocity
+      moving%control = machine%proportional*reference + machine%derivative*rate
+      moving%control(at_x1) = -machine%proportional
+      moving%control(at_v1) = -machine%derivative
+      moving%control(at_integral) = machine%integral
+      if (machine%drive == driven_by_motion) then
+        push(at_cosine) = -w**2*machine%amplitude
+        push(at_sine) = -w**2*machine%quadrature
+        moving%together = push
+        moving%push_scale = sum(abs(push))
+        moving%force_scale = machine%driven_mass*moving%push_scale + machine%friction
+      else
+        push(at_x1) = -machine%stiffness
+        push(at_v1) = -machine%damping
+        push(at_one) = machine%stiffness*machine%free_length
+        call set_drive(machine, moving)
+        push = push + moving%drive
+        moving%together = push/(machine%mass + machine%driven_mass)
+        moving%threshold = machine%friction
+        moving%push_scale = machine%friction + sum(abs(push(at_cosine:at_one)))
+        moving%force_scale = moving%push_scale
+      end if
+    end associate
+    moving%interface = machine%driven_mass*moving%together
+  end subroutine set_rows
+
+  pure subroutine set_drive(machine, moving)
+    type(pair_t), intent(in) :: machine
+    type(pair_motion_t), intent(inout) :: moving
+    if (machine%drive == driven_by_force) then
+      moving%drive = moving%reference
+      moving%drive(at_ramp) = 0
+    else if (machine%sample_time > 0) then
+      moving%drive(at_control) = 1
+    else
+      moving%drive = moving%control
+    end if
+  end subroutine set_drive
+
+  !> Rows of m1 while it slides in `direction` over m2.
+  pure subroutine drive_body(moving, direction, matrix)
+    type(pair_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: direction
+    real(wp), intent(inout) :: matrix(most_unknowns, most_unknowns)
+    matrix(at_x1, at_v1) = 1
+    if (moving%machine%drive == driven_by_motion) then
+      matrix(at_v1, :) = moving%push
+    else
+      matrix(at_v1, :) = moving%push/moving%machine%mass
+      matrix(at_v1, at_one) = matrix(at_v1, at_one) - direction*moving%machine%friction/moving%machine%mass
+    end if
+  end subroutine drive_body
+
+  !> Adds the rows of what turns, ramps and adds up.
+  pure function with_clocks(moving, bodies) result(matrix)
+    type(pair_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: bodies(most_unknowns, most_unknowns)
+    real(wp) :: matrix(most_unknowns, most_unknowns)
+    matrix = bodies
+    matrix(at_cosine, at_sine) = -moving%machine%frequency
+    matrix(at_sine, at_cosine) = moving%machine%frequency
+    matrix(at_ramp, at_one) = moving%machine%velocity
+    if (moving%machine%drive == driven_by_controller .and. .not. moving%machine%sample_time > 0) then
+      matrix(at_integral, :) = moving%reference
+      matrix(at_integral, at_x1) = -1
+    end if
+  end function with_clocks
+
+  !> Sets what the time alone decides.
+  pure subroutine refresh(moving, state)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    call sine_cosine(moving%machine%frequency*state%time, state%y(at_sine), state%y(at_cosine))
+    state%y(at_one) = 1
+    if (moving%machine%drive /= driven_by_motion) return
+    state%y(at_x1) = sum(moving%reference*state%y)
+    state%y(at_v1) = sum(moving%reference_rate*state%y)
+    if (state%mode == mode_stick) state%y(at_v2) = state%y(at_v1)
+  end subroutine refresh
+
+  !> Control that the controller would put out now [N].
+  pure real(wp) function control_now(moving, state)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    control_now = sum(moving%control*state%y)
+  end function control_now
+
+  !> Slip mode of the relative velocity v1 - v2 with sign `s`.
+  pure elemental integer function mode_of_slip(s)
+    integer, intent(in) :: s
+    mode_of_slip = merge(mode_slip_plus, mode_slip_minus, s > 0)
+  end function mode_of_slip
+
+  !> Sign of v1 - v2 in a mode, 0 where the bodies move together.
+  pure elemental integer function sense_of(mode)
+    integer, intent(in) :: mode
+    sense_of = 0
+    if (mode == mode_slip_plus .or. mode == mode_upper_barrier) sense_of = 1
+    if (mode == mode_slip_minus .or. mode == mode_lower_barrier) sense_of = -1
+  end function sense_of
+
+  !> Sets the mode that follows where v1 = v2, and clears `touch` where m2 leaves its stop.
+  pure subroutine mode_together(moving, state)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp) :: push, rate
+    integer :: s
+    if (state%touch /= 0 .and. .not. moving%machine%carried) then
+      push = state%touch*sum(moving%push*state%y)
+      rate = state%touch*sum(moving%push_rate*state%y)
+      if (exceeds(push - moving%threshold, rate, moving%push_scale + abs(push))) then
+        state%mode = merge(mode_upper_barrier, mode_lower_barrier, state%touch > 0)
+        return
+      else if (moving%clamped .and. exceeds(-push - moving%threshold, -rate, moving%push_scale + abs(push))) then
+        state%touch = -state%touch
+        state%mode = merge(mode_upper_barrier, mode_lower_barrier, state%touch > 0)
+        return
+      else if (moving%clamped .or. .not. exceeds(-push, -rate, moving%push_scale + abs(push))) then
+        state%mode = mode_held
+        return
+      end if
+    end if
+    state%mode = mode_stick
+    push = sum(moving%interface*state%y)
+    rate = sum(moving%interface_rate*state%y)
+    do s = -1, 1, 2
+      if (.not. exceeds(s*push - moving%machine%friction, s*rate, moving%force_scale + abs(push))) cycle
+      ! A stop carried by m1 keeps m2 from running ahead of it.
+      if (moving%machine%carried .and. state%touch == -s) cycle
+      if (moving%machine%carried .and. moving%clamped) cycle
+      state%mode = mode_of_slip(s)
+    end do
+  end subroutine mode_together
+
+  !> Whether a reserve is used up: above zero, or at zero to rounding and rising.
+  pure logical function exceeds(excess, rate, scale)
+    real(wp), intent(in) :: excess, rate, scale
+    if (abs(excess) <= 32*epsilon(1.0_wp)*scale) then
+      exceeds = rate > 0
+    else
+      exceeds = excess > 0
+    end if
+  end function exceeds
+
+end module pair_modes

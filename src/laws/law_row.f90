@@ -1,0 +1,38 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What a row of the catalogue of laws holds.
+module law_row
+  use kinds, only: wp
+  implicit none
+  private
+
+  !> Lengths of the names of families and laws.
+  integer, parameter, public :: family_length = 9, law_length = 24
+
+  real(wp), parameter, public :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
+
+  type, public :: law_row_t
+    character(len=family_length) :: family
+    character(len=law_length) :: name
+    character(len=96) :: meaning
+    character(len=96) :: source
+  end type law_row_t
+
+  !> One parameter of one law. Values are in the SI unit given; bounds are closed unless open.
+  type, public :: parameter_row_t
+    character(len=family_length) :: family
+    character(len=law_length) :: law
+    character(len=20) :: name
+    character(len=6) :: unit
+    real(wp) :: lower, upper
+    logical :: lower_open
+    !> An optional parameter takes its default.
+    logical :: optional
+    real(wp) :: default
+    !> A list of any length instead of one number.
+    logical :: list
+    character(len=88) :: meaning
+  end type parameter_row_t
+
+end module law_row

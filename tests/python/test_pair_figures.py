@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures of two bodies and of soft contacts, from files that the program wrote."""
+
+import numpy as np
+import pytest
+from program import succeed
+from separatrix import cli, contact, pair, style, trajectory
+from separatrix.open import open_result
+
+
+def file_of(separatrix, source_dir, folder, example, *settings):
+    words = [word for setting in settings for word in ("--set", setting)]
+    case = source_dir / "examples" / f"{example}.toml"
+    succeed(separatrix, "trajectory", case, "-o", folder / f"{example}.h5", *words, folder=folder)
+    return folder / f"{example}.h5"
+
+
+def test_modes_are_shaded(separatrix, source_dir, tmp_path):
+    path = file_of(separatrix, source_dir, tmp_path, "pair_platform")
+    with open_result(path) as result, style.context():
+        ax = style.new_figure(100, 50).add_subplot()
+        assert pair.shade_modes(ax, result) == {"stick", "upper_barrier"}
+        bands = [patch.get_extents().get_points() for patch in ax.patches]
+        assert len(bands) == 2
+        figure = pair.history(result, "platform")
+    apart = figure.axes[1].lines[0].get_ydata()
+    assert apart[0] == 1
+    assert apart[-1] == 0
+
+
+def test_energy_adds_up(separatrix, source_dir, tmp_path):
+    """The top of what is stacked is the line of what was put in."""
+    path = file_of(separatrix, source_dir, tmp_path, "pair_free")
+    with open_result(path) as result, style.context():
+        figure = pair.energy(result, "free pair")
+        top = max(
+            (piece.get_paths()[0].vertices[:, 1].max() for piece in figure.axes[0].collections), default=0
+        )
+        assert top == pytest.approx(0.5, abs=1e-12)
+        assert figure.axes[0].lines[0].get_ydata() == pytest.approx(0.5)
+
+
+def test_contact_loops_close(separatrix, source_dir, tmp_path):
+    path = file_of(separatrix, source_dir, tmp_path, "contact_hunt_crossley")
+    with open_result(path) as result, style.context():
+        found = contact.contacts(result)
+        assert len(found) >= 2
+        for _, speed, time, depth, force in found:
+            assert speed > 0
+            assert np.all(np.diff(time) > 0)
+            # the force starts and ends at zero
+            assert max(force[0], force[-1]) < 0.2 * force.max()
+            assert min(depth) > 0
+        speeds = [speed for _, speed, *_ in found]
+        peaks = [force.max() for *_, force in found]
+        assert np.argmax(speeds) == np.argmax(peaks)
+        figure = trajectory.figures(result, "contact")["contact"]
+    assert len(figure.axes[0].lines) == min(len(found), contact.MOST_LOOPS) + 1
+
+
+def test_linear_damping_jumps_and_pulls(separatrix, source_dir, tmp_path):
+    law = 'contact={law="kelvin_voigt_restitution", stiffness=1e5, restitution=0.5, upper=0}'
+    path = file_of(separatrix, source_dir, tmp_path, "contact_hunt_crossley", law)
+    with open_result(path) as result:
+        _, _, _, _, force = contact.contacts(result)[0]
+    assert force[0] > 0.2 * force.max()
+    assert force[-1] < -0.02 * force.max()
+
+
+@pytest.mark.parametrize(
+    ("example", "names"),
+    [
+        ("pair_free", ["history", "energy", "phase"]),
+        ("contact_hunt_crossley", ["history", "contact", "phase"]),
+    ],
+)
+def test_figures_are_written(separatrix, source_dir, tmp_path, example, names):
+    path = file_of(separatrix, source_dir, tmp_path, example)
+    assert cli.main([str(path), "-o", str(tmp_path / "out")]) == 0
+    made = {item.name for item in (tmp_path / "out").iterdir()}
+    assert made == {f"{example}_{name}.{suffix}" for name in names for suffix in ("png", "pdf")}
