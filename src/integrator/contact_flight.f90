@@ -9,7 +9,7 @@ module contact_flight
   use drive_law, only: foot_motion
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
-  use friction_law, only: sliding_friction
+  use friction_law, only: power, sliding_friction
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
     take_step
   use kinds, only: wp
