@@ -13,7 +13,7 @@ import pytest
 
 PART = f"{life.NAME}.part"
 # What a map does not depend on.
-COSMETIC = {"title", "trajectory", "sweep"}
+COSMETIC = {"title", "trajectory", "sweep", "record"}
 
 
 @pytest.fixture(scope="module")
