@@ -31,9 +31,9 @@ class Reference:
         rows, lengths, values = [], [], []
         for family in FAMILIES:
             chosen = case[family].get("law", "point_mass")
-            row = next(i for i, law in enumerate(table) if (law["family"], law["law"]) == (family, chosen))
-            rows.append(row + 1)
-            for parameter in table[row]["parameters"]:
+            law = next(law for law in table if (law["family"], law["law"]) == (family, chosen))
+            rows.append(law["row"])
+            for parameter in law["parameters"]:
                 value = self.value_of(case[family], parameter)
                 lengths.append(len(value))
                 values += value

@@ -69,7 +69,8 @@ contains
           ', "optional": '//to_text(rows(i)%optional)//', "meaning": '//json_text(trim(rows(i)%meaning))//'}'
       end do
       write (output_unit, '(a)') trim(merge('  ', ', ', first))//'{"family": '//json_text(trim(row%family))// &
-        ', "law": '//json_text(trim(row%name))//', "meaning": '//json_text(trim(row%meaning))//', "source": '// &
+        ', "law": '//json_text(trim(row%name))//', "row": '//to_text(law)//', "meaning": '// &
+        json_text(trim(row%meaning))//', "source": '// &
         json_text(trim(row%source))//', "parameters": ['//list//']}'
     end associate
   end subroutine print_json

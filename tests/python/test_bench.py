@@ -42,3 +42,17 @@ def test_the_driver_of_a_peer_agrees_with_ours(
         assert peers.impacts.tolist() == ours["impacts"][()].tolist()
         np.testing.assert_allclose(peers.x, ours["x"][()], atol=1e-6)
         np.testing.assert_allclose(peers.v, ours["v"][()], atol=1e-6)
+
+
+def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separatrix, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    from published_case import CASE
+    from reference_run import Reference
+
+    found = Reference(build_dir / "lib" / "libseparatrix_reference.so", separatrix).run(np.array(STARTS))
+    (tmp_path / "list.csv").write_text("x0,v0\n" + "".join(f"{x},{v}\n" for x, v in STARTS))
+    succeed(separatrix, "points", CASE, "--list", "list.csv", "-o", "ours.h5", "--quiet", folder=tmp_path)
+    with h5py.File(tmp_path / "ours.h5") as file:
+        assert found.x == pytest.approx(file["x"][()], abs=1e-11)
+        assert found.v == pytest.approx(file["v"][()], abs=1e-10)
+        assert found.impacts.tolist() == file["impacts"][()].tolist()
