@@ -18,6 +18,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import published_tables as tables
+from markdown import table
 from published_tables import LAWS, MOTIONS, SOURCE, case_of, resolved, run_of
 from separatrix import cli, open_result
 
@@ -109,12 +110,6 @@ def axes(path: Path) -> str:
         )
 
 
-def markdown(head: str, rows: list[list[str]]) -> str:
-    """Return a table."""
-    lines = [head.split(", "), ["---"] * len(rows[0]), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def pictures(stem: str, text: str, laws: Iterable[str] = LAWS) -> str:
     """Return the lines that show a figure for each friction law."""
     return "\n\n".join(f"![{text.format(LAWS[law])}](figures/{stem.format(law)}.png)" for law in laws)
@@ -154,7 +149,7 @@ def page(files: dict[str, Path], version: dict[str, str]) -> str:
         "motion_figures": "\n\n".join(motions),
     }
     for name, (head, make) in tables.TABLES.items():
-        fields[name] = markdown(head, make(files))
+        fields[name] = table(head.split(", "), make(files))
     return (SOURCE / "scripts" / "published.md.in").read_text().format(**fields, **run)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import compiled
+from markdown import table
 from published_case import SEED, SOURCE, TOLERANCE, fingerprint, start_points
 
 if TYPE_CHECKING:
@@ -54,12 +55,6 @@ def number(value: float) -> str:
     """Three digits, thousands apart."""
     digits = f"{value:.3g}"
     return f"{float(digits):,.0f}".replace(",", " ") if value >= 100 else digits
-
-
-def table(header: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def speed_table(results: Results) -> str:

@@ -15,6 +15,7 @@ import memory
 import model
 import simulation
 from costs import spread_of
+from markdown import table
 from runs import POINTS_PER_TILE, X0_COUNT, Run
 
 if TYPE_CHECKING:
@@ -27,12 +28,6 @@ BAR_MEMORY = 1.1
 MIB = 2**20
 MOST_TILES = 2**20
 """Of src/drivers/case_setup.f90."""
-
-
-def table(header: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def number(value: float) -> str:
