@@ -76,7 +76,7 @@ contains
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
     type(course_t) :: course
-    logical :: slipped, described
+    logical :: slipped
     if (allocated(moving%pair)) then
       call run_two_bodies(moving, span, x, v, crank_angle, outcome, log)
       return
@@ -93,8 +93,7 @@ contains
     end do
     if (present(log)) then
       log%book%at_end = energy_of_body(moving%machine, course%state)
-      described = log%sample_interval > 0 .and. course%elapsed >= span%duration
-      if (described) call record_sample(log, course%state)
+      if (log%sample_interval > 0 .and. course%elapsed >= span%duration) call record_sample(log, course%state)
     end if
     do while (course%phase == phase_extension)
       call go_to_stop(moving, course, slipped)

@@ -4,7 +4,7 @@
 !> `separatrix basin`: where every point of a grid ends up.
 module basin_driver
   use attractors, only: last_regime, regime_names
-  use basin, only: basin_points, basin_variables, catalogue_t, marks_of_attractor, open_journey, settling_value, &
+  use basin, only: basin_points, basin_variables, catalogue_t, marks_of_attractor, points_at_a_time, settling_value, &
     slice_cache_t
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
@@ -26,7 +26,6 @@ module basin_driver
   use status, only: last_reason, exit_done, reason_names, reason_settled
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
-  use trajectories, only: block_size, describe_all, journey_t
   use trajectory, only: span_t
   implicit none
   private
@@ -95,7 +94,7 @@ contains
     call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                            command%time_limit, work%catalogues, error)
     call session%stop_if(error)
-    call choose_block(work, error)
+    if (size(work%catalogues) > 0) call points_at_a_time(work%grid, work%span, work%block, error)
     call session%stop_if(error)
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)
@@ -152,16 +151,6 @@ contains
     if (work%refine%active) call report_refinement(session, work, work%grid%shape, work%origins)
     call session%end_with(exit_done)
   end subroutine end_basin
-
-  !> The first slice's machine tells how many points are worth computing at a time.
-  subroutine choose_block(work, error)
-    type(basin_work_t), intent(inout) :: work
-    type(error_t), allocatable, intent(out) :: error
-    type(journey_t) :: journey
-    if (size(work%catalogues) == 0) return
-    call open_journey(work%grid, work%span, 0_int64, describe_all, journey, error)
-    if (.not. allocated(error)) work%block = block_size(journey)
-  end subroutine choose_block
 
   subroutine prepare_refinement(the_case, work)
     type(case_t), intent(in) :: the_case

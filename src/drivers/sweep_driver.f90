@@ -5,7 +5,7 @@
 module sweep_driver
   use axis, only: axis_t, linear_values
   use basin_driver, only: bytes_per_point
-  use basin, only: basin_points, basin_variables, catalogue_t, open_journey, slice_cache_t
+  use basin, only: basin_points, basin_variables, catalogue_t, points_at_a_time, slice_cache_t
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t, contact_position => contact_law
@@ -24,7 +24,6 @@ module sweep_driver
   use sweep_chain, only: chains_t, limit_t, run_chains
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
-  use trajectories, only: block_size, describe_all
   use trajectory, only: span_t
   implicit none
   private
@@ -141,9 +140,8 @@ contains
     call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                            session%command%time_limit, work%catalogues, error)
     call session%stop_if(error)
-    call open_journey(work%grid, work%span, 0_int64, describe_all, work%cache%journey, error)
+    call points_at_a_time(work%grid, work%span, work%block, error)
     call session%stop_if(error)
-    work%block = block_size(work%cache%journey)
     starts = product(work%grid%shape(2:3))
     associate (axes => work%grid%axes)
       x0 = [(axes(2)%values(1 + (i - 1)/work%grid%shape(3)), i=1, starts)]

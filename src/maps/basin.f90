@@ -14,13 +14,13 @@ module basin
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
-  use trajectories, only: describe_all, journey_t, run_trajectories
+  use trajectories, only: block_size, describe_all, journey_t, run_trajectories
   use trajectory, only: outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: open_slice, open_journey, search_starts, label_slices, basin_points, outcome_values
+  public :: open_slice, points_at_a_time, search_starts, label_slices, basin_points, outcome_values
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13
@@ -69,6 +69,18 @@ contains
     journey%describe = describe
     call prepare_lanes(journey%moving, journey%flow)
   end subroutine open_journey
+
+  !> Points worth asking `basin_points` for at a time; the machine of the first slice speaks for all.
+  subroutine points_at_a_time(grid, span, points, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    integer, intent(out) :: points
+    type(error_t), allocatable, intent(out) :: error
+    type(journey_t) :: journey
+    points = 1
+    call open_journey(grid, span, 0_int64, describe_all, journey, error)
+    if (.not. allocated(error)) points = block_size(journey)
+  end subroutine points_at_a_time
 
   !> Starts from which the attractors of a slice are searched: its own sample, or, where `neighbours` (attractors of other
   !> slices) are given, their section points.
