@@ -4,7 +4,8 @@
 !> A machine and its neighbours: for every chosen parameter the machine with that parameter a step further, and the one with
 !> it a step back. They are built once for all segments.
 !> A difference over a step e of a natural size has the error e of the series cut off and the error s/e of the results'
-!> own error s: both are least at e = sqrt(s), s being rounding for exact flights and the tolerance for adaptive ones.
+!> own error s: both are least at e = sqrt(s), s being rounding for exact flights and, for adaptive ones, the part of the
+!> tolerance that neighbours do not share.
 module variants
   use build_motion, only: machine_of
   use errors, only: error_t, fail
@@ -22,6 +23,9 @@ module variants
 
   !> Relative error of an exact flight: rounding, somewhat grown.
   real(wp), parameter :: exact_error = 1e-14_wp
+  !> Part of the tolerance of an adaptive flight by which the errors of two neighbours differ, found by comparison with
+  !> flights of much smaller tolerance.
+  real(wp), parameter :: uncommon = 4e-4_wp
   !> A parameter smaller than this share of its natural size is stepped as if it had that size.
   real(wp), parameter :: smallest_share = 0.1_wp
 
@@ -66,7 +70,7 @@ contains
     if (.not. derivatives) return
     scales = scales_of(family%moving%machine)
     share = sqrt(exact_error)
-    if (.not. all_exact(family%moving)) share = sqrt(max(exact_error, options%tolerance))
+    if (.not. all_exact(family%moving)) share = sqrt(max(exact_error, uncommon*options%tolerance))
     family%start_step = share*[scales%length, scales%length/scales%time, 1.0_wp]
     allocate (family%further(size(chosen)), family%back(size(chosen)))
     do i = 1, size(chosen)
@@ -104,6 +108,8 @@ contains
     changed = laws
     call put_values(changed, chosen, values)
     call machine_of(changed, options, moving, error)
+    ! Samples within the Stribeck layer need the adaptive flight anyhow.
+    moving%transit%available = .false.
   end subroutine build
 
   pure subroutine build_variant(laws, options, chosen, values, which, step, variant, error)

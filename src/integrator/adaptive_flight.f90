@@ -290,7 +290,7 @@ contains
       tally%v_max = max(tally%v_max, y(2), maximum_until(path(:, 2), fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, gauss_points
+    do k = 1, merge(gauss_points, 0, log%book%kept)
       t = fraction*gauss_place(k)
       call book_instant(machine, state%time + t*h, value_at(path(:, 1), t), value_at(path(:, 2), t), &
                         fraction*h*gauss_weight(k), log%book)
