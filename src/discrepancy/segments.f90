@@ -51,7 +51,7 @@ contains
   !> Flies every segment: `start` = x [m], v [m/s], crank angle [rad] at its time 0 by column; its samples are
   !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. A segment that cannot be flown has samples that are not
   !> numbers and a reason (module `status`; `exit_bad_case`: its start is not finite or beyond a rigid barrier). It is steady
-  !> if the same barriers are met in the same order by all its neighbours.
+  !> if its neighbours meet the same barriers in the same order and none is grazed.
   pure subroutine propagate(family, start, first, times, derivatives, samples, report)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(:, :), times(:)
@@ -76,7 +76,7 @@ contains
         samples%v(from:to) = base%v(:to - from + 1)
         report%impacts(i) = base%count
         report%reason(i) = base%reason
-        report%steady(i) = base%reason == 0
+        report%steady(i) = base%reason == 0 .and. .not. (derivatives .and. grazes(family, base))
         if (derivatives) call differentiate(family, start(:, i), times(from:to), base, other, samples%x_slope(:, from:to), &
                                             samples%v_slope(:, from:to), report%steady(i))
       end associate
@@ -262,6 +262,7 @@ contains
     logical, intent(inout) :: open(:), steady
     real(wp), intent(inout) :: x_slope(:), v_slope(:)
     logical :: between(size(times))
+    real(wp) :: rounding
     integer :: i
     if (.not. abs(step) > 0) return
     call fly(moving, start, times, other)
@@ -272,8 +273,9 @@ contains
     end if
     between = .false.
     do i = 1, min(base%count, other%count)
-      between = between .or. (times >= min(base%impact(1, i), other%impact(1, i)) &
-                              .and. times <= max(base%impact(1, i), other%impact(1, i)))
+      rounding = 32*epsilon(1.0_wp)*(base%origin + base%impact(1, i))
+      between = between .or. (times >= min(base%impact(1, i), other%impact(1, i)) - rounding &
+                              .and. times <= max(base%impact(1, i), other%impact(1, i)) + rounding)
     end do
     do i = 1, size(times)
       if (.not. open(i) .or. between(i)) cycle
@@ -282,6 +284,13 @@ contains
     end do
     open = open .and. between
   end subroutine compare
+
+  !> Whether a motion turns round so close to a barrier, or meets one so slowly, that the steps are not small against it.
+  pure logical function grazes(family, run)
+    type(family_t), intent(in) :: family
+    type(run_t), intent(in) :: run
+    grazes = run%tally%grazing_margin < family%least_clearance .or. any(run%impact(2, :run%count) < family%least_speed)
+  end function grazes
 
   !> Whether a variant that differs at the barriers only cannot differ on a motion.
   pure logical function untouched(moving, variant, run)

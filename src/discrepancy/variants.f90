@@ -44,6 +44,9 @@ module variants
     type(variant_t), allocatable :: further(:), back(:)
     !> Steps of x [m], v [m/s] and crank angle [rad] of a start.
     real(wp) :: start_step(3) = 0
+    !> Distance to a barrier [m] and speed of an impact [m/s] below which a motion grazes: there a step changes the speed of
+    !> the impact by more than a hundredth.
+    real(wp) :: least_clearance = 0, least_speed = 0
   end type family_t
 
 contains
@@ -72,6 +75,8 @@ contains
     share = sqrt(exact_error)
     if (.not. all_exact(family%moving)) share = sqrt(max(exact_error, uncommon*options%tolerance))
     family%start_step = share*[scales%length, scales%length/scales%time, 1.0_wp]
+    family%least_clearance = 10*family%start_step(1)
+    family%least_speed = 10*sqrt(share)*scales%length/scales%time
     allocate (family%further(size(chosen)), family%back(size(chosen)))
     do i = 1, size(chosen)
       step = share*max(abs(values(i)), smallest_share*natural_size(trim(chosen(i)%unit), scales))
