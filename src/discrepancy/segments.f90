@@ -196,8 +196,7 @@ contains
       run%count = run%count + 1
       associate (event => run%log%event_data(:, i))
         run%impact(:, run%count) = [event(1) - run%origin, abs(event(3)), abs(event(4)), side]
-        if (run%log%event_kind(i) == event_touch_upper .or. run%log%event_kind(i) == event_touch_lower) &
-          run%impact(3, run%count) = not_a_number()
+        if (any(run%log%event_kind(i) == [event_touch_upper, event_touch_lower])) run%impact(3, run%count) = not_a_number()
       end associate
     end do
   end subroutine read_impacts
@@ -211,7 +210,7 @@ contains
     real(wp), intent(inout) :: x_slope(:, :), v_slope(:, :)
     logical, intent(inout) :: steady
     logical :: open(size(times))
-    integer :: k, row
+    integer :: k, row, sense
     x_slope = merge(0.0_wp, not_a_number(), base%reason == 0)
     v_slope = x_slope
     if (base%reason /= 0) return
@@ -227,10 +226,10 @@ contains
     do k = 1, 3
       open = .true.
       row = size(family%further) + k
-      call step_start(family, start, k, merge(-1, 1, k == 2 .and. start(2) < 0), times, base, other, open, x_slope(row, :), &
-                      v_slope(row, :), steady)
-      if (any(open)) call step_start(family, start, k, merge(1, -1, k == 2 .and. start(2) < 0), times, base, other, open, &
-                                     x_slope(row, :), v_slope(row, :), steady)
+      ! A velocity is made larger, so that a slow body does not turn round.
+      sense = merge(-1, 1, k == 2 .and. start(2) < 0)
+      call step_start(family, start, k, sense, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+      if (any(open)) call step_start(family, start, k, -sense, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
       if (any(open)) steady = .false.
     end do
   end subroutine differentiate
