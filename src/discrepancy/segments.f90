@@ -59,7 +59,7 @@ contains
     logical, intent(in) :: derivatives
     type(samples_t), intent(out) :: samples
     type(report_t), intent(out) :: report
-    type(run_t) :: base, other
+    type(run_t) :: base, adaptive, other
     integer :: i, total
     allocate (samples%x(size(times)), samples%v(size(times)))
     if (derivatives) allocate (samples%x_slope(size(family%further) + 3, size(times)), &
@@ -67,6 +67,7 @@ contains
     allocate (report%impacts(size(start, 2)), report%reason(size(start, 2)), report%steady(size(start, 2)))
     allocate (report%impact_segment(size(start, 2)), report%impact(4, size(start, 2)))
     call open_run(base)
+    call open_run(adaptive)
     call open_run(other)
     total = 0
     do i = 1, size(start, 2)
@@ -77,8 +78,9 @@ contains
         report%impacts(i) = base%count
         report%reason(i) = base%reason
         report%steady(i) = base%reason == 0 .and. .not. (derivatives .and. grazes(family, base))
-        if (derivatives) call differentiate(family, start(:, i), times(from:to), base, other, samples%x_slope(:, from:to), &
-                                            samples%v_slope(:, from:to), report%steady(i))
+        if (derivatives .and. allocated(family%adaptive)) call fly(family%adaptive, start(:, i), times(from:to), adaptive)
+        if (derivatives) call differentiate(family, start(:, i), times(from:to), base, adaptive, other, &
+                                            samples%x_slope(:, from:to), samples%v_slope(:, from:to), report%steady(i))
       end associate
       call note_impacts(i, base, total, report)
     end do
@@ -202,10 +204,10 @@ contains
   end subroutine read_impacts
 
   !> Derivatives of the samples of one segment by differences between its neighbours and itself.
-  pure subroutine differentiate(family, start, times, base, other, x_slope, v_slope, steady)
+  pure subroutine differentiate(family, start, times, base, adaptive, other, x_slope, v_slope, steady)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(3), times(:)
-    type(run_t), intent(in) :: base
+    type(run_t), intent(in) :: base, adaptive
     type(run_t), intent(inout) :: other
     real(wp), intent(inout) :: x_slope(:, :), v_slope(:, :)
     logical, intent(inout) :: steady
@@ -217,10 +219,11 @@ contains
     do row = 1, size(family%further)
       if (untouched(family%moving, family%further(row), base)) cycle
       open = .true.
-      call compare(family%further(row)%moving, start, family%further(row)%step, times, base, other, open, x_slope(row, :), &
-                   v_slope(row, :), steady)
-      if (any(open)) call compare(family%back(row)%moving, start, family%back(row)%step, times, base, other, open, &
-                                  x_slope(row, :), v_slope(row, :), steady)
+      if (family%further(row)%leaves_exact) then
+        call step_parameter(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
+      else
+        call step_parameter(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+      end if
       if (any(open)) steady = .false.
     end do
     do k = 1, 3
@@ -233,6 +236,21 @@ contains
       if (any(open)) steady = .false.
     end do
   end subroutine differentiate
+
+  !> The difference that a step of the parameter `k` makes.
+  pure subroutine step_parameter(family, k, start, times, base, other, open, x_slope, v_slope, steady)
+    type(family_t), intent(in) :: family
+    integer, intent(in) :: k
+    real(wp), intent(in) :: start(3), times(:)
+    type(run_t), intent(in) :: base
+    type(run_t), intent(inout) :: other
+    logical, intent(inout) :: open(:), steady
+    real(wp), intent(inout) :: x_slope(:), v_slope(:)
+    associate (further => family%further(k), back => family%back(k))
+      call compare(further%moving, start, further%step, times, base, other, open, x_slope, v_slope, steady)
+      if (any(open)) call compare(back%moving, start, back%step, times, base, other, open, x_slope, v_slope, steady)
+    end associate
+  end subroutine step_parameter
 
   !> The difference that a step of the start in coordinate `k`, forth or back, makes, where the barriers allow it.
   pure subroutine step_start(family, start, k, sense, times, base, other, open, x_slope, v_slope, steady)

@@ -198,9 +198,9 @@ contains
       do i = 7, 1, -1
         p(0) = p(0) + nested(k, i)
         if (modulo(i, 2) == 1) then
-          p = eoshift(p, -1)
+          p = [0.0_wp, p(:degree - 1)]
         else
-          p = p - eoshift(p, -1)
+          p = p - [0.0_wp, p(:degree - 1)]
         end if
       end do
       path(:, k) = p
