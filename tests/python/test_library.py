@@ -185,6 +185,11 @@ EFFECTS = {
 }
 
 
+def effect_may_be_zero(path: str) -> bool:
+    """A stiffness must be positive, and a barrier is somewhere."""
+    return path not in ("dahl.stiffness", "compliant_contact.stiffness", "second_barrier.position")
+
+
 @pytest.mark.parametrize("path", EFFECTS)
 def test_an_effect_has_a_derivative(path: str, separatrix: Path, tmp_path: Path) -> None:
     """It is addressable, its derivative is that of another step, its text a case that moves the same."""
@@ -204,6 +209,22 @@ def test_an_effect_has_a_derivative(path: str, separatrix: Path, tmp_path: Path)
     subprocess.run([separatrix, "trajectory", "--validate", written], check=True, capture_output=True)
     again = fly(Model.read(written), start=starts, derivatives=False)
     np.testing.assert_array_equal(again.x, fly(model, [key], [1.1 * value], starts, derivatives=False).x)
+
+
+@pytest.mark.parametrize("path", [path for path in EFFECTS if effect_may_be_zero(path)])
+def test_an_effect_of_size_zero_has_a_derivative(path: str) -> None:
+    """A fit begins there. Many leave the closed form with the first step."""
+    name, parameter = path.split(".")
+    model = Model.from_text(CASE + f"[effect.{name}]\n{parameter} = 0\n")
+    starts = np.array([(0.5, 1.0, 0.3), (0.9, 4.0, 1.0), (0.6, -2.0, 4.0)])
+    result = fly(model, [f"effect.{path}", "drive.mean"], [0.0, 0.31055], starts)
+    assert result.steady.all()
+    step = 2e-4 * EFFECTS[path]
+    values = [fly(model, [f"effect.{path}"], [k * step], starts, derivatives=False, tolerance=1e-12).x for k in (1, 2)]
+    expected = (4 * values[0] - values[1] - 3 * result.x) / (2 * step)
+    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-7)
+    plain = fly(Model.from_text(CASE), ["drive.mean"], [0.31055], starts)
+    np.testing.assert_array_equal(result.jacobian[:, 1:], plain.jacobian)
 
 
 def test_a_sensor_shows_another_position(model: Model) -> None:
