@@ -47,6 +47,7 @@ contains
     real(wp), intent(in) :: time, x, v, weight
     type(book_t), intent(inout) :: book
     real(wp) :: foot, rate
+    if (.not. book%kept) return
     call foot_motion(machine%drive, machine%drive_frequency*time, foot, rate)
     associate (law => machine%friction)
       book%friction = book%friction + weight*(law%kinetic + stribeck_excess(law, abs(v)))*abs(v)
@@ -68,6 +69,7 @@ contains
     type(kinematics_t) :: now
     real(wp) :: piece, elapsed
     integer :: pieces, i, k
+    if (.not. book%kept) return
     call begin_segment(flow, start%time, start%x, start%v, direction, segment)
     pieces = ceiling((time_end - start%time)*max(flow%natural, flow%harmonics*flow%drive_frequency)/longest_piece)
     piece = (time_end - start%time)/max(1, pieces)
@@ -86,6 +88,7 @@ contains
     type(state_t), intent(in) :: before, now
     type(book_t), intent(inout) :: book
     type(state_t) :: rest
+    if (.not. book%kept) return
     rest = before
     rest%v = 0
     book%work = book%work - energy_of_body(machine, rest)

@@ -70,16 +70,20 @@ module motion_state
     real(wp) :: friction = 0, damping = 0, contact = 0, work = 0
     !> Energy of the machine then and now.
     real(wp) :: at_start = 0, at_end = 0
+    !> Whether anybody will read it.
+    logical :: kept = .true.
   end type book_t
 
-  !> Every event and equidistant samples, in absolute time. Storage grows as needed.
+  !> Every event and samples, equidistant or at chosen instants, in absolute time. Storage grows as needed.
   type, public :: log_t
     !> Absolute time of the start of the current drive period [s].
     real(wp) :: origin = 0
     !> Distance of samples within a period [s]; 0 = no samples.
     real(wp) :: sample_interval = 0
+    !> Instants of the samples [s], ascending, in place of the equidistant ones.
+    real(wp), allocatable :: instants(:)
     integer :: events = 0, samples = 0
-    !> Index of the next sample within the current period.
+    !> Index of the next sample, from 0: within the current period, or of the chosen instants.
     integer :: next_sample = 0
     integer, allocatable :: event_kind(:), sample_mode(:)
     !> Rows: time, x, v before, v after.
@@ -100,7 +104,13 @@ contains
   !> Time of the next sample [s after the section].
   pure real(wp) function sample_time(log)
     type(log_t), intent(in) :: log
-    sample_time = log%next_sample*log%sample_interval
+    if (.not. allocated(log%instants)) then
+      sample_time = log%next_sample*log%sample_interval
+    else if (log%next_sample < size(log%instants)) then
+      sample_time = log%instants(log%next_sample + 1) - log%origin
+    else
+      sample_time = huge(1.0_wp)
+    end if
   end function sample_time
 
   !> Whether the next sample comes before `until` [s after the section] by more than rounding: the end of a period is the
