@@ -3,6 +3,6 @@
 """Find the physics that a model lacks: where records disagree with it, what is missing, and proof."""
 
 from separatrix.discovery.options import Options
-#from separatrix.discovery.workflow import discover
+from separatrix.discovery.workflow import discover
 
-__all__ = ["Options", ]
+__all__ = ["Options", "discover"]

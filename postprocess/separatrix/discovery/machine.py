@@ -47,7 +47,7 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
         value = float(parameter.value)
         if abs(value) >= _UNBOUNDED:
             continue
-        lower, upper = _bounds(parameter)
+        lower, upper = bounds_of(parameter)
         free.append(Free(path, value, lower, upper, _size(path, value, model)))
     return free
 
@@ -66,7 +66,8 @@ def _is_tied(path: str, model) -> bool:
     return other in parameters and parameters[path].value == parameters[other].value
 
 
-def _bounds(parameter) -> tuple[float, float]:
+def bounds_of(parameter) -> tuple[float, float]:
+    """Bounds of a parameter, infinite where there are none."""
     lower = -np.inf if parameter.lower is None or parameter.lower < -_UNBOUNDED else float(parameter.lower)
     upper = np.inf if parameter.upper is None or parameter.upper > _UNBOUNDED else float(parameter.upper)
     return lower, upper
@@ -85,20 +86,20 @@ def drive_amplitudes(model) -> dict[str, float]:
     }
 
 
-def drive_nuisances(model, phase_known: list[bool], records: int) -> list[Free]:
-    """Scale of the drive, zero of the crank (of each record where its phase is not known) and clocks."""
+def drive_nuisances(model, phase_known: list[bool]) -> list[Free]:
+    """Scale of the drive, zero of the crank and clock of each record; the zero is known where phi was measured."""
     if "drive.ratio" not in model.parameters or not model.parameters["drive.ratio"].value:
         return []
     free = []
     if drive_amplitudes(model):
         free.append(Free("nuisance:drive_scale", 1.0, 0.2, 5.0, 0.01))
-    if any(phase_known):
-        free.append(Free("nuisance:phase", 0.0, -1.0, 1.0, 0.01))
-    free += [
-        Free("nuisance:phase", 0.0, -np.inf, np.inf, 0.01, record=i) for i in range(records) if not phase_known[i]
-    ]
-    free += [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(records)]
-    return free
+    return free + record_nuisances(phase_known)
+
+
+def record_nuisances(phase_known: list[bool]) -> list[Free]:
+    """What is free for each record by itself."""
+    free = [Free("nuisance:phase", 0.0, size=0.01, record=i) for i, known in enumerate(phase_known) if not known]
+    return free + [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(len(phase_known))]
 
 
 def with_values(free: list[Free], values: np.ndarray) -> list[Free]:

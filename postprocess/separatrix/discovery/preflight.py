@@ -25,12 +25,23 @@ class Prepared:
     sigma: float
     velocity_sigma: float
     resolution: float
+    # correlation of neighbouring noise
+    memory: float = 0.0
+    sigma_stated: bool = False
+    velocity_sigma_stated: bool = False
     frequency: float | None = None
     phase: float = 0.0
+    # known: measured as a channel; stated: in the header, refined by the fit
     phase_known: bool = False
+    phase_stated: bool = True
     drive_scale: float = 1.0
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
+
+    def note(self, text: str) -> None:
+        """Keep a remark once."""
+        if text not in self.notes:
+            self.notes.append(text)
 
     @property
     def period_samples(self) -> float | None:
@@ -50,8 +61,10 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
             f"{record.name}: x moves by {np.std(record.x):.3g} m (standard deviation) at a noise of {sigma:.3g} m: "
             "nothing but noise"
         )
-    prepared = Prepared(record, sigma, _velocity_noise(record), resolution, notes=notes, origin=float(record.t[0]))
+    prepared = Prepared(record, sigma, _velocity_noise(record), resolution, notes=notes, origin=record.header.get("phase_origin_s", float(record.t[0])))
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
+    prepared.sigma_stated = rest is not None or "sensor_noise_sigma_m" in record.header
+    prepared.velocity_sigma_stated = "sensor_noise_sigma_m_s" in record.header
     _find_drive(prepared, model)
     _check_size(prepared, model)
     if record.v is not None:
@@ -112,9 +125,9 @@ def _find_drive(prepared: Prepared, model) -> None:
             values = {"drive.ratio": header.get("drive_ratio", ratio.value)}
             prepared.frequency = model.drive_frequency(values)
         prepared.phase = header.get("phase", 0.0)
-        prepared.phase_known = "phase" in header
-        if not prepared.phase_known:
-            prepared.notes.append("no phase: it is fitted")
+        prepared.phase_stated = "phase" in header
+        if not prepared.phase_stated:
+            prepared.notes.append("no phase: it is searched for")
     samples = prepared.period_samples
     if samples < _FEWEST_PER_PERIOD:
         raise SeparatrixError(

@@ -28,6 +28,8 @@ class Evaluation:
     steady: np.ndarray
     x: np.ndarray
     v: np.ndarray
+    # per record rows of segment (of that record), time, speed before, speed after, side
+    impacts: list[np.ndarray | None]
     by_start: np.ndarray | None = None
     by_parameter: np.ndarray | None = None
     # derivatives of x and v by the start, without noise: what a force does later follows from them
@@ -91,6 +93,7 @@ class Problem:
             steady=np.ones(count, bool),
             x=np.zeros(shape),
             v=np.zeros(shape),
+            impacts=[None] * len(self._parts),
         )
         if derivatives:
             out.by_start = np.zeros((count, width, 2))
@@ -99,7 +102,27 @@ class Problem:
         for number, part in enumerate(self._parts):
             if part["rows"].size:
                 self._evaluate_record(number, part, values, starts, derivatives, out)
+        out.residual = self.whitened(out.residual)
+        if derivatives:
+            out.by_start = self.whitened(out.by_start)
+            out.by_parameter = self.whitened(out.by_parameter)
         return out
+
+    def whitened(self, table: np.ndarray) -> np.ndarray:
+        """Rows (segments, channels*length, ...) over their noise, freed of the memory of the noise."""
+        length = self.segments.inside.shape[1]
+        for number, prepared in enumerate(self.prepared):
+            memory = prepared.memory
+            if memory == 0:
+                continue
+            rows = np.flatnonzero(self.segments.record == number)
+            for first in range(0, table.shape[1], length):
+                part = table[rows, first : first + length]
+                part[:, 1:] = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
+                table[rows, first : first + length] = part
+        used = np.tile(self.segments.inside, (1, table.shape[1] // length))
+        table[~used] = 0
+        return table
 
     def _evaluate_record(
         self, number: int, part: dict, values: np.ndarray, starts: np.ndarray, derivatives: bool, out: Evaluation
@@ -116,6 +139,8 @@ class Problem:
         out.failed[rows] = failed
         out.x[rows] = _padded(result.x, inside)
         out.v[rows] = _padded(result.v, inside)
+        hits = result.impact
+        out.impacts[number] = np.column_stack([hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side])
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
@@ -160,13 +185,9 @@ class Problem:
 
     def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float) -> float:
         for one, value in zip(self.free, values, strict=True):
-            if one.path == path and one.record in (None, number) and self._applies(one, number):
+            if one.path == path and one.record in (None, number):
                 return float(value)
         return absent
-
-    def _applies(self, one: Free, number: int) -> bool:
-        """The common zero of the crank serves the records whose phase is known."""
-        return one.record is not None or one.path != "nuisance:phase" or self.prepared[number].phase_known
 
     def _crank(self, number: int, part: dict, values: np.ndarray) -> np.ndarray:
         prepared = self.prepared[number]
@@ -213,7 +234,7 @@ class Problem:
         crank = np.zeros((part["starts"].size, len(self.free)))
         scale_column = None
         for j, one in enumerate(self.free):
-            if one.path == "nuisance:phase" and one.record in (None, number) and self._applies(one, number):
+            if one.path == "nuisance:phase" and one.record == number:
                 crank[:, j] = 1
             elif one.path == "nuisance:clock" and one.record == number:
                 crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
