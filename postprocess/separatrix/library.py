@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulator as a function: a case file, other values for its numbers, many short segments and their derivatives.
+"""The simulator as a function: other values for a case's numbers, many short segments, their derivatives.
 
 This is the binding of libseparatrix (include/separatrix.h, docs/library.md).
 """
@@ -10,7 +10,7 @@ import functools
 import os
 import shutil
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,10 +53,10 @@ class Impacts:
 class Segments:
     """Samples of all segments, one after the other.
 
-    `x` is what the sensor shows, `v` the velocity. Columns of the Jacobians: the active parameters, then x, v and
-    crank angle of the start; None without derivatives. Per segment: the number of impacts, whether it is steady (all
-    neighbours meet the same barriers in the same order; otherwise the derivatives mean little) and the reason why it
-    could not be flown, 0 if it was.
+    `x` is what the sensor shows, `v` the velocity. Columns of the Jacobians: the active parameters, then x, v
+    and crank angle of the start; None without derivatives. Per segment: the number of impacts, whether it is
+    steady (its neighbours meet the same barriers in the same order and none is grazed; otherwise the
+    derivatives mean little) and the reason why it could not be flown, 0 if it was.
     """
 
     x: np.ndarray
@@ -70,7 +70,7 @@ class Segments:
 
 
 class Model:
-    """A case that has been read, with its numbers addressed by path: "restoring.stiffness", "drive.cosine[1]"."""
+    """A case that has been read; its numbers have paths: "restoring.stiffness", "drive.cosine[1]"."""
 
     def __init__(self, handle: ctypes.c_void_p) -> None:
         """Take over a handle of the library; use `read` or `from_text`."""
@@ -115,20 +115,27 @@ class Model:
 
     def segments(
         self,
-        active: Sequence[str],
+        active: list[str],
         values: np.ndarray,
         start: np.ndarray,
         first: np.ndarray,
         times: np.ndarray,
+        force: tuple[np.ndarray, float, np.ndarray] | None = None,
         derivatives: bool = True,
         tolerance: float = 1e-9,
     ) -> Segments:
         """Fly many segments, each from its own start, and sample them.
 
-        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start` is (n, 3):
-        x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are at
-        `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
+        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start` is
+        (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are
+        at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that of
+        the adaptive flight.
         """
+        for path in active:
+            if active.count(path) > 1:
+                raise CaseError(f"active: found '{path}' twice")
+        if force is not None:
+            raise CaseError('force: given, allowed with drive.law = "measured_force"')
         chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
         start = np.asarray(start, float)
         start = _array(start, (len(start), 3), "start")
@@ -201,8 +208,8 @@ def library_path() -> Path:
             return path
     tried = ", ".join(str(folder) for folder in folders)
     raise CaseError(
-        f"no libseparatrix.so in {tried}; build it (cmake --build build --target separatrix_library) or name it in "
-        "SEPARATRIX_LIBRARY"
+        f"no libseparatrix.so in {tried}; build it (cmake --build build --target separatrix_library) "
+        "or name it in SEPARATRIX_LIBRARY"
     )
 
 

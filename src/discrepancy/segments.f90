@@ -51,7 +51,7 @@ contains
   !> Flies every segment: `start` = x [m], v [m/s], crank angle [rad] at its time 0 by column; its samples are
   !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. A segment that cannot be flown has samples that are not
   !> numbers and a reason (module `status`; `exit_bad_case`: its start is not finite or beyond a rigid barrier). It is steady
-  !> if the same barriers are met in the same order by all its neighbours.
+  !> if its neighbours meet the same barriers in the same order and none is grazed.
   pure subroutine propagate(family, start, first, times, derivatives, samples, report)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(:, :), times(:)
@@ -59,7 +59,7 @@ contains
     logical, intent(in) :: derivatives
     type(samples_t), intent(out) :: samples
     type(report_t), intent(out) :: report
-    type(run_t) :: base, other
+    type(run_t) :: base, adaptive, other
     integer :: i, total
     allocate (samples%x(size(times)), samples%v(size(times)))
     if (derivatives) allocate (samples%x_slope(size(family%further) + 3, size(times)), &
@@ -67,6 +67,7 @@ contains
     allocate (report%impacts(size(start, 2)), report%reason(size(start, 2)), report%steady(size(start, 2)))
     allocate (report%impact_segment(size(start, 2)), report%impact(4, size(start, 2)))
     call open_run(base)
+    call open_run(adaptive)
     call open_run(other)
     total = 0
     do i = 1, size(start, 2)
@@ -76,9 +77,10 @@ contains
         samples%v(from:to) = base%v(:to - from + 1)
         report%impacts(i) = base%count
         report%reason(i) = base%reason
-        report%steady(i) = base%reason == 0
-        if (derivatives) call differentiate(family, start(:, i), times(from:to), base, other, samples%x_slope(:, from:to), &
-                                            samples%v_slope(:, from:to), report%steady(i))
+        report%steady(i) = base%reason == 0 .and. .not. (derivatives .and. grazes(family, base))
+        if (derivatives .and. allocated(family%adaptive)) call fly(family%adaptive, start(:, i), times(from:to), adaptive)
+        if (derivatives) call differentiate(family, start(:, i), times(from:to), base, adaptive, other, &
+                                            samples%x_slope(:, from:to), samples%v_slope(:, from:to), report%steady(i))
       end associate
       call note_impacts(i, base, total, report)
     end do
@@ -196,44 +198,59 @@ contains
       run%count = run%count + 1
       associate (event => run%log%event_data(:, i))
         run%impact(:, run%count) = [event(1) - run%origin, abs(event(3)), abs(event(4)), side]
-        if (run%log%event_kind(i) == event_touch_upper .or. run%log%event_kind(i) == event_touch_lower) &
-          run%impact(3, run%count) = not_a_number()
+        if (any(run%log%event_kind(i) == [event_touch_upper, event_touch_lower])) run%impact(3, run%count) = not_a_number()
       end associate
     end do
   end subroutine read_impacts
 
   !> Derivatives of the samples of one segment by differences between its neighbours and itself.
-  pure subroutine differentiate(family, start, times, base, other, x_slope, v_slope, steady)
+  pure subroutine differentiate(family, start, times, base, adaptive, other, x_slope, v_slope, steady)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(3), times(:)
-    type(run_t), intent(in) :: base
+    type(run_t), intent(in) :: base, adaptive
     type(run_t), intent(inout) :: other
     real(wp), intent(inout) :: x_slope(:, :), v_slope(:, :)
     logical, intent(inout) :: steady
     logical :: open(size(times))
-    integer :: k, row
+    integer :: k, row, sense
     x_slope = merge(0.0_wp, not_a_number(), base%reason == 0)
     v_slope = x_slope
     if (base%reason /= 0) return
     do row = 1, size(family%further)
       if (untouched(family%moving, family%further(row), base)) cycle
       open = .true.
-      call compare(family%further(row)%moving, start, family%further(row)%step, times, base, other, open, x_slope(row, :), &
-                   v_slope(row, :), steady)
-      if (any(open)) call compare(family%back(row)%moving, start, family%back(row)%step, times, base, other, open, &
-                                  x_slope(row, :), v_slope(row, :), steady)
+      if (family%further(row)%leaves_exact) then
+        call step_parameter(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
+      else
+        call step_parameter(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+      end if
       if (any(open)) steady = .false.
     end do
     do k = 1, 3
       open = .true.
       row = size(family%further) + k
-      call step_start(family, start, k, merge(-1, 1, k == 2 .and. start(2) < 0), times, base, other, open, x_slope(row, :), &
-                      v_slope(row, :), steady)
-      if (any(open)) call step_start(family, start, k, merge(1, -1, k == 2 .and. start(2) < 0), times, base, other, open, &
-                                     x_slope(row, :), v_slope(row, :), steady)
+      ! A velocity is made larger, so that a slow body does not turn round.
+      sense = merge(-1, 1, k == 2 .and. start(2) < 0)
+      call step_start(family, start, k, sense, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+      if (any(open)) call step_start(family, start, k, -sense, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
       if (any(open)) steady = .false.
     end do
   end subroutine differentiate
+
+  !> The difference that a step of the parameter `k` makes.
+  pure subroutine step_parameter(family, k, start, times, base, other, open, x_slope, v_slope, steady)
+    type(family_t), intent(in) :: family
+    integer, intent(in) :: k
+    real(wp), intent(in) :: start(3), times(:)
+    type(run_t), intent(in) :: base
+    type(run_t), intent(inout) :: other
+    logical, intent(inout) :: open(:), steady
+    real(wp), intent(inout) :: x_slope(:), v_slope(:)
+    associate (further => family%further(k), back => family%back(k))
+      call compare(further%moving, start, further%step, times, base, other, open, x_slope, v_slope, steady)
+      if (any(open)) call compare(back%moving, start, back%step, times, base, other, open, x_slope, v_slope, steady)
+    end associate
+  end subroutine step_parameter
 
   !> The difference that a step of the start in coordinate `k`, forth or back, makes, where the barriers allow it.
   pure subroutine step_start(family, start, k, sense, times, base, other, open, x_slope, v_slope, steady)
@@ -262,6 +279,7 @@ contains
     logical, intent(inout) :: open(:), steady
     real(wp), intent(inout) :: x_slope(:), v_slope(:)
     logical :: between(size(times))
+    real(wp) :: rounding
     integer :: i
     if (.not. abs(step) > 0) return
     call fly(moving, start, times, other)
@@ -272,8 +290,9 @@ contains
     end if
     between = .false.
     do i = 1, min(base%count, other%count)
-      between = between .or. (times >= min(base%impact(1, i), other%impact(1, i)) &
-                              .and. times <= max(base%impact(1, i), other%impact(1, i)))
+      rounding = 32*epsilon(1.0_wp)*(base%origin + base%impact(1, i))
+      between = between .or. (times >= min(base%impact(1, i), other%impact(1, i)) - rounding &
+                              .and. times <= max(base%impact(1, i), other%impact(1, i)) + rounding)
     end do
     do i = 1, size(times)
       if (.not. open(i) .or. between(i)) cycle
@@ -282,6 +301,13 @@ contains
     end do
     open = open .and. between
   end subroutine compare
+
+  !> Whether a motion turns round so close to a barrier, or meets one so slowly, that the steps are not small against it.
+  pure logical function grazes(family, run)
+    type(family_t), intent(in) :: family
+    type(run_t), intent(in) :: run
+    grazes = run%tally%grazing_margin < family%least_clearance .or. any(run%impact(2, :run%count) < family%least_speed)
+  end function grazes
 
   !> Whether a variant that differs at the barriers only cannot differ on a motion.
   pure logical function untouched(moving, variant, run)

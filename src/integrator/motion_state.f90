@@ -8,7 +8,8 @@ module motion_state
   implicit none
   private
 
-  public :: sample_time, sample_due, closing_error, reset_tally, note_position, append_word, open_log, record_event, record_sample
+  public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, note_position, append_word, open_log, &
+    record_event, record_sample
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -121,6 +122,19 @@ contains
     sample_due = sample_time(log) < until*(1 - 8*epsilon(until))
   end function sample_due
 
+  !> Number of the chosen instants that come before `until` [s after the section], in the sense of `sample_due`.
+  pure integer function samples_before(log, until) result(last)
+    type(log_t), intent(in) :: log
+    real(wp), intent(in) :: until
+    real(wp) :: limit
+    limit = until*(1 - 8*epsilon(until))
+    last = log%next_sample
+    do while (last < size(log%instants))
+      if (.not. log%instants(last + 1) - log%origin < limit) exit
+      last = last + 1
+    end do
+  end function samples_before
+
   !> What is missing in a book [J].
   pure elemental real(wp) function closing_error(book)
     type(book_t), intent(in) :: book
@@ -206,16 +220,7 @@ contains
     type(state_t), intent(in) :: state
     real(wp), intent(in), optional :: driver(2)
     type(book_t), intent(in), optional :: book
-    integer, allocatable :: modes_grown(:)
-    real(wp), allocatable :: data_grown(:, :)
-    if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
-    if (log%samples == size(log%sample_mode)) then
-      allocate (modes_grown(2*log%samples), data_grown(3, 2*log%samples))
-      modes_grown(:log%samples) = log%sample_mode
-      data_grown(:, :log%samples) = log%sample_data
-      call move_alloc(modes_grown, log%sample_mode)
-      call move_alloc(data_grown, log%sample_data)
-    end if
+    call make_room(log, log%samples + 1)
     log%samples = log%samples + 1
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
@@ -224,6 +229,21 @@ contains
     if (present(book)) call put_column(log%sample_book, log%samples, &
                                        [book%friction, book%damping, book%contact, book%work, book%at_end])
   end subroutine record_sample
+
+  !> Room for `count` samples.
+  pure subroutine make_room(log, count)
+    type(log_t), intent(inout) :: log
+    integer, intent(in) :: count
+    integer, allocatable :: modes_grown(:)
+    real(wp), allocatable :: data_grown(:, :)
+    if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
+    if (count <= size(log%sample_mode)) return
+    allocate (modes_grown(2*count), data_grown(3, 2*count))
+    modes_grown(:log%samples) = log%sample_mode(:log%samples)
+    data_grown(:, :log%samples) = log%sample_data(:, :log%samples)
+    call move_alloc(modes_grown, log%sample_mode)
+    call move_alloc(data_grown, log%sample_data)
+  end subroutine make_room
 
   !> Puts values into column `column`, the one after the last.
   pure subroutine put_column(columns, column, values)
