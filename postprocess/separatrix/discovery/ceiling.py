@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fit import Fit, blocks_of, eliminate
 from separatrix.discovery.problem import Problem
-from separatrix.discovery.response import force_columns, kick_columns
+from separatrix.discovery.response import force_columns, kick_columns, sample_times
 from separatrix.discovery.screen import project
 
 _PIECES = 5
@@ -181,3 +181,11 @@ def _splines(values: np.ndarray, count: int) -> np.ndarray:
 
 def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
+
+
+def after_impacts(problem: Problem, fit: Fit) -> np.ndarray:
+    """Time since the last impact of the segment at each sample [s], not a number before the first."""
+    _, at = _impacts(problem, fit)
+    times = sample_times(problem)
+    last = np.maximum.accumulate(np.where(at != 0, times, -np.inf), axis=1)
+    return np.where(np.isfinite(last), times - last, np.nan)

@@ -23,6 +23,8 @@ class Decision:
     outcome: str
     accepted: list[Judged]
     alternatives: list[list[str]]
+    # the fits that could not be told from the accepted one
+    rivals: list[Judged]
     rounds: list[Round]
     base_ceiling: Ceiling
     foretold: Prediction | None
@@ -37,7 +39,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     bench.options.progress("looking for a gap", 0.15)
     gap = ceiling(base.problem, base.fit, bench.scales.mass)
     first = run_round(bench, base, foretold, 0.2, 0.75)
-    decision = Decision("none", [], [], [first], gap, foretold)
+    decision = Decision("none", [], [], [], [first], gap, foretold)
     if not first.judged:
         return _without_name(bench, decision)
     best, rivals = _leaders(bench, first)
@@ -86,6 +88,7 @@ def _conclude(decision: Decision, best: Judged, rivals: list[Judged]) -> Decisio
     decision.accepted = [best]
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
+    decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
     if failed == []:
         decision.outcome = "named"

@@ -19,7 +19,7 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
     segments = problem.segments
     inside = segments.inside
     transition = fit.evaluation.transition
-    times = _times(problem)
+    times = sample_times(problem)
     determinant = transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
     # a body that sticks forgets: from there on a force does nothing
     alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & inside, axis=1)
@@ -63,7 +63,7 @@ def _as_columns(problem: Problem, fit: Fit, moved: np.ndarray) -> np.ndarray:
     return problem.whitened(columns)
 
 
-def _times(problem: Problem) -> np.ndarray:
+def sample_times(problem: Problem) -> np.ndarray:
     """Times of the samples since the start of their segment [s], (segments, length)."""
     times = np.zeros(problem.segments.inside.shape)
     for number, prepared in enumerate(problem.prepared):
