@@ -85,6 +85,12 @@ int separatrix_model_text(const separatrix_model *model, int chosen_count, const
                           const double *values, char *text, size_t text_size, size_t *length, char *message,
                           size_t message_size);
 
+/* Row `index` of the catalogue of effects, one per parameter: effect, its meaning, parameter and unit; numbers[4] = default,
+ * lower and upper bound (+-1.8e308: none), and 1 if the parameter is optional. Code 64 beyond the last row. */
+int separatrix_effect_parameter(int index, char *effect, size_t effect_size, char *meaning, size_t meaning_size,
+                                char *parameter, size_t parameter_size, char *unit, size_t unit_size, double *numbers,
+                                char *message, size_t message_size);
+
 #ifdef __cplusplus
 }
 #endif

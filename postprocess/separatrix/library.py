@@ -18,7 +18,7 @@ import numpy as np
 
 from separatrix.errors import SeparatrixError
 
-__all__ = ["CaseError", "Impacts", "Model", "Parameter", "Segments", "library_path"]
+__all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
 
 _NONE = 1e308  # bounds beyond this mean that there is none
 _TEXT = 4096
@@ -36,6 +36,15 @@ class Parameter:
     unit: str
     lower: float
     upper: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A law of the family `effect`, its parameters by name; `value` is the default, NaN where one must be given."""
+
+    name: str
+    meaning: str
+    parameters: dict[str, Parameter]
 
 
 @dataclass(frozen=True)
@@ -128,8 +137,8 @@ class Model:
 
         `active` are the paths of the parameters with the `values` to use and to differentiate by. `start` is
         (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are
-        at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that of
-        the adaptive flight.
+        at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that
+        of the adaptive flight.
         """
         for path in active:
             if active.count(path) > 1:
@@ -178,9 +187,7 @@ class Model:
         numbers = (ctypes.c_double * 3)()
         _call("separatrix_parameter", self._handle, index, path, _size(path), unit, _size(unit), numbers)
         value, lower, upper = numbers
-        lower = -np.inf if lower < -_NONE else lower
-        upper = np.inf if upper > _NONE else upper
-        return path.value.decode(), Parameter(value, unit.value.decode(), lower, upper)
+        return path.value.decode(), _parameter(value, unit.value.decode(), lower, upper)
 
     def _chosen(self, values: Mapping[str, float]) -> tuple[int, ctypes.Array, ctypes.Array]:
         """Return number, indices and values of parameters by path."""
@@ -192,6 +199,25 @@ class Model:
             # The library knows the one that was meant.
             _call("separatrix_find_parameter", self._handle, path.encode(), ctypes.byref(ctypes.c_int()))
         return self._index[path]
+
+
+def effects() -> dict[str, Effect]:
+    """Return the catalogue of effects that may be added to a case, by name, as the law table has it."""
+    found: dict[str, Effect] = {}
+    index = 0
+    while True:
+        texts = [ctypes.create_string_buffer(_TEXT) for _ in range(4)]
+        numbers = (ctypes.c_double * 4)()
+        sized = [argument for text in texts for argument in (text, _size(text))]
+        try:
+            _call("separatrix_effect_parameter", index, *sized, numbers)
+        except CaseError:
+            return found
+        name, meaning, parameter, unit = (text.value.decode() for text in texts)
+        default, lower, upper, optional = numbers
+        effect = found.setdefault(name, Effect(name, meaning, {}))
+        effect.parameters[parameter] = _parameter(default if optional else np.nan, unit, lower, upper)
+        index += 1
 
 
 def library_path() -> Path:
@@ -230,6 +256,12 @@ def _call(name: str, *arguments: object) -> None:
     code = getattr(_library(), name)(*arguments, message, _size(message))
     if code:
         raise CaseError(message.value.decode(errors="replace"), code)
+
+
+def _parameter(value: float, unit: str, lower: float, upper: float) -> Parameter:
+    lower = -np.inf if lower < -_NONE else lower
+    upper = np.inf if upper > _NONE else upper
+    return Parameter(value, unit, lower, upper)
 
 
 def _size(buffer: ctypes.Array) -> ctypes.c_size_t:

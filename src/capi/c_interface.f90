@@ -8,7 +8,7 @@ module c_interface
   use c_text, only: from_c, to_c
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: law_choice_t
+  use law_table, only: effect_family, find_law, law_choice_t, laws, parameters
   use model_type, only: check_values, find_parameter, model_from_text, model_options, model_t, read_model, text_with
   use motion, only: motion_t
   use parameter_list, only: put_values
@@ -20,7 +20,8 @@ module c_interface
   private
 
   public :: separatrix_model_read, separatrix_model_from_text, separatrix_model_free, separatrix_parameter_count, &
-    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_segments, separatrix_model_text
+    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_segments, separatrix_model_text, &
+    separatrix_effect_parameter
 
   !> Drive periods that a segment may last.
   real(wp), parameter :: most_periods = 1e5_wp
@@ -253,6 +254,32 @@ contains
     end if
     code = answer(error, message, message_size)
   end function separatrix_model_text
+
+  integer(c_int) function separatrix_effect_parameter(index, effect, effect_size, meaning, meaning_size, parameter, &
+      parameter_size, unit, unit_size, numbers, message, message_size) bind(c) result(code)
+    integer(c_int), value :: index
+    character(kind=c_char), intent(inout) :: effect(*), meaning(*), parameter(*), unit(*), message(*)
+    integer(c_size_t), value :: effect_size, meaning_size, parameter_size, unit_size, message_size
+    real(c_double), intent(out) :: numbers(4)
+    type(error_t), allocatable :: error
+    integer, allocatable :: rows(:)
+    integer :: i
+    numbers = 0
+    rows = pack([(i, i=1, size(parameters))], parameters%family == effect_family)
+    if (index < 0 .or. index >= size(rows)) then
+      call fail(error, exit_usage, 'row of the effects: found '//to_text(int(index))//', allowed 0 to '// &
+                to_text(size(rows) - 1))
+    else
+      associate (row => parameters(rows(index + 1)))
+        call to_c(trim(row%law), effect, effect_size)
+        call to_c(trim(laws(find_law(effect_family, trim(row%law)))%meaning), meaning, meaning_size)
+        call to_c(trim(row%name), parameter, parameter_size)
+        call to_c(trim(row%unit), unit, unit_size)
+        numbers = [row%default, row%lower, row%upper, merge(1.0_wp, 0.0_wp, row%optional)]
+      end associate
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_effect_parameter
 
   !> The code of an error, its message in the buffer of the caller.
   integer(c_int) function answer(error, message, message_size) result(code)

@@ -2,10 +2,10 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The numbers of a choice of laws as one list, items of lists included, each under its path: 'restoring.stiffness',
-!> 'drive.cosine[2]'.
+!> 'drive.cosine[2]', 'effect.dahl.stiffness'.
 module parameter_list
   use kinds, only: wp
-  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of
+  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of, table_of
   use text, only: to_text
   implicit none
   private
@@ -38,12 +38,12 @@ contains
       do j = 1, size(rows)
         one = parameter_t(unit=rows(j)%unit, lower=rows(j)%lower, upper=rows(j)%upper, lower_open=rows(j)%lower_open, &
                           law=i, row=j)
-        one%path = trim(rows(j)%family)//'.'//rows(j)%name
+        one%path = table_of(rows(j)%family, rows(j)%law)//'.'//rows(j)%name
         do k = 1, size(laws(i)%parameters(j)%values)
           one%value = laws(i)%parameters(j)%values(k)
           if (abs(one%value) >= huge(one%value)) cycle
           if (rows(j)%list) then
-            one%path = trim(rows(j)%family)//'.'//trim(rows(j)%name)//'['//to_text(k)//']'
+            one%path = table_of(rows(j)%family, rows(j)%law)//'.'//trim(rows(j)%name)//'['//to_text(k)//']'
             one%item = k
           end if
           list = [list, one]

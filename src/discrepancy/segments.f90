@@ -6,12 +6,13 @@
 !> that a small error of the model does not grow into another motion.
 module segments
   use contact_law, only: barrier_positions
+  use effect_law, only: observed
   use kinds, only: wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
     state_t, tally_t
   use status, only: exit_bad_case
-  use variants, only: family_t, variant_t
+  use variants, only: family_t, of_the_machine, sensor_bias, sensor_delay, sensor_gain, variant_t
   implicit none
   private
 
@@ -48,10 +49,11 @@ module segments
 
 contains
 
-  !> Flies every segment: `start` = x [m], v [m/s], crank angle [rad] at its time 0 by column; its samples are
-  !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. A segment that cannot be flown has samples that are not
-  !> numbers and a reason (module `status`; `exit_bad_case`: its start is not finite or beyond a rigid barrier). It is steady
-  !> if its neighbours meet the same barriers in the same order and none is grazed.
+  !> Flies every segment: `start` = x [m], v [m/s], crank angle [rad] by column, its samples are at
+  !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. The sensor shows the start at time 0; if it is late, the body
+  !> was there `delay` before, when the crank was that much behind the angle given. A segment that cannot be flown has
+  !> samples that are not numbers and a reason (module `status`; `exit_bad_case`: its start is not finite or beyond a rigid
+  !> barrier). It is steady if its neighbours meet the same barriers in the same order and none is grazed.
   pure subroutine propagate(family, start, first, times, derivatives, samples, report)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(:, :), times(:)
@@ -73,7 +75,7 @@ contains
     do i = 1, size(start, 2)
       associate (from => first(i) + 1, to => first(i + 1))
         call fly(family%moving, start(:, i), times(from:to), base)
-        samples%x(from:to) = base%x(:to - from + 1)
+        samples%x(from:to) = observed(family%moving%machine%sensor, base%x(:to - from + 1))
         samples%v(from:to) = base%v(:to - from + 1)
         report%impacts(i) = base%count
         report%reason(i) = base%reason
@@ -128,7 +130,9 @@ contains
     run%log%samples = 0
     run%log%next_sample = 0
     if (start_allowed(moving, start)) then
-      state = start_state(moving, start(1), start(2), start(3))
+      associate (machine => moving%machine)
+        state = start_state(moving, start(1), start(2), start(3) - machine%drive_frequency*machine%sensor%delay)
+      end associate
       run%tally%x_max = start(1)
       run%tally%x_min = start(1)
       run%origin = state%time
@@ -216,16 +220,6 @@ contains
     x_slope = merge(0.0_wp, not_a_number(), base%reason == 0)
     v_slope = x_slope
     if (base%reason /= 0) return
-    do row = 1, size(family%further)
-      if (untouched(family%moving, family%further(row), base)) cycle
-      open = .true.
-      if (family%further(row)%leaves_exact) then
-        call step_parameter(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
-      else
-        call step_parameter(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
-      end if
-      if (any(open)) steady = .false.
-    end do
     do k = 1, 3
       open = .true.
       row = size(family%further) + k
@@ -235,7 +229,41 @@ contains
       if (any(open)) call step_start(family, start, k, -sense, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
       if (any(open)) steady = .false.
     end do
+    do row = 1, size(family%further)
+      if (family%further(row)%role /= of_the_machine) cycle
+      if (untouched(family%moving, family%further(row), base)) cycle
+      open = .true.
+      if (family%further(row)%leaves_exact) then
+        call step_parameter(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
+      else
+        call step_parameter(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+      end if
+      if (any(open)) steady = .false.
+    end do
+    call differentiate_sensor(family, base, x_slope, v_slope)
   end subroutine differentiate
+
+  !> From derivatives of the position to those of what the sensor shows, and those by the sensor's own parameters. A delay
+  !> is an angle by which the crank was behind.
+  pure subroutine differentiate_sensor(family, base, x_slope, v_slope)
+    type(family_t), intent(in) :: family
+    type(run_t), intent(in) :: base
+    real(wp), intent(inout) :: x_slope(:, :), v_slope(:, :)
+    integer :: row, crank
+    crank = size(x_slope, 1)
+    if (abs(family%moving%machine%sensor%gain) > 0) x_slope = (1 + family%moving%machine%sensor%gain)*x_slope
+    do row = 1, size(family%further)
+      select case (family%further(row)%role)
+      case (sensor_bias)
+        x_slope(row, :) = 1
+      case (sensor_gain)
+        x_slope(row, :) = base%x(:size(x_slope, 2))
+      case (sensor_delay)
+        x_slope(row, :) = -family%moving%machine%drive_frequency*x_slope(crank, :)
+        v_slope(row, :) = -family%moving%machine%drive_frequency*v_slope(crank, :)
+      end select
+    end do
+  end subroutine differentiate_sensor
 
   !> The difference that a step of the parameter `k` makes.
   pure subroutine step_parameter(family, k, start, times, base, other, open, x_slope, v_slope, steady)

@@ -29,11 +29,22 @@ module variants
   !> A parameter smaller than this share of its natural size is stepped as if it had that size.
   real(wp), parameter :: smallest_share = 0.1_wp
 
+  !> What a parameter of the sensor is: its derivative follows from the samples and from those by the crank angle, and needs
+  !> no machine.
+  integer, parameter, public :: of_the_machine = 0, sensor_bias = 1, sensor_gain = 2, sensor_delay = 3
+  character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
+    'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
+
+  !> Laws that decide only what happens at the barriers.
+  character(len=*), parameter :: contact_tables(4) = [character(len=26) :: &
+    'contact', 'effect.restitution_slope', 'effect.compliant_contact', 'effect.second_barrier']
+
   !> A machine one parameter of which is a step away.
   type, public :: variant_t
     type(motion_t) :: moving
     !> Signed step of the parameter, SI; 0 where there is no such machine.
     real(wp) :: step = 0
+    integer :: role = of_the_machine
     !> Only what happens at the barriers differs, so a motion that reaches none is the same.
     logical :: contact_only = .false.
     !> It leaves the closed form that the machine itself has, as an effect of size 0 does: it is compared with the machine
@@ -93,6 +104,8 @@ contains
     family%least_speed = 10*sqrt(share)*plan%scales%length/plan%scales%time
     allocate (family%further(size(chosen)), family%back(size(chosen)))
     do i = 1, size(chosen)
+      family%further(i)%role = findloc(sensor_paths == chosen(i)%path, .true., dim=1)
+      if (family%further(i)%role /= of_the_machine) cycle
       call build_neighbours(plan, i, all_exact(family%moving), family%further(i), family%back(i), error)
       if (allocated(error)) return
       if (.not. family%further(i)%leaves_exact .or. allocated(family%adaptive)) cycle
@@ -162,7 +175,7 @@ contains
       call take_step(plan, which, sense, share_of(plan%options, .false.), .true., variant, error)
     end if
     associate (path => plan%chosen(which)%path)
-      variant%contact_only = index(path, 'contact.') == 1
+      variant%contact_only = any(contact_tables == path(:index(path, '.', back=.true.) - 1))
     end associate
   end subroutine build_variant
 

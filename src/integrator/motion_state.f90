@@ -38,6 +38,8 @@ module motion_state
   type, public :: state_t
     real(wp) :: x = 0, v = 0, time = 0
     integer :: mode = 0
+    !> Force of Dahl's friction against the body [N], where that is.
+    real(wp) :: z = 0
   end type state_t
 
   type, public :: options_t

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """libseparatrix from Python: the motion is the program's, its texts are cases, refusals say what is wrong."""
 
+import json
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.library import CaseError, Model, library_path
+from separatrix.library import CaseError, Model, effects, library_path
 
 TIMES = np.linspace(0.0, 0.3, 7)
 
@@ -145,6 +146,97 @@ def test_a_start_that_is_none_has_a_reason(model: Model) -> None:
     assert result.reason.tolist() == [65, 0, 65]
     assert result.steady.tolist() == [False, True, False]
     np.testing.assert_array_equal(np.isnan(result.x.reshape(3, -1)).all(axis=1), [True, False, True])
+
+
+def test_effects_are_those_of_the_program(separatrix: Path) -> None:
+    """Name, parameters, units and bounds as `separatrix laws --json` has them."""
+    text = subprocess.run([separatrix, "laws", "--json"], capture_output=True, text=True, check=True).stdout
+    listed = {row["law"]: row for row in json.loads(text) if row["family"] == "effect"}
+    found = effects()
+    assert found.keys() == listed.keys()
+    assert len(found) > 15
+    for name, effect in found.items():
+        assert effect.meaning == listed[name]["meaning"]
+        rows = {row["name"]: row for row in listed[name]["parameters"]}
+        assert effect.parameters.keys() == rows.keys()
+        for parameter, one in effect.parameters.items():
+            assert one.unit == rows[parameter]["unit"]
+            assert one.lower == (-np.inf if rows[parameter]["lower"] is None else rows[parameter]["lower"])
+            assert np.isnan(one.value) != rows[parameter]["optional"]
+
+
+EFFECTS = {
+    "viscous.damping": 0.3,
+    "coulomb.force": 0.2,
+    "quadratic_drag.coefficient": 0.1,
+    "static_excess.force": 0.5,
+    "asymmetric_friction.coulomb": 0.3,
+    "position_dependent_friction.slope": 0.4,
+    "cubic_spring.stiffness": 30.0,
+    "offset_force.force": 1.0,
+    "restitution_slope.slope": 0.02,
+    "second_barrier.position": -0.2,
+    "drive_ripple.sine": 0.05,
+    "sensor_bias.bias": 0.01,
+    "sensor_gain.gain": 0.02,
+    "sensor_delay.delay": 0.003,
+    "dahl.stiffness": 2000.0,
+    "compliant_contact.stiffness": 1e5,
+}
+
+
+def effect_may_be_zero(path: str) -> bool:
+    """A stiffness must be positive, and a barrier is somewhere."""
+    return path not in ("dahl.stiffness", "compliant_contact.stiffness", "second_barrier.position")
+
+
+@pytest.mark.parametrize("path", EFFECTS)
+def test_an_effect_has_a_derivative(path: str, separatrix: Path, tmp_path: Path) -> None:
+    """It is addressable, its derivative is that of another step, its text a case that moves the same."""
+    name, parameter = path.split(".")
+    value = EFFECTS[path]
+    model = Model.from_text(CASE + f"[effect.{name}]\n{parameter} = {value}\n")
+    key = f"effect.{path}"
+    assert model.parameters[key].value == value
+    starts = np.array([(0.5, 1.0, 0.3), (0.9, 4.0, 1.0), (0.6, -2.0, 4.0)])
+    result = fly(model, [key], [value], starts)
+    step = 1e-4 * value
+    sides = [fly(model, [key], [value + s * step], starts, derivatives=False, tolerance=1e-12) for s in (1, -1)]
+    expected = (sides[0].x - sides[1].x) / (2 * step)
+    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-9)
+    written = tmp_path / "case.toml"
+    written.write_text(model.to_text({key: 1.1 * value}))
+    subprocess.run([separatrix, "trajectory", "--validate", written], check=True, capture_output=True)
+    again = fly(Model.read(written), start=starts, derivatives=False)
+    np.testing.assert_array_equal(again.x, fly(model, [key], [1.1 * value], starts, derivatives=False).x)
+
+
+@pytest.mark.parametrize("path", [path for path in EFFECTS if effect_may_be_zero(path)])
+def test_an_effect_of_size_zero_has_a_derivative(path: str) -> None:
+    """A fit begins there. Many leave the closed form with the first step."""
+    name, parameter = path.split(".")
+    model = Model.from_text(CASE + f"[effect.{name}]\n{parameter} = 0\n")
+    starts = np.array([(0.5, 1.0, 0.3), (0.9, 4.0, 1.0), (0.6, -2.0, 4.0)])
+    result = fly(model, [f"effect.{path}", "drive.mean"], [0.0, 0.31055], starts)
+    assert result.steady.all()
+    step = 2e-4 * EFFECTS[path]
+    values = [fly(model, [f"effect.{path}"], [k * step], starts, derivatives=False, tolerance=1e-12).x for k in (1, 2)]
+    expected = (4 * values[0] - values[1] - 3 * result.x) / (2 * step)
+    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-7)
+    plain = fly(Model.from_text(CASE), ["drive.mean"], [0.31055], starts)
+    np.testing.assert_array_equal(result.jacobian[:, 1:], plain.jacobian)
+
+
+def test_a_sensor_shows_another_position(model: Model) -> None:
+    """Bias and gain change the record, a delay the time; the motion is the same."""
+    text = CASE + "[effect.sensor_bias]\nbias = 0.01\n[effect.sensor_gain]\ngain = 0.1\n"
+    seen, moved = fly(Model.from_text(text), derivatives=False), fly(model, derivatives=False)
+    np.testing.assert_allclose(seen.x, 1.1 * moved.x + 0.01, rtol=1e-15)
+    np.testing.assert_array_equal(seen.v, moved.v)
+    late = Model.from_text(CASE + "[effect.sensor_delay]\ndelay = 0.05\n")
+    before = [(0.5, 1.0, 0.3 - 0.05 * model.drive_frequency({}))]
+    expected = fly(model, start=before, derivatives=False).x
+    np.testing.assert_allclose(fly(late, derivatives=False).x, expected, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(
