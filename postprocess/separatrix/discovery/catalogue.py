@@ -35,12 +35,13 @@ class Effect:
     """One row of the catalogue. `starts` gives, per parameter, the sizes to start from; the first is the usual one.
 
     `linear`: the parameters that the residual is linear in near zero (both signs are tried where bounds allow);
-    the others shape the effect. `needs`: families or paths that the base machine must have.
+    `positive`: those that are fitted by their logarithm. `needs`: families or paths that the base machine must have.
     """
 
     name: str
     starts: Callable[[Scales], dict[str, list[float]]]
     linear: tuple[str, ...] = ()
+    positive: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     sensor: bool = False
     # effects that are the same motion, and when
@@ -51,6 +52,7 @@ class Effect:
         return [f"effect.{self.name}.{key}" for key in self.starts(scales)]
 
 
+_FAR = 300.0
 _SLIDING = "while the body slides, friction that differs with the direction by a constant is a constant force"
 _SHIFT = "where the position of the barrier is fitted, a shifted sensor is a constant force"
 
@@ -62,11 +64,13 @@ CATALOGUE: tuple[Effect, ...] = (
         "stribeck",
         lambda s: {"excess": [0.05 * s.force], "velocity": [0.15 * s.speed, 0.04 * s.speed, 0.5 * s.speed]},
         ("excess",),
+        ("velocity",),
     ),
     Effect("static_excess", lambda s: {"force": [0.05 * s.force]}, ("force",)),
     Effect(
         "dahl",
         lambda s: {"stiffness": [s.friction / (share * s.length) for share in (0.02, 0.005, 0.1)]},
+        positive=("stiffness",),
         needs=("friction",),
     ),
     Effect(
@@ -100,6 +104,7 @@ CATALOGUE: tuple[Effect, ...] = (
             "stiffness": [1.25 * s.mass * s.impact_speed**2 / (share * s.length) ** 2.5 for share in (0.03, 0.008, 0.1)],
             "damping": [0.6 / s.impact_speed],
         },
+        positive=("stiffness", "damping"),
         needs=("contact.restitution",),
     ),
     Effect("second_barrier", lambda s: {"position": [np.nan]}, needs=("contact.restitution",)),
@@ -160,11 +165,15 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
     for key, value in first.items():
         path = f"effect.{name}.{key}"
         lower, upper = bounds_of(extended.parameters[path])
-        added.append(Free(path, value, lower, upper, abs(value) or 1.0))
+        if key in effect.positive:
+            ends = np.log([min(sizes[key]) / _FAR, max(sizes[key]) * _FAR])
+            added.append(Free(path, float(np.log(value)), *ends, 0.1, positive=True))
+        else:
+            added.append(Free(path, value, lower, upper, abs(value) or 1.0))
     place = tuple(range(len(whole), len(whole) + len(added)))
     absent = None
     if effect.linear:
-        absent = np.array([0.0 if key in effect.linear else value for key, value in first.items()])
+        absent = np.array([0.0 if key in effect.linear else one.value for key, one in zip(first, added, strict=True)])
     return Candidate((*names, name), extended, whole + added, place, _starts(effect, sizes, added), absent)
 
 
@@ -173,7 +182,8 @@ def _starts(effect: Effect, sizes: dict[str, list[float]], added: list[Free]) ->
     choices = []
     for (key, values), one in zip(sizes.items(), added, strict=True):
         signs = (1.0, -1.0) if key in effect.linear and one.lower < 0 else (1.0,)
-        choices.append([sign * value for value in values for sign in signs])
+        fitted = np.log(values) if key in effect.positive else np.array(values)
+        choices.append([float(sign * value) for value in fitted for sign in signs])
     found = [np.array(values, float) for values in product(*choices)]
     # two linear parameters: one sign of each and the opposite is enough
     return found[:2] if len(effect.linear) == 2 else found

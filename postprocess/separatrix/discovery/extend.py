@@ -74,7 +74,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
 def machine_values(fitted: Fitted) -> dict[str, float]:
     """Values of the machine as fitted, with the drive at the ratio of the case."""
     values = {
-        one.path: float(value)
+        one.path: one.physical(value)
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
         if not one.is_nuisance
     }

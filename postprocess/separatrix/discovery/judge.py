@@ -99,7 +99,9 @@ def admissible(one: Judged) -> tuple[bool, str]:
     for i in one.fitted.added:
         if fit.at_bound[i]:
             continue
-        clear.append(abs(fit.values[i]) > 1.96 * errors[i] > 0)
+        # the logarithm of a number says by its error whether the number is known at all
+        size = 1.0 if free[i].positive else abs(fit.values[i])
+        clear.append(size > 1.96 * errors[i] > 0)
     if not clear:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):

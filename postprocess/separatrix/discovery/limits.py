@@ -50,7 +50,7 @@ def detectable(bench: Bench, found: Round) -> dict[str, dict]:
 def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
     """The size at which d' is what counts as visible, between the rungs of a ladder around the usual size."""
     place = made.added[0]
-    usual = made.free[place].value
+    usual = made.free[place].physical(made.free[place].value)
     if made.names[-1] == "second_barrier":
         depths = np.abs(bench.scales.highest - bench.scales.lowest) * 0.002 * _LADDER
         inward = 1 if usual < 0.5 * (bench.scales.highest + bench.scales.lowest) else -1
@@ -61,7 +61,7 @@ def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
     visible = []
     for rung in rungs:
         free = list(made.free)
-        free[place] = replace(free[place], value=float(rung))
+        free[place] = replace(free[place], value=float(np.log(rung) if free[place].positive else rung))
         shown = signature(found.base.problem, found.base.fit, replace(made, free=free))
         if shown is None:
             visible.append(0.0)

@@ -18,12 +18,16 @@ _FIXED = (
 _FIXED_ENDS = ("exponent", "harmonic", "tension")
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
+_NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
 _UNBOUNDED = 1e100
 
 
 @dataclass(frozen=True)
 class Free:
-    """One free number of a fit; `path` of the machine, or a nuisance (`nuisance:...`) of all records or of one."""
+    """One free number of a fit; `path` of the machine, or a nuisance (`nuisance:...`) of all records or of one.
+
+    A `positive` one is fitted by its logarithm, which `value`, `lower` and `upper` are of.
+    """
 
     path: str
     value: float
@@ -31,6 +35,15 @@ class Free:
     upper: float = np.inf
     size: float = 1.0
     record: int | None = None
+    positive: bool = False
+
+    def physical(self, value: float) -> float:
+        """The number itself, from what is fitted."""
+        return float(np.exp(value)) if self.positive else float(value)
+
+    def slope(self, value: float) -> float:
+        """Derivative of the number by what is fitted."""
+        return float(np.exp(value)) if self.positive else 1.0
 
     @property
     def is_nuisance(self) -> bool:
@@ -48,6 +61,8 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
         if abs(value) >= _UNBOUNDED:
             continue
         lower, upper = bounds_of(parameter)
+        if path.endswith(_NEVER_ZERO):
+            lower = max(lower, 1e-3 * value)
         free.append(Free(path, value, lower, upper, _size(path, value, model)))
     return free
 

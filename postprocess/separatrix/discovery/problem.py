@@ -9,6 +9,7 @@ import numpy as np
 from separatrix.discovery.machine import Free, drive_amplitudes
 from separatrix.discovery.preflight import Prepared
 from separatrix.discovery.segments import Segments
+from separatrix.errors import SeparatrixError
 
 _SCALE_STEP = 1e-5
 _CLOCK_STEP = 1e-6
@@ -101,7 +102,11 @@ class Problem:
             out.transition = np.zeros((count, length, 2, 2))
         for number, part in enumerate(self._parts):
             if part["rows"].size:
-                self._evaluate_record(number, part, values, starts, derivatives, out)
+                try:
+                    self._evaluate_record(number, part, values, starts, derivatives, out)
+                except SeparatrixError:
+                    # values that together make no machine
+                    out.failed[part["rows"]] = True
         out.residual = self.whitened(out.residual)
         if derivatives:
             out.by_start = self.whitened(out.by_start)
@@ -170,7 +175,9 @@ class Problem:
 
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
-        chosen = {one.path: float(value) for one, value in zip(self.free, values, strict=True) if not one.is_nuisance}
+        chosen = {
+            one.path: one.physical(value) for one, value in zip(self.free, values, strict=True) if not one.is_nuisance
+        }
         prepared = self.prepared[number]
         scale = prepared.drive_scale * self._nuisance("nuisance:drive_scale", number, values, 1.0)
         if scale != 1.0 or prepared.drive_scale != 1.0:
@@ -208,11 +215,11 @@ class Problem:
         for j, one in enumerate(self.free):
             if one.is_nuisance:
                 continue
-            chain[active.index(one.path), j] = 1
+            chain[active.index(one.path), j] = one.slope(values[j])
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):
-                chain[row, j] = self._ratio_slope(one, number, chosen)
+                chain[row, j] = self._ratio_slope(one, number, chosen) * one.slope(values[j])
         return active, given, chain
 
     def _ratio_slope(self, one: Free, number: int, chosen: dict[str, float]) -> float:

@@ -76,7 +76,10 @@ def _candidate(one: Judged) -> dict:
         "reduced_chi2": fit.reduced_chi2,
         "converged": fit.converged,
         "starts": one.fitted.tries,
-        "values": {path: fit.values[i] for path, i in zip(one.fitted.paths, one.fitted.added, strict=True)},
+        "values": {
+            one.fitted.problem.free[i].path: one.fitted.problem.free[i].physical(fit.values[i])
+            for i in one.fitted.added
+        },
     }
 
 
@@ -128,9 +131,9 @@ def _parameters(fitted: Fitted) -> dict:
             continue
         parameter = fitted.model.parameters.get(one.path)
         found[one.path] = {
-            "value": float(value),
-            "standard_error": float(error),
-            "interval_95": [float(value - 1.96 * error), float(value + 1.96 * error)],
+            "value": one.physical(value),
+            "standard_error": one.slope(value) * float(error),
+            "interval_95": [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)],
             "unit": parameter.unit if parameter else "1",
         }
     return found
