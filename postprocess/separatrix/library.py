@@ -139,16 +139,18 @@ class Model:
         (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are
         at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that
         of the adaptive flight.
+
+        `force` = (time of each segment's start since the first sample [s], interval [s], samples [N]) takes the
+        place of the measured force of the case; the crank angles of `start` then are not looked at.
         """
         for path in active:
             if active.count(path) > 1:
                 raise CaseError(f"active: found '{path}' twice")
-        if force is not None:
-            raise CaseError('force: given, allowed with drive.law = "measured_force"')
         chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
         start = np.asarray(start, float)
         start = _array(start, (len(start), 3), "start")
         count = len(start)
+        start, interval, series = _with_force(start, force)
         first = np.ascontiguousarray(first, np.int32)
         if first.shape != (count + 1,):
             raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
@@ -167,6 +169,9 @@ class Model:
                 *chosen,
                 count,
                 *(_pointer(array) for array in (start, first, times)),
+                len(series),
+                ctypes.c_double(interval),
+                _pointer(series),
                 int(derivatives),
                 ctypes.c_double(tolerance),
                 *(_pointer(array) for array in (x, v, *slopes, *report)),
@@ -273,6 +278,21 @@ def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
     if array.shape != shape:
         raise CaseError(f"{name}: found shape {array.shape}, allowed {shape}")
     return array
+
+
+def _with_force(
+    start: np.ndarray, force: tuple[np.ndarray, float, np.ndarray] | None
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return starts whose crank angle is the place in the record of the force, its interval and its samples."""
+    if force is None:
+        return start, 0.0, np.empty(0)
+    first, interval, series = force
+    series = _array(series, (len(series),), "force")
+    first = _array(first, (len(start),), "force: first times")
+    duration = (len(series) - 1) * interval
+    if not (duration > 0 and (first >= 0).all() and (first <= duration).all()):
+        raise CaseError(f"force: first times from {first.min()} to {first.max()} s, allowed 0 to {duration} s")
+    return np.column_stack([start[:, :2], 2 * np.pi * first / duration]), float(interval), series
 
 
 def _pointer(array: np.ndarray | None) -> ctypes.c_void_p | None:
