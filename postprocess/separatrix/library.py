@@ -40,7 +40,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """A law of the family `effect`, its parameters by name; `value` is the default, NaN where one must be given."""
+    """A law of the family `effect`, its parameters; `value` is the default, NaN where it must be given."""
 
     name: str
     meaning: str
@@ -135,13 +135,13 @@ class Model:
     ) -> Segments:
         """Fly many segments, each from its own start, and sample them.
 
-        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start` is
-        (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are
-        at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that
-        of the adaptive flight.
+        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start`
+        is (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of
+        segment i are at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
+        `tolerance` is that of the adaptive flight.
 
-        `force` = (time of each segment's start since the first sample [s], interval [s], samples [N]) takes the
-        place of the measured force of the case; the crank angles of `start` then are not looked at.
+        `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
+        takes the place of the measured force of the case; the crank angles of `start` are not looked at.
         """
         for path in active:
             if active.count(path) > 1:
@@ -283,7 +283,7 @@ def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
 def _with_force(
     start: np.ndarray, force: tuple[np.ndarray, float, np.ndarray] | None
 ) -> tuple[np.ndarray, float, np.ndarray]:
-    """Return starts whose crank angle is the place in the record of the force, its interval and its samples."""
+    """Return starts whose crank angle is the place in the force, its interval and its samples."""
     if force is None:
         return start, 0.0, np.empty(0)
     first, interval, series = force
@@ -291,7 +291,9 @@ def _with_force(
     first = _array(first, (len(start),), "force: first times")
     duration = (len(series) - 1) * interval
     if not (duration > 0 and (first >= 0).all() and (first <= duration).all()):
-        raise CaseError(f"force: first times from {first.min()} to {first.max()} s, allowed 0 to {duration} s")
+        raise CaseError(
+            f"force: first times from {first.min()} to {first.max()} s, allowed 0 to {duration} s"
+        )
     return np.column_stack([start[:, :2], 2 * np.pi * first / duration]), float(interval), series
 
 

@@ -201,9 +201,13 @@ def test_an_effect_has_a_derivative(path: str, separatrix: Path, tmp_path: Path)
     starts = np.array([(0.5, 1.0, 0.3), (0.9, 4.0, 1.0), (0.6, -2.0, 4.0)])
     result = fly(model, [key], [value], starts)
     step = 1e-4 * value
-    sides = [fly(model, [key], [value + s * step], starts, derivatives=False, tolerance=1e-12) for s in (1, -1)]
+    sides = [
+        fly(model, [key], [value + s * step], starts, derivatives=False, tolerance=1e-12) for s in (1, -1)
+    ]
     expected = (sides[0].x - sides[1].x) / (2 * step)
-    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-9)
+    np.testing.assert_allclose(
+        result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-9
+    )
     written = tmp_path / "case.toml"
     written.write_text(model.to_text({key: 1.1 * value}))
     subprocess.run([separatrix, "trajectory", "--validate", written], check=True, capture_output=True)
@@ -220,9 +224,14 @@ def test_an_effect_of_size_zero_has_a_derivative(path: str) -> None:
     result = fly(model, [f"effect.{path}", "drive.mean"], [0.0, 0.31055], starts)
     assert result.steady.all()
     step = 2e-4 * EFFECTS[path]
-    values = [fly(model, [f"effect.{path}"], [k * step], starts, derivatives=False, tolerance=1e-12).x for k in (1, 2)]
+    values = [
+        fly(model, [f"effect.{path}"], [k * step], starts, derivatives=False, tolerance=1e-12).x
+        for k in (1, 2)
+    ]
     expected = (4 * values[0] - values[1] - 3 * result.x) / (2 * step)
-    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-7)
+    np.testing.assert_allclose(
+        result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-7
+    )
     plain = fly(Model.from_text(CASE), ["drive.mean"], [0.31055], starts)
     np.testing.assert_array_equal(result.jacobian[:, 1:], plain.jacobian)
 
@@ -283,6 +292,16 @@ def test_a_bad_call_says_what_is_wrong(model: Model, options: dict, expected: st
     """What was found and what is allowed."""
     with pytest.raises(CaseError, match=expected):
         fly(model, **options)
+
+
+def test_the_example_of_the_page_runs(source_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """docs/library.md shows what works."""
+    monkeypatch.chdir(source_dir)
+    page = (source_dir / "docs" / "library.md").read_text()
+    names: dict = {}
+    exec(page.split("```python\n")[1].split("```")[0], names)
+    assert names["result"].x.shape == (100,)
+    assert names["result"].jacobian.shape == (100, 5)
 
 
 def test_a_pair_is_refused(source_dir: Path) -> None:
