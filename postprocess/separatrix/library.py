@@ -150,11 +150,11 @@ class Model:
         start = np.asarray(start, float)
         start = _array(start, (len(start), 3), "start")
         count = len(start)
-        start, interval, series = _with_force(start, force)
         first = np.ascontiguousarray(first, np.int32)
         if first.shape != (count + 1,):
             raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
         times = _array(times, (int(first[-1]),), "times")
+        start, interval, series = _with_force(start, first, times, force)
         m, columns = len(times), len(active) + 3
         x, v = np.empty(m), np.empty(m)
         slopes = [np.empty((m, columns)) for _ in range(2)] if derivatives else [None, None]
@@ -281,20 +281,25 @@ def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
 
 
 def _with_force(
-    start: np.ndarray, force: tuple[np.ndarray, float, np.ndarray] | None
+    start: np.ndarray,
+    first: np.ndarray,
+    times: np.ndarray,
+    force: tuple[np.ndarray, float, np.ndarray] | None,
 ) -> tuple[np.ndarray, float, np.ndarray]:
     """Return starts whose crank angle is the place in the force, its interval and its samples."""
     if force is None:
         return start, 0.0, np.empty(0)
-    first, interval, series = force
+    begins, interval, series = force
     series = _array(series, (len(series),), "force")
-    first = _array(first, (len(start),), "force: first times")
+    begins = _array(begins, (len(start),), "force: begin of each segment")
     duration = (len(series) - 1) * interval
-    if not (duration > 0 and (first >= 0).all() and (first <= duration).all()):
-        raise CaseError(
-            f"force: first times from {first.min()} to {first.max()} s, allowed 0 to {duration} s"
-        )
-    return np.column_stack([start[:, :2], 2 * np.pi * first / duration]), float(interval), series
+    last_sample = np.minimum(first[1:], len(times)) - 1
+    ends = begins + np.where(np.diff(first) > 0, times[last_sample], 0.0) if len(times) else begins
+    lowest, highest = begins.min(initial=0.0), ends.max(initial=0.0)
+    if not (duration > 0 and lowest >= 0 and highest <= duration * (1 + 1e-9)):
+        raise CaseError(f"force: segments from {lowest} to {highest} s, allowed 0 to {duration} s")
+    angle = 2 * np.pi * begins / duration
+    return np.column_stack([start[:, :2], angle]), float(interval), series
 
 
 def _pointer(array: np.ndarray | None) -> ctypes.c_void_p | None:
