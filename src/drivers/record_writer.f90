@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A motion as a sensor would have measured it: sampled, delayed, off by gain and bias, noisy, quantised; a table that looks like a record.
+!> A motion as a sensor would have measured it: delayed, sampled, scaled, noisy, quantised; a table that looks like a record.
 module record_writer
   use case_type, only: case_t, record_t
   use constants, only: two_pi
