@@ -208,9 +208,9 @@ contains
       do i = 7, 1, -1
         p(0) = p(0) + nested(k, i)
         if (modulo(i, 2) == 1) then
-          p = eoshift(p, -1)
+          p = [0.0_wp, p(:degree - 1)]
         else
-          p = p - eoshift(p, -1)
+          p = p - [0.0_wp, p(:degree - 1)]
         end if
       end do
       path(:, k) = p
@@ -300,7 +300,7 @@ contains
       tally%v_max = max(tally%v_max, y(2), maximum_until(path(:, 2), fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, gauss_points
+    do k = 1, merge(gauss_points, 0, log%book%kept)
       t = fraction*gauss_place(k)
       call book_instant(machine, slip%memory, state%time + t*h, value_at(path(:, 1), t), value_at(path(:, 2), t), &
                         fraction*h*gauss_weight(k), log%book)

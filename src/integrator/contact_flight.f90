@@ -200,7 +200,7 @@ contains
       tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, gauss_points
+    do k = 1, merge(gauss_points, 0, log%book%kept)
       t = march%fraction*gauss_place(k)
       call book_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
                         pressed%surface + pressed%side*value_at(march%path(:, 1), t), &

@@ -53,6 +53,7 @@ contains
     real(wp), intent(in) :: time, x, v, weight
     type(book_t), intent(inout) :: book
     real(wp) :: foot, rate, stretch, measured, losses(2)
+    if (.not. book%kept) return
     call foot_motion(machine%drive, machine%drive_frequency*time, foot, rate)
     associate (law => machine%friction)
       book%friction = book%friction + weight*(law%kinetic + stribeck_excess(law, abs(v)))*abs(v)
@@ -85,6 +86,7 @@ contains
     type(slip_memory_t) :: slip
     real(wp) :: piece, elapsed
     integer :: pieces, i, k
+    if (.not. book%kept) return
     slip = slip_memory_t(direction=direction, x=start%x)
     call begin_segment(flow, start%time, start%x, start%v, direction, segment)
     pieces = ceiling((time_end - start%time)*max(flow%natural, flow%harmonics*flow%drive_frequency)/longest_piece)
@@ -104,6 +106,7 @@ contains
     type(state_t), intent(in) :: before, now
     type(book_t), intent(inout) :: book
     type(state_t) :: rest
+    if (.not. book%kept) return
     rest = before
     rest%v = 0
     book%work = book%work - energy_of_body(machine, rest)

@@ -133,7 +133,7 @@ contains
     call append_word(tally, word_period)
     if (present(log)) then
       log%origin = log%origin + moving%machine%period
-      log%next_sample = 0
+      if (.not. allocated(log%instants)) log%next_sample = 0
     end if
   end subroutine advance_period
 

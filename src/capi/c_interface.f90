@@ -1,0 +1,192 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The functions of include/separatrix.h, which says what they do, but for the one of `c_segments`. Nothing is kept between
+!> calls but what a handle holds.
+module c_interface
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
+  use build_motion, only: machine_of
+  use c_text, only: answer, from_c, to_c
+  use errors, only: error_t, fail
+  use kinds, only: wp
+  use law_table, only: effect_family, find_law, law_choice_t, law_rows => laws, parameters
+  use model_type, only: check_values, find_parameter, model_from_text, model_options, model_t, read_model, text_with
+  use motion, only: motion_t
+  use parameter_list, only: put_values
+  use status, only: exit_usage
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: separatrix_model_read, separatrix_model_from_text, separatrix_model_free, separatrix_parameter_count, &
+    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_model_text, separatrix_effect_parameter
+
+contains
+
+  integer(c_int) function separatrix_model_read(path, model, message, message_size) bind(c) result(code)
+    character(kind=c_char), intent(in) :: path(*)
+    type(c_ptr), intent(out) :: model
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: new
+    type(error_t), allocatable :: error
+    allocate (new)
+    call read_model(from_c(path), new, error)
+    call hand_out(new, model, error)
+    code = answer(error, message, message_size)
+  end function separatrix_model_read
+
+  integer(c_int) function separatrix_model_from_text(text, directory, model, message, message_size) bind(c) result(code)
+    character(kind=c_char), intent(in) :: text(*), directory(*)
+    type(c_ptr), intent(out) :: model
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: new
+    type(error_t), allocatable :: error
+    allocate (new)
+    call model_from_text(from_c(text), from_c(directory), new, error)
+    call hand_out(new, model, error)
+    code = answer(error, message, message_size)
+  end function separatrix_model_from_text
+
+  subroutine hand_out(new, model, error)
+    type(model_t), pointer, intent(inout) :: new
+    type(c_ptr), intent(out) :: model
+    type(error_t), allocatable, intent(in) :: error
+    model = c_null_ptr
+    if (allocated(error)) then
+      deallocate (new)
+    else
+      model = c_loc(new)
+    end if
+  end subroutine hand_out
+
+  subroutine separatrix_model_free(model) bind(c)
+    type(c_ptr), value :: model
+    type(model_t), pointer :: old
+    if (.not. c_associated(model)) return
+    call c_f_pointer(model, old)
+    deallocate (old)
+  end subroutine separatrix_model_free
+
+  integer(c_int) function separatrix_parameter_count(model) bind(c) result(count)
+    type(c_ptr), value :: model
+    type(model_t), pointer :: self
+    call c_f_pointer(model, self)
+    count = size(self%parameters)
+  end function separatrix_parameter_count
+
+  integer(c_int) function separatrix_parameter(model, index, path, path_size, unit, unit_size, numbers, message, &
+      message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    integer(c_int), value :: index
+    character(kind=c_char), intent(inout) :: path(*), unit(*), message(*)
+    integer(c_size_t), value :: path_size, unit_size, message_size
+    real(c_double), intent(out) :: numbers(3)
+    type(model_t), pointer :: self
+    type(error_t), allocatable :: error
+    call c_f_pointer(model, self)
+    numbers = 0
+    if (index < 0 .or. index >= size(self%parameters)) then
+      call fail(error, exit_usage, 'parameter index: found '//to_text(int(index))//', allowed 0 to '// &
+                to_text(size(self%parameters) - 1))
+    else
+      associate (one => self%parameters(index + 1))
+        call to_c(trim(one%path), path, path_size)
+        call to_c(trim(one%unit), unit, unit_size)
+        numbers = [one%value, one%lower, one%upper]
+      end associate
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_parameter
+
+  integer(c_int) function separatrix_find_parameter(model, path, index, message, message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    character(kind=c_char), intent(in) :: path(*)
+    integer(c_int), intent(out) :: index
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: self
+    type(error_t), allocatable :: error
+    integer :: position
+    call c_f_pointer(model, self)
+    call find_parameter(self, from_c(path), position, error)
+    index = position - 1
+    code = answer(error, message, message_size)
+  end function separatrix_find_parameter
+
+  integer(c_int) function separatrix_drive_frequency(model, chosen_count, chosen, values, frequency, message, &
+      message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    integer(c_int), value :: chosen_count
+    integer(c_int), intent(in) :: chosen(chosen_count)
+    real(c_double), intent(in) :: values(chosen_count)
+    real(c_double), intent(out) :: frequency
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: self
+    type(error_t), allocatable :: error
+    type(motion_t) :: moving
+    type(law_choice_t), allocatable :: laws(:)
+    call c_f_pointer(model, self)
+    frequency = 0
+    call check_values(self, chosen + 1, values, error)
+    if (.not. allocated(error)) then
+      laws = self%the_case%laws
+      call put_values(laws, self%parameters(chosen + 1), values)
+      call machine_of(laws, model_options(self, self%the_case%integrator%tolerance), moving, error)
+    end if
+    if (.not. allocated(error)) frequency = moving%machine%drive_frequency
+    code = answer(error, message, message_size)
+  end function separatrix_drive_frequency
+
+  integer(c_int) function separatrix_model_text(model, chosen_count, chosen, values, text, text_size, length, message, &
+      message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    integer(c_int), value :: chosen_count
+    integer(c_int), intent(in) :: chosen(chosen_count)
+    real(c_double), intent(in) :: values(chosen_count)
+    character(kind=c_char), intent(inout) :: text(*), message(*)
+    integer(c_size_t), value :: text_size, message_size
+    integer(c_size_t), intent(out) :: length
+    type(model_t), pointer :: self
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: written
+    call c_f_pointer(model, self)
+    length = 0
+    call check_values(self, chosen + 1, values, error)
+    if (.not. allocated(error)) call text_with(self, chosen + 1, values, written, error)
+    if (.not. allocated(error)) then
+      length = len(written, c_size_t)
+      call to_c(written, text, text_size)
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_model_text
+
+  integer(c_int) function separatrix_effect_parameter(index, effect, effect_size, meaning, meaning_size, parameter, &
+      parameter_size, unit, unit_size, numbers, message, message_size) bind(c) result(code)
+    integer(c_int), value :: index
+    character(kind=c_char), intent(inout) :: effect(*), meaning(*), parameter(*), unit(*), message(*)
+    integer(c_size_t), value :: effect_size, meaning_size, parameter_size, unit_size, message_size
+    real(c_double), intent(out) :: numbers(4)
+    type(error_t), allocatable :: error
+    integer, allocatable :: rows(:)
+    integer :: i
+    numbers = 0
+    rows = pack([(i, i=1, size(parameters))], parameters%family == effect_family)
+    if (index < 0 .or. index >= size(rows)) then
+      call fail(error, exit_usage, 'row of the effects: found '//to_text(int(index))//', allowed 0 to '// &
+                to_text(size(rows) - 1))
+    else
+      associate (row => parameters(rows(index + 1)))
+        call to_c(trim(row%law), effect, effect_size)
+        call to_c(trim(law_rows(find_law(effect_family, trim(row%law)))%meaning), meaning, meaning_size)
+        call to_c(trim(row%name), parameter, parameter_size)
+        call to_c(trim(row%unit), unit, unit_size)
+        numbers = [row%default, row%lower, row%upper, merge(1.0_wp, 0.0_wp, row%optional)]
+      end associate
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_effect_parameter
+
+end module c_interface
