@@ -11,7 +11,7 @@ module bindings
   public :: c_crashed, c_fork, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
     c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
-    c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
+    c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, &
     c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
@@ -137,6 +137,11 @@ module bindings
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: name(*), value(*)
     end function c_default_environment
+
+    integer(c_int) function c_set_environment(name, value) bind(c, name='separatrix_set_environment')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: name(*), value(*)
+    end function c_set_environment
 
     subroutine c_sleep_microseconds(microseconds) bind(c, name='separatrix_sleep_microseconds')
       import :: c_int
