@@ -156,8 +156,11 @@ contains
     logical, intent(in) :: searched(:)
     real(wp), allocatable :: packed(:)
     integer :: slice, i, position
-    allocate (packed(sum([(merge(2 + packed_size*size(catalogues(slice)%attractors), 0, searched(slice)), &
-                           slice=1, size(catalogues))])))
+    position = 0
+    do slice = 1, size(catalogues)
+      if (searched(slice)) position = position + 2 + packed_size*size(catalogues(slice)%attractors)
+    end do
+    allocate (packed(position))
     position = 0
     do slice = 1, size(catalogues)
       if (.not. searched(slice)) cycle

@@ -6,7 +6,7 @@ module command_line
   use errors, only: error_t, fail
   use kinds, only: wp
   use status, only: exit_usage
-  use text, only: join, starts_with
+  use text, only: join, read_number, starts_with
   implicit none
   private
 
@@ -71,7 +71,7 @@ contains
         command%path = argument
       else if (command%name == 'merge') then
         padded = argument
-        command%shards = [command%shards, padded]
+        command%shards = [character(len=longest_argument) :: command%shards, padded]
       else
         call fail(error, exit_usage, "unexpected argument '"//argument//"' after '"//command%path//"'")
       end if
@@ -199,11 +199,11 @@ contains
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
-      command%overrides = [command%overrides, padded]
+      command%overrides = [character(len=longest_argument) :: command%overrides, padded]
     case ('--shard')
       call read_shard(value, command, error)
     case ('--time-limit')
-      call read_number(name, value, command%time_limit, error)
+      call read_seconds(name, value, command%time_limit, error)
     case ('--ranks-per-node')
       call read_integer(name, value, 1, command%ranks_per_node, error)
     case ('--sample')
@@ -248,18 +248,18 @@ contains
     end select
   end subroutine take_path
 
-  subroutine read_number(name, value, number, error)
+  subroutine read_seconds(name, value, number, error)
     character(len=*), intent(in) :: name, value
     real(wp), intent(out) :: number
     type(error_t), allocatable, intent(out) :: error
     integer :: status
     number = 0
     status = verify(value, '0123456789.eE+-')
-    if (status == 0) read (value, *, iostat=status) number
+    if (status == 0) call read_number(value, number, status)
     if (status /= 0 .or. .not. number > 0 .or. number > huge(number)) then
       call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of seconds above 0")
     end if
-  end subroutine read_number
+  end subroutine read_seconds
 
   subroutine read_integer(name, value, least, number, error)
     character(len=*), intent(in) :: name, value
