@@ -253,13 +253,27 @@ contains
     call look_up(source, path, required, at)
     if (at == 0) return
     associate (entry => source%entries(at)%entry)
-      if (entry%kind == toml_string) then
-        value = entry%string
-      else
+      if (entry%kind /= toml_string) then
         call report(source, path, 'found '//description(entry)//', allowed a text in quotes')
+      else if (has_control_characters(entry%string)) then
+        call report(source, path, 'found a control character, allowed a text without')
+      else
+        value = entry%string
       end if
     end associate
   end subroutine take_text
+
+  !> Whether a text would end early in the file or spoil a terminal; tabs and ends of lines do neither.
+  pure logical function has_control_characters(string)
+    character(len=*), intent(in) :: string
+    integer :: i
+    has_control_characters = .true.
+    do i = 1, len(string)
+      if (any(iachar(string(i:i)) == [9, 10, 13])) cycle
+      if (iachar(string(i:i)) < 32 .or. iachar(string(i:i)) == 127) return
+    end do
+    has_control_characters = .false.
+  end function has_control_characters
 
   !> One of a few words, blank-padded.
   subroutine take_choice(source, path, words, value)

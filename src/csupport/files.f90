@@ -71,9 +71,14 @@ contains
     integer, intent(out) :: lock
     type(error_t), allocatable, intent(out) :: error
     integer(c_int) :: descriptor
-    if (c_take_lock(path//c_null_char, descriptor) /= 0) call fail(error, exit_cannot_create, &
-      "another run is at work on this file; it has the lock '"//path//"'")
+    integer(c_int) :: number
+    number = c_take_lock(path//c_null_char, descriptor)
     lock = descriptor
+    if (number < 0) then
+      call fail(error, exit_cannot_create, "another run is at work on this file; it has the lock '"//path//"'")
+    else
+      call test(number, exit_cannot_create, 'cannot create', path, error)
+    end if
   end subroutine take_lock
 
   !> Removes the file of a lock; does nothing for -1.

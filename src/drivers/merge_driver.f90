@@ -14,7 +14,7 @@ module merge_driver
   use points_driver, only: describe_list, end_points, list_work_t, points_per_tile, read_list
   use serial_team, only: serial_team_t
   use session, only: session_t
-  use share_files, only: join_shares, read_shares, shares_t
+  use share_files, only: join_shares, note_builds, read_shares, shares_t
   use signals, only: install_signals
   use status, only: exit_io, exit_usage
   implicit none
@@ -69,6 +69,8 @@ contains
     call session%stop_if(error)
     call session%begin(session%command%path, tiled=.true.)
     call describe_basin(session, work, schema, dimensions)
+    call note_builds(session, shares, schema, error)
+    call session%stop_if(error)
     call join_shares(session, shares, session%command%path, schema, dimensions, tile, work, file)
     call end_basin(session, work, file, complete=.true.)
   end subroutine merge_map
@@ -84,6 +86,8 @@ contains
     call session%stop_if(error)
     call session%begin(session%command%path, tiled=.true.)
     call describe_list(session, work%list, schema)
+    call note_builds(session, shares, schema, error)
+    call session%stop_if(error)
     call join_shares(session, shares, session%command%path, schema, ['point'], [points_per_tile], work, file)
     call end_points(session, work, file, complete=.true.)
   end subroutine merge_list

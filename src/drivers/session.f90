@@ -15,7 +15,7 @@ module session
   use journal, only: journal_t
   use launcher, only: launched_ranks
   use map_schema, only: schema_t
-  use output_check, only: check_create, check_result, check_resume, check_table
+  use output_check, only: check_create, check_result, check_resume, check_table, working_path
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
   use serial_team, only: serial_team_t
@@ -88,7 +88,7 @@ contains
     type(error_t), allocatable :: error
     if (self%team%is_root()) then
       call check_outputs(self%command, path, tiled, error)
-      self%lock_path = path//'.lock'
+      self%lock_path = working_path(path)//'.lock'
       if (tiled .and. .not. allocated(error)) call take_lock(self%lock_path, self%lock, error)
     end if
     call self%stop_if(error)

@@ -10,6 +10,7 @@ module share_files
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t
   use point_work, only: point_work_t
+  use resumption, only: builder_of, read_builder
   use session, only: session_t
   use shard, only: catalogue_dataset, describe_shard, in_shard
   use status, only: exit_bad_case, exit_io, exit_no_input, exit_other_case, exit_resumable
@@ -18,7 +19,7 @@ module share_files
   implicit none
   private
 
-  public :: read_shares, join_shares, read_catalogue
+  public :: read_shares, note_builds, join_shares, read_catalogue
 
   !> What is known of the shares before their tiles are read.
   type, public :: shares_t
@@ -76,7 +77,7 @@ contains
     type(error_t), allocatable :: ignored
     type(reader_t) :: reader
     real(wp), allocatable :: catalogue(:)
-    character(len=:), allocatable :: kind
+    character(len=:), allocatable :: kind, made_by
     real(wp) :: values(2)
     number = 0
     count = 0
@@ -90,6 +91,7 @@ contains
       call fail(error, exit_bad_case, "'"//path//"' is no share of a map: basin --shard I/N writes them")
     end if
     if (.not. allocated(error)) call reader%text_attribute('/', 'kind', kind, error)
+    if (.not. allocated(error)) call reader%text_attribute('/provenance', 'version', made_by, error)
     allocate (catalogue(0))
     if (.not. allocated(error)) then
       if (kind == 'basin') call reader%read_values(catalogue_dataset, catalogue, error)
@@ -108,7 +110,9 @@ contains
     end if
     number = nint(values(1))
     count = nint(values(2))
-    if (kind /= shares%kind) then
+    if (made_by /= version) then
+      call fail(error, exit_other_case, "'"//path//"' was made by version "//made_by//', this is '//version)
+    else if (kind /= shares%kind) then
       call fail(error, exit_other_case, "'"//path//"' belongs to another case: it was made by "//kind//', the first share by '// &
                 shares%kind)
     else if (.not. same(catalogue, shares%catalogue)) then
@@ -149,6 +153,30 @@ contains
     call reader%close(ignored)
   end subroutine read_catalogue
 
+  !> Names the builds other than this one that made shares, in the log and in the file.
+  subroutine note_builds(session, shares, schema, error)
+    type(session_t), intent(inout) :: session
+    type(shares_t), intent(in) :: shares
+    type(schema_t), intent(inout) :: schema
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: ignored
+    type(reader_t) :: reader
+    character(len=:), allocatable :: builder, builders
+    integer :: i
+    builders = ''
+    do i = 1, shares%count
+      call open_final(trim(shares%files(i)), reader, error)
+      if (allocated(error)) return
+      call read_builder(reader, builder, error)
+      call reader%close(ignored)
+      if (allocated(error)) return
+      if (builder == builder_of(session) .or. index(builders, builder) > 0) cycle
+      builders = builders//builder//new_line('a')
+      call session%journal%line('build', "'"//trim(shares%files(i))//"' was made by another build: "//builder)
+    end do
+    if (len(builders) > 0) call schema%add_attribute('provenance', 'other_builds', builders(:len(builders) - 1))
+  end subroutine note_builds
+
   !> Copies the tiles of the shares into the new working file of `path`, counted by `work`. Ends the program on errors.
   subroutine join_shares(session, shares, path, schema, grid, tile, work, file)
     type(session_t), intent(inout) :: session
@@ -170,7 +198,7 @@ contains
     call session%stop_if(error)
   end subroutine join_shares
 
-  !> Opens the shares as if to resume them, which checks case, layout and every tile.
+  !> Opens the shares, only to be read, which checks case, layout and every tile.
   subroutine open_parts(shares, session, schema, grid, tile, parts, error)
     type(shares_t), intent(in) :: shares
     type(session_t), intent(in) :: session
@@ -195,7 +223,8 @@ contains
       else
         call describe_shard(i, shares%count, of_share)
       end if
-      call open_working(path(:len(path) - len('.part')), of_share, grid, int(tile, int64), session%team, parts(i), error)
+      call open_working(path(:len(path) - len('.part')), of_share, grid, int(tile, int64), session%team, parts(i), error, &
+                        only_read=.true.)
       if (allocated(error)) return
       left = count([(in_shard(k, i, shares%count) .and. .not. parts(i)%tile_done(k), k=1, parts(i)%tile_count())])
       if (left == 0) cycle
