@@ -97,6 +97,7 @@ contains
     call ieee_set_halting_mode(ieee_usual, .false.)
     value = 0
     read (text, *, iostat=status) value
+    if (status /= 0) value = 0
     ! With a flag up the return to the halting mode of before would stop the program.
     call ieee_set_flag(ieee_usual, .false.)
   end subroutine read_number

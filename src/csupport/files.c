@@ -120,7 +120,8 @@ int separatrix_take_lock(const char *path, int *descriptor) {
       return errno;
     const int status = flock(*descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     /* The one who had it may have removed the file meanwhile. */
-    if (status == 0 && fstat(*descriptor, &held) == 0 && stat(path, &named) == 0 && held.st_ino == named.st_ino)
+    if (status == 0 && fstat(*descriptor, &held) == 0 && stat(path, &named) == 0 &&
+        held.st_ino == named.st_ino)
       return 0;
     if (status != 0 && status != EWOULDBLOCK)
       unlink(path);

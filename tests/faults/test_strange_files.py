@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files where none can be, names that are odd, two runs at one file: told before any work, and nothing is spoilt."""
+"""Files where none can be, odd names, two runs at one file: told before any work, and nothing is spoilt."""
 
 import os
 import shutil
@@ -14,7 +14,8 @@ import life
 import pytest
 from program import listing
 
-QUICK = ["basin", "case.toml", "--set", "axis[1].count=6", "--set", "axis[2].count=8", "--set", "attractors.sample=4"]
+SMALL = ["--set", "axis[1].count=6", "--set", "axis[2].count=8", "--set", "attractors.sample=4"]
+QUICK = ["basin", "case.toml", *SMALL]
 
 
 @pytest.fixture
@@ -77,7 +78,7 @@ def test_a_folder_that_is_not_there(separatrix, folder):
 
 
 def test_blanks_quotes_and_letters_of_all_alphabets(mpi_separatrix, folder):
-    place = folder / 'a b ü\'"$x;#漢'
+    place = folder / "a b ü'\"$x;#漢"
     place.mkdir()
     shutil.move(folder / "case.toml", place / "ça se.toml")
     asked = ["basin", "ça se.toml", *QUICK[2:], "-o", "out put é.h5", "--log", "lo g.jsonl"]
