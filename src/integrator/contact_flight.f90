@@ -5,7 +5,7 @@
 !> stiffness: until the velocity falls to zero, the body leaves the barrier, or the time is over. Where the force
 !> formula would pull and may not, the force is nil; the surface counts as recovered as soon as it would push again.
 module contact_flight
-  use contact_law, only: contact_force, contact_margin, contact_t
+  use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
@@ -16,12 +16,12 @@ module contact_flight
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, sample_due, &
     sample_time, state_t, tally_t
   use oscillator, only: oscillator_t
-  use polynomial, only: maximum_until, value_at
+  use polynomial, only: degree, maximum_until, value_at
   use restoring_law, only: restoring_force
   implicit none
   private
 
-  public :: contact_side, fly_contact
+  public :: contact_side, fly_contact, raise_peak_force
 
   !> Guards: velocity zero, end of contact, change between pushing and not.
   integer, parameter :: turning = 1, leaving = 2, cut = 3
@@ -70,12 +70,13 @@ contains
     real(wp) :: y(3), scale(3), duration, time
     integer :: fallen
     pressed%machine = machine
+    pressed%machine%contact = contact_at_speed(machine%contact, state%touch_speed)
     pressed%side = side
     pressed%start = state%time
     pressed%surface = merge(machine%contact%soft_upper, machine%contact%soft_lower, side > 0)
     pressed%direction = merge(1, -1, state%mode == mode_slip_plus)
     y = [side*(state%x - pressed%surface), side*state%v, 0.0_wp]
-    pressed%pushing = machine%contact%tension .or. margin_at(machine%contact, y) >= 0
+    pressed%pushing = pressed%machine%contact%tension .or. margin_at(pressed%machine%contact, y) >= 0
     call sizes_of(pressed, y, scale, duration)
     guards = guards_of(pressed)
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
@@ -198,7 +199,8 @@ contains
                         pressed%side*value_at(march%path(:, 2), t), march%fraction*march%length*gauss_weight(k), log%book)
     end do
     log%peak_penetration = max(log%peak_penetration, march%y(1))
-    if (pressed%pushing) call raise_peak_force(march, pressed%machine%contact, log%peak_force)
+    if (pressed%pushing) call raise_peak_force(march%path(:, 1), march%path(:, 2), march%fraction, pressed%machine%contact, &
+                                           log%peak_force)
     if (log%sample_interval <= 0) return
     sample%mode = merge(mode_slip_plus, mode_slip_minus, pressed%direction > 0)
     do
@@ -211,18 +213,19 @@ contains
     end do
   end subroutine look_along
 
-  !> Raises `peak` to the largest force within the step behind: a golden section around the largest of a few.
-  pure subroutine raise_peak_force(march, contact, peak)
-    type(march_t), intent(in) :: march
+  !> Raises `peak` to the largest force up to a `fraction` of a step, over which penetration and rate are polynomials: a
+  !> golden section around the largest of a few.
+  pure subroutine raise_peak_force(p, rate, fraction, contact, peak)
+    real(wp), intent(in) :: p(0:degree), rate(0:degree), fraction
     type(contact_t), intent(in) :: contact
     real(wp), intent(inout) :: peak
     integer, parameter :: parts = 8
     real(wp) :: force(0:parts), low, high, a, b
     integer :: i
-    force = [(force_at(i*march%fraction/parts), i=0, parts)]
+    force = [(force_at(i*fraction/parts), i=0, parts)]
     i = maxloc(force, dim=1) - 1
-    low = max(i - 1, 0)*march%fraction/parts
-    high = min(i + 1, parts)*march%fraction/parts
+    low = max(i - 1, 0)*fraction/parts
+    high = min(i + 1, parts)*fraction/parts
     if (2*maxval(force) < peak) return
     do i = 1, most_sections
       a = high - golden*(high - low)
@@ -239,7 +242,7 @@ contains
 
     pure real(wp) function force_at(t)
       real(wp), intent(in) :: t
-      force_at = contact_force(contact, value_at(march%path(:, 1), t), value_at(march%path(:, 2), t))
+      force_at = contact_force(contact, value_at(p, t), value_at(rate, t))
     end function force_at
 
   end subroutine raise_peak_force

@@ -80,7 +80,7 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, crank_angle
     type(state_t) :: state
-    state = state_t(x=x, v=v, mode=mode_slip_plus)
+    state = state_t(x=x, v=v, mode=mode_slip_plus, touch_speed=abs(v))
     state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
     if (v == 0) state%mode = mode_from_rest(moving%machine, state)
@@ -190,11 +190,12 @@ contains
 
   !> A soft barrier is reached: nothing changes but the forces from here on.
   pure subroutine touch(state, direction, tally, log)
-    type(state_t), intent(in) :: state
+    type(state_t), intent(inout) :: state
     integer, intent(in) :: direction
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     call count_impact(tally, state, direction)
+    state%touch_speed = abs(state%v)
     if (present(log)) call record_event(log, merge(event_touch_upper, event_touch_lower, direction > 0), state, state%v)
   end subroutine touch
 

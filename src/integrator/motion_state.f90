@@ -37,6 +37,8 @@ module motion_state
   type, public :: state_t
     real(wp) :: x = 0, v = 0, time = 0
     integer :: mode = 0
+    !> Speed at which the last contact with a soft barrier began [m/s].
+    real(wp) :: touch_speed = 0
   end type state_t
 
   type, public :: options_t
@@ -93,6 +95,8 @@ module motion_state
     !> Where the energy went until now, and until each sample: rows as in `book_t`, `at_end` being the energy then.
     type(book_t) :: book
     real(wp), allocatable :: sample_book(:, :)
+    !> Speed at which the last contact with a soft barrier began, at samples; one row.
+    real(wp), allocatable :: sample_touch(:, :)
   end type log_t
 
 contains
@@ -210,6 +214,7 @@ contains
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
     log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
+    call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
     if (present(book)) call put_column(log%sample_book, log%samples, &
                                        [book%friction, book%damping, book%contact, book%work, book%at_end])
