@@ -6,10 +6,10 @@
 module trajectory
   use attractors, only: attractor_t, features_t, find_box, find_capture, regime_at_rest, regime_of, &
     regime_stuck
-  use energy, only: energy_of_body
+  use energy, only: energy_of_body, record_with_book
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
+  use motion_state, only: log_t, reset_tally, state_t, tally_t
   use pair_flight, only: body_state
   use pair_trajectory, only: pair_course_t, run_pair
   use status, only: reason_settled, reason_time_over
@@ -92,8 +92,9 @@ contains
       call pass_stop(moving, catalogue, span, slipped, course, outcome)
     end do
     if (present(log)) then
+      if (log%sample_interval > 0 .and. course%elapsed >= span%duration) &
+        call record_with_book(moving%machine, course%state, log)
       log%book%at_end = energy_of_body(moving%machine, course%state)
-      if (log%sample_interval > 0 .and. course%elapsed >= span%duration) call record_sample(log, course%state)
     end if
     do while (course%phase == phase_extension)
       call go_to_stop(moving, course, slipped)

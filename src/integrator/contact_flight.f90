@@ -7,13 +7,13 @@
 module contact_flight
   use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion
-  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
+  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight, record_with_book
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: power, sliding_friction
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
     take_step
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, sample_due, &
+  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, sample_due, &
     sample_time, state_t, tally_t
   use oscillator, only: oscillator_t
   use polynomial, only: degree, maximum_until, value_at
@@ -82,7 +82,7 @@ contains
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       call take_step(march, pressed, guards, time_end - pressed%start, fallen)
-      call look_along(march, pressed, tally, log)
+      call look_along(march, pressed, state%touch_speed, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing
         guards = guards_of(pressed)
@@ -93,10 +93,6 @@ contains
         exit
       end if
     end do
-    if (present(log)) then
-      log%contact_work = log%contact_work + march%y(3)
-      log%book%contact = log%book%contact + march%y(3)
-    end if
     state%time = merge(time_end, min(pressed%start + march%time, time_end), fallen == march_time_over)
     state%x = pressed%surface + side*march%y(1)
     state%v = side*march%y(2)
@@ -179,39 +175,57 @@ contains
   end subroutine sizes_of
 
   !> Samples and extremes of the step behind.
-  pure subroutine look_along(march, pressed, tally, log)
+  pure subroutine look_along(march, pressed, touch_speed, tally, log)
     type(march_t), intent(in) :: march
     type(pressed_t), intent(in) :: pressed
+    real(wp), intent(in) :: touch_speed
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
-    real(wp) :: t
-    integer :: k
+    real(wp) :: t, done
     if (.not. march%fraction > 0) return
     if (tally%wants_v_max .and. pressed%direction > 0) then
       tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, gauss_points
-      t = march%fraction*gauss_place(k)
-      call book_instant(pressed%machine, pressed%start + march%from + t*march%length, &
-                        pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
-                        pressed%side*value_at(march%path(:, 2), t), march%fraction*march%length*gauss_weight(k), log%book)
-    end do
     log%peak_penetration = max(log%peak_penetration, march%y(1))
     if (pressed%pushing) call raise_peak_force(march%path(:, 1), march%path(:, 2), march%fraction, pressed%machine%contact, &
-                                           log%peak_force)
-    if (log%sample_interval <= 0) return
+                                               log%peak_force)
+    done = 0
     sample%mode = merge(mode_slip_plus, mode_slip_minus, pressed%direction > 0)
-    do
+    sample%touch_speed = touch_speed
+    do while (log%sample_interval > 0)
       sample%time = sample_time(log)
       t = max(0.0_wp, (sample%time - pressed%start - march%from)/march%length)
       if (t >= march%fraction .or. .not. sample_due(log, pressed%start + march%time)) exit
       sample%x = pressed%surface + pressed%side*value_at(march%path(:, 1), t)
       sample%v = pressed%side*value_at(march%path(:, 2), t)
-      call record_sample(log, sample)
+      call book_piece(pressed, march, done, t, log)
+      done = t
+      call record_with_book(pressed%machine, sample, log)
     end do
+    call book_piece(pressed, march, done, march%fraction, log)
   end subroutine look_along
+
+  !> Where the energy went between two fractions of the step behind. The barrier's part is that until the second one.
+  pure subroutine book_piece(pressed, march, from, until, log)
+    type(pressed_t), intent(in) :: pressed
+    type(march_t), intent(in) :: march
+    real(wp), intent(in) :: from, until
+    type(log_t), intent(inout) :: log
+    real(wp) :: t, work
+    integer :: k
+    do k = 1, gauss_points
+      t = from + (until - from)*gauss_place(k)
+      call book_instant(pressed%machine, pressed%start + march%from + t*march%length, &
+                        pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
+                        pressed%side*value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), log%book)
+    end do
+    work = value_at(march%path(:, 3), until) - value_at(march%path(:, 3), from)
+    if (until >= march%fraction) work = march%y(3) - value_at(march%path(:, 3), from)
+    log%book%contact = log%book%contact + work
+    log%contact_work = log%contact_work + work
+  end subroutine book_piece
 
   !> Raises `peak` to the largest force up to a `fraction` of a step, over which penetration and rate are polynomials: a
   !> golden section around the largest of a few.

@@ -8,7 +8,8 @@ module motion_state
   implicit none
   private
 
-  public :: sample_time, sample_due, closing_error, reset_tally, note_position, append_word, open_log, record_event, record_sample
+  public :: sample_time, sample_due, closing_error, reset_tally, note_position, append_word, open_log, record_event, &
+    record_sample, put_sample_book
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -216,9 +217,16 @@ contains
     log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
     call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
-    if (present(book)) call put_column(log%sample_book, log%samples, &
-                                       [book%friction, book%damping, book%contact, book%work, book%at_end])
+    if (present(book)) call put_sample_book(log, log%samples, book)
   end subroutine record_sample
+
+  !> Writes down where the energy went until sample number `sample`, in order.
+  pure subroutine put_sample_book(log, sample, book)
+    type(log_t), intent(inout) :: log
+    integer, intent(in) :: sample
+    type(book_t), intent(in) :: book
+    call put_column(log%sample_book, sample, [book%friction, book%damping, book%contact, book%work, book%at_end])
+  end subroutine put_sample_book
 
   !> Puts values into column `column`, the one after the last.
   pure subroutine put_column(columns, column, values)

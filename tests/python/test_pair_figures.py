@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from program import succeed
-from separatrix import cli, contact, pair, style, trajectory
+from separatrix import cli, contact, energy, pair, style, trajectory
 from separatrix.open import open_result
 
 
@@ -33,7 +33,7 @@ def test_energy_adds_up(separatrix, source_dir, tmp_path):
     """The top of what is stacked is the line of what was put in."""
     path = file_of(separatrix, source_dir, tmp_path, "pair_free")
     with open_result(path) as result, style.context():
-        figure = pair.energy(result, "free pair")
+        figure = energy.decomposition(result, "free pair", [])
         top = max(
             (piece.get_paths()[0].vertices[:, 1].max() for piece in figure.axes[0].collections), default=0
         )
@@ -72,7 +72,7 @@ def test_linear_damping_jumps_and_pulls(separatrix, source_dir, tmp_path):
     ("example", "names"),
     [
         ("pair_free", ["history", "energy", "phase"]),
-        ("contact_hunt_crossley", ["history", "contact", "phase"]),
+        ("contact_hunt_crossley", ["history", "energy", "contact", "phase"]),
     ],
 )
 def test_figures_are_written(separatrix, source_dir, tmp_path, example, names):
