@@ -29,10 +29,12 @@ module pair_motion
 contains
 
   !> State of m2 at `x` [m], `v` [m/s] and m1 at `driver` (position, velocity), with the drive at `angle` [rad]. Where
-  !> the motion of m1 is given, `driver` is not looked at.
-  pure function start_pair(moving, x, v, driver, angle) result(state)
+  !> the motion of m1 is given, `driver` is not looked at. `integral` [ms] is that of the error which a controller has
+  !> added up.
+  pure function start_pair(moving, x, v, driver, angle, integral) result(state)
     type(pair_motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, driver(2), angle
+    real(wp), intent(in), optional :: integral
     type(pair_state_t) :: state
     real(wp) :: place, w
     associate (machine => moving%machine)
@@ -42,11 +44,17 @@ contains
       state%y(at_v1) = driver(2)
       state%y(at_x2) = x
       state%y(at_v2) = v
+      if (present(integral)) state%y(at_integral) = integral
       call refresh(moving, state)
       place = x
       if (machine%carried) place = x - state%y(at_x1)
       if (place >= machine%upper) state%touch = 1
       if (place <= machine%lower) state%touch = -1
+      if (machine%contact%soft .and. (place > machine%upper .or. place < machine%lower)) then
+        state%pressed = state%touch
+        state%penetration = max(place - machine%upper, machine%lower - place)
+        state%touch_speed = abs(v - merge(state%y(at_v1), 0.0_wp, machine%carried))
+      end if
       w = state%y(at_v1) - state%y(at_v2)
       if (state%touch /= 0 .and. .not. machine%carried .and. .not. abs(v) > 0 .and. .not. machine%contact%soft) then
         call rest_on_stop(moving, state)
