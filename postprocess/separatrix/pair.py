@@ -78,21 +78,27 @@ def _distance(result: xr.Dataset) -> tuple[str, np.ndarray]:
 def caption(result: xr.Dataset) -> list[str]:
     """Return the bodies, their regime, and the version of the program."""
     return [
-        *_machine(result),
+        *machine(result),
         f"regime: {flag_text(str(result.attrs['regime']))}",
         plain(version_text(result)),
     ]
 
 
-def _machine(result: xr.Dataset) -> list[str]:
-    """The bodies, the friction between them, the drive and the stop."""
+def machine(result: xr.Dataset, swept: str = "") -> list[str]:
+    """Return the bodies, the friction between them, the drive and the stop; what is swept is left out."""
     case = resolved_case(result)
     body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
-    pieces = [
-        f"$m_1$ = {body['mass']:g} kg, $m_2$ = {body['driven_mass']:g} kg, $b$ = {body['friction']:g} N",
-        f"drive: {flag_text(drive.get('law', 'none'))}",
+    symbols = {"mass": ("$m_1$", "kg"), "driven_mass": ("$m_2$", "kg"), "friction": ("$b$", "N")}
+    values = [
+        f"{symbol} = {body[name]:g} {unit}" for name, (symbol, unit) in symbols.items() if f"body_{name}" != swept
     ]
-    if "restitution" in contact:
-        carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
-        pieces.append(f"stop on {carrier}, $k$ = {contact['restitution']:g}")
-    return pieces
+    pieces = [", ".join(values), f"drive: {flag_text(drive.get('law', 'none'))}"]
+    law = contact.get("law", "none")
+    if law == "none":
+        return pieces
+    carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
+    text = f"stop on {carrier}" + ("" if law.startswith("newton") else f", {flag_text(law)}")
+    for name, symbol in (("restitution", "$k$"), ("stiffness", "$K$"), ("exponent", "$n$"), ("damping", "damping")):
+        if name in contact and f"contact_{name}" != swept:
+            text += f", {symbol} = {contact[name]:g}"
+    return [*pieces, text]
