@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.case import resolved_case, version_text
+from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -78,27 +78,7 @@ def _distance(result: xr.Dataset) -> tuple[str, np.ndarray]:
 def caption(result: xr.Dataset) -> list[str]:
     """Return the bodies, their regime, and the version of the program."""
     return [
-        *machine(result),
+        *describe_case(result),
         f"regime: {flag_text(str(result.attrs['regime']))}",
         plain(version_text(result)),
     ]
-
-
-def machine(result: xr.Dataset, swept: str = "") -> list[str]:
-    """Return the bodies, the friction between them, the drive and the stop; what is swept is left out."""
-    case = resolved_case(result)
-    body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
-    symbols = {"mass": ("$m_1$", "kg"), "driven_mass": ("$m_2$", "kg"), "friction": ("$b$", "N")}
-    values = [
-        f"{symbol} = {body[name]:g} {unit}" for name, (symbol, unit) in symbols.items() if f"body_{name}" != swept
-    ]
-    pieces = [", ".join(values), f"drive: {flag_text(drive.get('law', 'none'))}"]
-    law = contact.get("law", "none")
-    if law == "none":
-        return pieces
-    carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
-    text = f"stop on {carrier}" + ("" if law.startswith("newton") else f", {flag_text(law)}")
-    for name, symbol in (("restitution", "$k$"), ("stiffness", "$K$"), ("exponent", "$n$"), ("damping", "damping")):
-        if name in contact and f"contact_{name}" != swept:
-            text += f", {symbol} = {contact[name]:g}"
-    return [*pieces, text]

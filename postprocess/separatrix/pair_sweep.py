@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from separatrix import pair, style
-from separatrix.case import version_text
+from separatrix import style
+from separatrix.case import describe_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names, table
@@ -46,7 +46,7 @@ def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
     top.set_xlim(values.min(), values.max())
     for letter, ax in zip("ab", (top, bottom), strict=True):
         ax.set_title(f"{letter})", loc="left")
-    caption = [*pair.machine(result, name), *limit_texts(result), plain(version_text(result))]
+    caption = [*describe_case(result), *limit_texts(result), plain(version_text(result))]
     compose(figure, title, caption, handles, columns=min(5, len(handles)))
     return figure
 
