@@ -15,7 +15,7 @@ module pair_contact
   use linear_flow, only: most_unknowns
   use motion_state, only: book_t, event_touch_lower, event_touch_upper, log_t, mode_stick, note_position, record_event, &
     record_sample, sample_due, sample_time, tally_t, word_lower, word_upper, append_word
-  use pair, only: driven_by_motion, impact_mass, pair_t
+  use pair, only: driven_by_controller, driven_by_motion, impact_mass, pair_t
   use pair_flight, only: body_state, driver_of, energy_of, guard_failed, guard_minus, guard_none, guard_plus, &
     guard_separate, guard_slip
   use pair_modes, only: at_control, at_cosine, at_integral, at_one, at_ramp, at_sine, at_v1, at_v2, at_x1, at_x2, &
@@ -29,9 +29,9 @@ module pair_contact
   !> Guards of a march: slip stops, the body leaves the stop, change between pushing and not, break-away in either
   !> direction.
   integer, parameter :: slipping = 1, leaving = 2, cut = 3, plus = 4, minus = 5
-  !> Unknowns: x1, v1, p, v2, integral of the control error, energy put into the stop, lost to damping, put in by the
+  !> Unknowns: x1, v1, p, p', integral of the control error, energy put into the stop, lost to damping, put in by the
   !> drive.
-  integer, parameter :: of_x1 = 1, of_v1 = 2, of_p = 3, of_v2 = 4, of_integral = 5, of_contact = 6, of_damping = 7, &
+  integer, parameter :: of_x1 = 1, of_v1 = 2, of_p = 3, of_rate = 4, of_integral = 5, of_contact = 6, of_damping = 7, &
     of_work = 8, unknowns = 8
   !> What is taken for a tie of forces, relative to their size.
   real(wp), parameter :: tie = 32*epsilon(1.0_wp)
@@ -92,7 +92,7 @@ contains
     real(wp) :: force, y(unknowns)
     state%mode = mode_stick
     pressing = pressing_of(moving, state)
-    y = unknowns_of(state)
+    y = unknowns_of(pressing, state)
     force = interface_force(pressing, 0.0_wp, y)
     if (abs(force) - moving%machine%friction > tie*(moving%force_scale + abs(force))) then
       state%mode = mode_of_slip(nint(sign(1.0_wp, force)))
@@ -117,7 +117,7 @@ contains
     integer :: fell
     call refresh(moving, state)
     pressing = pressing_of(moving, state)
-    y = unknowns_of(state)
+    y = unknowns_of(pressing, state)
     call sizes_of(moving, pressing, y, scale, duration)
     start = state
     if (present(log)) book = log%book
@@ -172,13 +172,17 @@ contains
     pressing%side = state%pressed
     pressing%sense = sense_of(state%mode)
     pressing%carried = merge(1, 0, moving%machine%carried)
-    pressing%pushing = pressing%contact%tension .or. margin_at(pressing, unknowns_of(state)) >= 0
+    pressing%pushing = pressing%contact%tension .or. margin_at(pressing, unknowns_of(pressing, state)) >= 0
   end function pressing_of
 
-  pure function unknowns_of(state) result(y)
+  pure function unknowns_of(pressing, state) result(y)
+    type(pressing_t), intent(in) :: pressing
     type(pair_state_t), intent(in) :: state
     real(wp) :: y(unknowns)
-    y = [state%y(at_x1), state%y(at_v1), state%penetration, state%y(at_v2), state%y(at_integral), 0.0_wp, 0.0_wp, 0.0_wp]
+    y = 0
+    y([of_x1, of_v1, of_p, of_integral]) = [state%y(at_x1), state%y(at_v1), state%penetration, state%y(at_integral)]
+    y(of_rate) = pressing%side*(state%y(at_v2) - pressing%carried*state%y(at_v1))
+    if (pressing%carried == 1 .and. pressing%sense == 0) y(of_rate) = 0
   end function unknowns_of
 
   !> The state at `time` [s] of a march.
@@ -193,7 +197,7 @@ contains
       state%y(at_v1) = y(of_v1)
       state%y(at_x2) = merge(machine%upper, machine%lower, pressing%side > 0) + pressing%carried*y(of_x1) &
                        + pressing%side*y(of_p)
-      state%y(at_v2) = y(of_v2)
+      state%y(at_v2) = pressing%side*y(of_rate) + pressing%carried*y(of_v1)
       if (pressing%sense == 0) state%y(at_v2) = y(of_v1)
       state%y(at_integral) = y(of_integral)
       state%y(at_ramp) = pressing%ramp + machine%velocity*time
@@ -215,20 +219,12 @@ contains
     z(at_control) = pressing%control
   end function full_state
 
-  !> Rate of penetration.
-  pure real(wp) function rate_of(pressing, y)
-    class(pressing_t), intent(in) :: pressing
-    real(wp), intent(in) :: y(:)
-    rate_of = pressing%side*(y(of_v2) - pressing%carried*y(of_v1))
-    if (pressing%carried == 1 .and. pressing%sense == 0) rate_of = 0
-  end function rate_of
-
   !> Force of the stop on m2, away from it.
   pure real(wp) function force_of(pressing, y)
     class(pressing_t), intent(in) :: pressing
     real(wp), intent(in) :: y(:)
     force_of = 0
-    if (pressing%pushing) force_of = contact_force(pressing%contact, y(of_p), rate_of(pressing, y))
+    if (pressing%pushing) force_of = contact_force(pressing%contact, y(of_p), y(of_rate))
   end function force_of
 
   !> Acceleration that the bodies have together.
@@ -279,10 +275,12 @@ contains
       slope = 0
       slope(of_x1) = y(of_v1)
       slope(of_v1) = a1
-      slope(of_p) = rate_of(self, y)
-      slope(of_v2) = a2
-      slope(of_integral) = sum(self%reference*z) - y(of_x1)
-      slope(of_contact) = force*rate_of(self, y)
+      slope(of_p) = y(of_rate)
+      slope(of_rate) = self%side*(a2 - self%carried*a1)
+      if (machine%drive == driven_by_controller .and. .not. machine%sample_time > 0) then
+        slope(of_integral) = sum(self%reference*z) - y(of_x1)
+      end if
+      slope(of_contact) = force*y(of_rate)
       if (machine%drive == driven_by_motion) then
         slope(of_work) = (machine%driven_mass*a2 + (1 - self%carried)*self%side*force)*y(of_v1)
       else
@@ -295,7 +293,7 @@ contains
   pure real(wp) function margin_at(pressing, y)
     type(pressing_t), intent(in) :: pressing
     real(wp), intent(in) :: y(:)
-    margin_at = sum(contact_margin(pressing%contact)*[1.0_wp, y(of_p), rate_of(pressing, y)])
+    margin_at = sum(contact_margin(pressing%contact)*[1.0_wp, y(of_p), y(of_rate)])
   end function margin_at
 
   pure function guards_of(moving, pressing, hold) result(guards)
@@ -307,7 +305,7 @@ contains
     guards%constant = 1
     if (pressing%sense /= 0) then
       guards(slipping)%constant = 0
-      guards(slipping)%coefficients([of_v1, of_v2]) = [1, -1]*pressing%sense
+      guards(slipping)%coefficients([of_v1, of_rate]) = pressing%sense*[1 - pressing%carried, -pressing%side]
     end if
     if (pressing%carried == 0 .or. pressing%sense /= 0) then
       guards(leaving)%constant = 0
@@ -316,8 +314,7 @@ contains
     if (.not. pressing%contact%tension) then
       margin = merge(1, -1, pressing%pushing)*contact_margin(pressing%contact)
       guards(cut)%constant = margin(1)
-      guards(cut)%coefficients([of_p, of_v2]) = [margin(2), pressing%side*margin(3)]
-      if (pressing%carried == 1) guards(cut)%coefficients(of_v1) = -pressing%side*margin(3)
+      guards(cut)%coefficients([of_p, of_rate]) = margin(2:)
     end if
     if (pressing%sense == 0) then
       guards([plus, minus])%margin = [1, 2]
@@ -334,9 +331,10 @@ contains
     type(pressing_t), intent(in) :: pressing
     real(wp), intent(in) :: y(unknowns)
     real(wp), intent(out) :: scale(unknowns), duration
-    real(wp) :: mass, speed, depth, frequency, pressure
+    real(wp) :: slope(unknowns), mass, speed, depth, frequency, pressure
+    slope = pressing%slope(0.0_wp, y)
     mass = impact_mass(moving%machine)
-    speed = abs(rate_of(pressing, y))
+    speed = abs(y(of_rate))
     pressure = moving%force_scale + moving%machine%friction
     associate (law => pressing%contact)
       depth = max(abs(y(of_p)), power((law%exponent + 1)*mass*speed**2/(2*law%stiffness), 1/(law%exponent + 1)))
@@ -345,9 +343,11 @@ contains
       frequency = sqrt(law%stiffness*power(depth, law%exponent - 1)/mass)
     end associate
     speed = max(speed, depth*frequency)
-    scale = mass*speed**2
-    scale([of_x1, of_v1, of_p, of_v2]) = [depth, speed, depth, speed]
-    scale(of_integral) = depth/frequency
+    scale([of_p, of_rate, of_contact]) = [depth, speed, mass*speed**2]
+    ! What goes by while the contact lasts is rounded on its own scale; energies that decide nothing do not shorten steps.
+    scale([of_x1, of_v1, of_integral]) = 100*(abs(slope([of_x1, of_v1, of_integral]))/frequency) &
+                                    + [depth, speed, depth/frequency]
+    scale([of_damping, of_work]) = huge(1.0_wp)
     duration = 3/frequency
   end subroutine sizes_of
 
@@ -360,18 +360,19 @@ contains
     type(book_t), intent(in) :: book
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
-    real(wp) :: path(0:degree), rate(0:degree), surface
+    real(wp) :: path(0:degree), velocity(0:degree), surface
     if (.not. march%fraction > 0) return
     surface = merge(moving%machine%upper, moving%machine%lower, pressing%side > 0)
     path = pressing%side*march%path(:, of_p) + pressing%carried*march%path(:, of_x1)
     path(0) = path(0) + surface
     tally%x_max = max(tally%x_max, maximum_until(path, march%fraction))
     tally%x_min = min(tally%x_min, -maximum_until(-path, march%fraction))
-    if (tally%wants_v_max) tally%v_max = max(tally%v_max, maximum_until(march%path(:, of_v2), march%fraction))
+    velocity = pressing%side*march%path(:, of_rate) + pressing%carried*march%path(:, of_v1)
+    if (tally%wants_v_max) tally%v_max = max(tally%v_max, maximum_until(velocity, march%fraction))
     if (.not. present(log)) return
-    rate = pressing%side*(march%path(:, of_v2) - pressing%carried*march%path(:, of_v1))
     log%peak_penetration = max(log%peak_penetration, maximum_until(march%path(:, of_p), march%fraction))
-    if (pressing%pushing) call raise_peak_force(march%path(:, of_p), rate, march%fraction, pressing%contact, log%peak_force)
+    if (pressing%pushing) call raise_peak_force(march%path(:, of_p), march%path(:, of_rate), march%fraction, &
+                                                pressing%contact, log%peak_force)
     call sample_along(moving, pressing, march, state, book, log)
     log%contact_work = log%contact_work - log%book%contact
     log%book = book_at(pressing, march%y(:unknowns), state, book)
