@@ -19,7 +19,7 @@ _NAMES = {0: "run-up", 1: "run-down"}
 
 
 def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
-    """Return velocities of the driven body, the largest and the stroboscopic ones, with the regimes as bands."""
+    """Return the largest and the stroboscopic velocities of the driven body, with the regimes as bands."""
     figure = style.new_figure(style.DOUBLE_COLUMN, 105.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     values = result[name].values
