@@ -337,10 +337,7 @@ contains
   subroutine require_sweep(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    if (is_pair(the_case%laws)) then
-      call fail(error, exit_bad_case, the_case%path//': key ''body.law'': found "'//trim(the_case%laws(1)%name)// &
-                '", allowed for a sweep point_mass; a basin over parameters shows the regimes of two bodies')
-    else if (.not. the_case%sweep%present) then
+    if (.not. the_case%sweep%present) then
       call fail(error, exit_bad_case, the_case%path//': a sweep needs a table [sweep]')
     else
       call allow_start(the_case, [the_case%sweep%swept], error)

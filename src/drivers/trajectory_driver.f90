@@ -8,7 +8,7 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use contact_law, only: barrier_positions, force_on_body
+  use contact_law, only: barrier_positions, contact_at_speed, force_on_body
   use drive_law, only: foot_motion
   use errors, only: error_t
   use file_layout, only: add_events
@@ -19,6 +19,7 @@ module trajectory_driver
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
+  use pair, only: driven_by_motion
   use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
@@ -70,7 +71,8 @@ contains
     call describe_motion(moving, span, outcome, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
-    if (allocated(moving%pair)) call add_pair(log, schema)
+    if (allocated(moving%pair)) call add_driver_events(log, schema)
+    call add_energy(moving, log, schema)
     call add_book(log%book, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
@@ -140,13 +142,24 @@ contains
     end if
     if (moving%machine%contact%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
-        long_name='force of the barriers on the body', &
-        data=force_on_body(moving%machine%contact, log%sample_data(2, :log%samples), log%sample_data(3, :log%samples)))
+        long_name='force of the barriers on the body', data=contact_forces(moving, log))
     end if
     call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5, 6], &
       flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
       data=real(log%sample_mode(:log%samples), wp))
   end subroutine add_history
+
+  !> Forces of soft barriers at the samples.
+  function contact_forces(moving, log) result(forces)
+    type(motion_t), intent(in) :: moving
+    type(log_t), intent(in) :: log
+    real(wp) :: forces(log%samples), place(2, log%samples)
+    place = log%sample_data(2:3, :log%samples)
+    if (allocated(moving%pair)) then
+      if (moving%pair%machine%carried) place = place - log%sample_driver(:, :log%samples)
+    end if
+    forces = force_on_body(contact_at_speed(moving%machine%contact, log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
+  end function contact_forces
 
   subroutine add_foot(moving, crank_angle, log, schema)
     type(motion_t), intent(in) :: moving
@@ -175,8 +188,8 @@ contains
     call schema%add_attribute('', 'energy_closing_error', closing_error(book))
   end subroutine add_book
 
-  !> What only two bodies have: the driving one at the events, and where the energy went over time.
-  subroutine add_pair(log, schema)
+  !> The driving body of two at the events.
+  subroutine add_driver_events(log, schema)
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: driver(2, log%events)
@@ -186,22 +199,39 @@ contains
                              long_name='position of the driving body', data=driver(1, :))
     call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
                              long_name='velocity of the driving body', data=driver(2, :))
-    call add('energy', 5, 'energy of spring and bodies')
-    call add('friction_loss', 1, 'energy lost to dry friction since the start')
-    call add('damping_loss', 2, 'energy lost to viscous damping since the start')
-    call add('contact_loss', 3, 'energy lost to impacts since the start')
-    call add('drive_work', 4, 'work of drive and blows since the start')
+  end subroutine add_driver_events
+
+  !> Where the energy went over time.
+  subroutine add_energy(moving, log, schema)
+    type(motion_t), intent(in) :: moving
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: kinetic(log%samples)
+    kinetic = 0.5_wp*moving%machine%mass*log%sample_data(3, :log%samples)**2
+    if (allocated(moving%pair)) then
+      if (moving%pair%machine%drive /= driven_by_motion) then
+        kinetic = kinetic + 0.5_wp*moving%pair%machine%mass*log%sample_driver(2, :log%samples)**2
+      end if
+    end if
+    associate (book => log%sample_book(:, :log%samples))
+      call add('energy', book(5, :), 'energy of spring and bodies')
+      call add('kinetic_energy', kinetic, 'kinetic energy')
+      call add('potential_energy', book(5, :) - kinetic, 'energy of the spring')
+      call add('friction_loss', book(1, :), 'energy lost to dry friction since the start')
+      call add('damping_loss', book(2, :), 'energy lost to viscous damping since the start')
+      call add('contact_loss', book(3, :), 'energy put into barriers since the start; of a pressed soft one, part comes back')
+      call add('drive_work', book(4, :), 'work of drive and blows since the start')
+    end associate
 
   contains
 
-    subroutine add(name, row, long_name)
+    subroutine add(name, values, long_name)
       character(len=*), intent(in) :: name, long_name
-      integer, intent(in) :: row
-      call schema%add_variable(name, type_float64, ['time'], units='J', long_name=long_name, &
-                               data=log%sample_book(row, :log%samples))
+      real(wp), intent(in) :: values(:)
+      call schema%add_variable(name, type_float64, ['time'], units='J', long_name=long_name, data=values)
     end subroutine add
 
-  end subroutine add_pair
+  end subroutine add_energy
 
   !> The events as a table at full precision.
   subroutine write_events(path, log, error)

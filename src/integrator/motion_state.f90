@@ -9,7 +9,7 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, note_position, append_word, open_log, &
-    record_event, record_sample
+    record_event, record_sample, put_sample_book
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -40,6 +40,8 @@ module motion_state
     integer :: mode = 0
     !> Force of Dahl's friction against the body [N], where that is.
     real(wp) :: z = 0
+    !> Speed at which the last contact with a soft barrier began [m/s].
+    real(wp) :: touch_speed = 0
   end type state_t
 
   type, public :: options_t
@@ -100,6 +102,8 @@ module motion_state
     !> Where the energy went until now, and until each sample: rows as in `book_t`, `at_end` being the energy then.
     type(book_t) :: book
     real(wp), allocatable :: sample_book(:, :)
+    !> Speed at which the last contact with a soft barrier began, at samples; one row.
+    real(wp), allocatable :: sample_touch(:, :)
   end type log_t
 
 contains
@@ -227,9 +231,9 @@ contains
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
     log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
+    if (log%book%kept) call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
-    if (present(book)) call put_column(log%sample_book, log%samples, &
-                                       [book%friction, book%damping, book%contact, book%work, book%at_end])
+    if (present(book)) call put_sample_book(log, log%samples, book)
   end subroutine record_sample
 
   !> Room for `count` samples.
@@ -246,6 +250,14 @@ contains
     call move_alloc(modes_grown, log%sample_mode)
     call move_alloc(data_grown, log%sample_data)
   end subroutine make_room
+
+  !> Writes down where the energy went until sample number `sample`, in order.
+  pure subroutine put_sample_book(log, sample, book)
+    type(log_t), intent(inout) :: log
+    integer, intent(in) :: sample
+    type(book_t), intent(in) :: book
+    call put_column(log%sample_book, sample, [book%friction, book%damping, book%contact, book%work, book%at_end])
+  end subroutine put_sample_book
 
   !> Puts values into column `column`, the one after the last.
   pure subroutine put_column(columns, column, values)

@@ -20,6 +20,8 @@ module pair_flight
   integer, parameter, public :: guard_none = 0, guard_upper = 1, guard_lower = 2, guard_slip = 3, guard_plus = 4, &
     guard_minus = 5, guard_press = 6, guard_leave = 7
   integer, parameter :: guards = 7
+  !> Of a contact with a soft stop: its end; no step is short enough.
+  integer, parameter, public :: guard_separate = 8, guard_failed = 9
   !> Twice what `mode_together` takes for a tie, which it decides by the rate.
   real(wp), parameter :: tie_allowance = 64*epsilon(1.0_wp)
 
@@ -103,7 +105,7 @@ contains
         if (.not. machine%carried) call watch_stops(moving, state%touch, watches)
         call watch_interface(moving, watches(guard_plus), 1)
         call watch_interface(moving, watches(guard_minus), -1)
-        if (machine%carried) then
+        if (machine%carried .and. .not. machine%contact%soft) then
           watches(guard_plus)%active = state%touch /= -1 .and. .not. moving%clamped
           watches(guard_minus)%active = state%touch /= 1 .and. .not. moving%clamped
         end if
@@ -132,10 +134,6 @@ contains
     associate (machine => moving%machine, upper => watches(guard_upper), lower => watches(guard_lower))
       upper%active = machine%upper < unreachable
       lower%active = machine%lower > -unreachable
-      if (machine%contact%soft) then
-        upper%active = .false.
-        lower%active = .false.
-      end if
       upper%row(at_x2) = -1
       lower%row(at_x2) = 1
       if (machine%carried) then
@@ -256,7 +254,7 @@ contains
   !> The driven body as a single one, for tally and log.
   pure type(state_t) function body_state(state)
     type(pair_state_t), intent(in) :: state
-    body_state = state_t(x=state%y(at_x2), v=state%y(at_v2), time=state%time, mode=state%mode)
+    body_state = state_t(x=state%y(at_x2), v=state%y(at_v2), time=state%time, mode=state%mode, touch_speed=state%touch_speed)
   end function body_state
 
   !> Position and velocity of the driving body.

@@ -31,6 +31,9 @@ module pair_modes
     integer :: mode = 0
     !> The stop that m2 rests on, or has just left: +1 upper, -1 lower, 0 none.
     integer :: touch = 0
+    !> The soft stop that m2 presses, how deep [m], and the speed at which it met it [m/s].
+    integer :: pressed = 0
+    real(wp) :: penetration = 0, touch_speed = 0
     !> The blow has fallen; the next sample of the controller [s], both in time since the start.
     logical :: struck = .false.
     real(wp) :: clock = 0
@@ -71,7 +74,7 @@ contains
     integer :: s
     moving%machine = machine
     moving%options = options
-    moving%clamped = machine%lower >= machine%upper
+    moving%clamped = machine%lower >= machine%upper .and. .not. machine%contact%soft
     call set_rows(machine, moving)
     moving%negligible_speed = briefest_bounce*machine%period*moving%push_scale
     if (machine%drive /= driven_by_motion) moving%negligible_speed = moving%negligible_speed/(machine%mass + machine%driven_mass)

@@ -151,7 +151,7 @@ contains
         ! It was captured when its window began, and lost: once more, in the event loop.
         call run_trajectory(journey%moving, catalogue, journey%span, start(1), start(2), start(3), outcome)
       else
-        call conclude(catalogue, course, outcome)
+        call conclude(journey%moving, catalogue, course, outcome)
       end if
     end associate
   end subroutine go_on
