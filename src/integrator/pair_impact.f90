@@ -10,7 +10,7 @@ module pair_impact
     word_chatter_upper, word_lower, word_upper
   use pair, only: driven_by_motion, impact_mass
   use pair_flight, only: body_state, driver_of, fly_pair, guard_none
-  use pair_modes, only: at_v1, at_v2, at_x1, at_x2, mode_of_slip, mode_together, pair_motion_t, pair_state_t
+  use pair_modes, only: at_v1, at_v2, at_x1, at_x2, mode_of_slip, mode_together, pair_motion_t, pair_state_t, stands
   implicit none
   private
 
@@ -112,7 +112,7 @@ contains
       return
     end if
     state%y(at_v2) = 0
-    if (.not. abs(state%y(at_v1)) > 0) then
+    if (stands(moving, state%y(at_v1))) then
       call mode_together(moving, state)
       return
     end if

@@ -14,7 +14,7 @@ module pair_modes
   implicit none
   private
 
-  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now
+  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now, stands
 
   !> Unknowns: both bodies, cosine and sine of the drive, one, integral of the control error, velocity of the drive
   !> times time, control held between samples.
@@ -59,6 +59,8 @@ module pair_modes
     real(wp) :: force_scale = 0, push_scale = 0
     !> Speed at which m2 meets a stop without rebound [m/s]: rounding.
     real(wp) :: negligible_speed = 0
+    !> Size of the velocity of a given motion [m/s], for its rounding.
+    real(wp) :: driving_speed = 0
     !> The stops leave no room.
     logical :: clamped = .false.
   end type pair_motion_t
@@ -124,6 +126,7 @@ contains
         push(at_sine) = -w**2*machine%quadrature
         moving%together = push
         moving%push_scale = sum(abs(push))
+        moving%driving_speed = sum(abs(rate))
         moving%force_scale = machine%driven_mass*moving%push_scale + machine%friction
       else
         push(at_x1) = -machine%stiffness
@@ -201,6 +204,13 @@ contains
     control_now = sum(moving%control*state%y)
   end function control_now
 
+  !> Whether a velocity [m/s] is zero, that of a given motion to rounding.
+  pure elemental logical function stands(moving, velocity)
+    type(pair_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: velocity
+    stands = abs(velocity) <= 64*epsilon(1.0_wp)*moving%driving_speed
+  end function stands
+
   !> Slip mode of the relative velocity v1 - v2 with sign `s`.
   pure elemental integer function mode_of_slip(s)
     integer, intent(in) :: s
@@ -215,7 +225,7 @@ contains
     if (mode == mode_slip_minus .or. mode == mode_lower_barrier) sense_of = -1
   end function sense_of
 
-  !> Sets the mode that follows where v1 = v2, and clears `touch` where m2 leaves its stop.
+  !> Sets the mode that follows where v1 = v2, m2 being at rest on its stop where `state%touch` says so.
   pure subroutine mode_together(moving, state)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
