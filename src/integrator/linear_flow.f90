@@ -175,18 +175,18 @@ contains
     t = 2
   end function first_zero
 
-  !> A fraction up to which a series that is zero at 0 stays positive, as its first term outweighs all others; 0 if that
-  !> term is negative.
+  !> A fraction up to which a series that is zero at 0 stays positive, as one of its terms before the first negative one
+  !> outweighs all negative ones; 0 if there is none.
   pure real(wp) function leading_step(p) result(step)
     real(wp), intent(in) :: p(0:order)
-    real(wp) :: others
+    real(wp) :: against
     integer :: k
     step = 0
-    k = findloc(abs(p) > 0, .true., dim=1) - 1
-    if (p(k) < 0) return
-    others = sum(abs(p(k + 1:)))
-    step = 1
-    if (others > 0.99_wp*p(k)) step = 0.99_wp*p(k)/others
+    against = sum(max(-p, 0.0_wp))
+    do k = 0, order
+      if (p(k) < 0) return
+      if (p(k) > 0) step = max(step, min(1.0_wp, 0.99_wp*p(k)/max(against, tiny(against))))
+    end do
   end function leading_step
 
   !> The one root between `t`, where the series is positive, and `last`.

@@ -10,7 +10,8 @@ module pair_flight
   use motion_state, only: book_t, log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
     sample_due, sample_time, state_t, tally_t
   use pair, only: driven_by_motion
-  use pair_modes, only: at_cosine, at_one, at_sine, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of
+  use pair_modes, only: at_cosine, at_one, at_sine, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of, &
+    speed_size
   implicit none
   private
 
@@ -57,7 +58,8 @@ contains
     ! The ties that choose a mode are taken in units of the amplitudes.
     sizes = state%y
     sizes([at_cosine, at_sine]) = 1
-    sizes(at_v1) = max(abs(sizes(at_v1)), moving%driving_speed)
+    sizes(at_v1) = speed_size(moving, state)
+    sizes(at_x1) = max(abs(sizes(at_x1)), moving%swing*sizes(at_v1))
     begins = .true.
     do
       call expand(moving%modes(state%mode), state%y, time_end - state%time, stretch)

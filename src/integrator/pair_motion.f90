@@ -77,7 +77,7 @@ contains
       return
     end if
     touch = state%touch
-    rests = .not. moving%machine%contact%soft .and. (moving%machine%carried .or. stands(moving, state%y(at_v2)))
+    rests = .not. moving%machine%contact%soft .and. (moving%machine%carried .or. stands(moving, state, state%y(at_v2)))
     if (.not. rests) state%touch = 0
     call mode_together(moving, state)
     if (.not. rests) state%touch = touch
