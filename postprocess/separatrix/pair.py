@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.case import resolved_case, version_text
+from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -78,21 +78,7 @@ def _distance(result: xr.Dataset) -> tuple[str, np.ndarray]:
 def caption(result: xr.Dataset) -> list[str]:
     """Return the bodies, their regime, and the version of the program."""
     return [
-        *_machine(result),
+        *describe_case(result),
         f"regime: {flag_text(str(result.attrs['regime']))}",
         plain(version_text(result)),
     ]
-
-
-def _machine(result: xr.Dataset) -> list[str]:
-    """The bodies, the friction between them, the drive and the stop."""
-    case = resolved_case(result)
-    body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
-    pieces = [
-        f"$m_1$ = {body['mass']:g} kg, $m_2$ = {body['driven_mass']:g} kg, $b$ = {body['friction']:g} N",
-        f"drive: {flag_text(drive.get('law', 'none'))}",
-    ]
-    if "restitution" in contact:
-        carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
-        pieces.append(f"stop on {carrier}, $k$ = {contact['restitution']:g}")
-    return pieces

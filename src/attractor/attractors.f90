@@ -26,7 +26,7 @@ module attractors
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 
-  integer, parameter :: packed_scalars = 15 + most_coordinates
+  integer, parameter :: packed_scalars = 20 + most_coordinates
   !> Share of its size by which a box of section points is widened on each side.
   real(wp), parameter :: box_margin = 0.05_wp
   !> Length of a packed attractor.
@@ -51,8 +51,13 @@ module attractors
     type(features_t) :: features
     !> Largest modulus of the multipliers.
     real(wp) :: multiplier = 0
+    !> State at the first section point, for the reader: x, v, and those of the driving body of two.
+    real(wp) :: section(4) = 0
     !> Number of coordinates on the section.
     integer :: coordinates = 2
+    !> A motion of two bodies between their stops, which it does not touch: it may be anywhere. The coordinates are those
+    !> after the first.
+    logical :: any_place = .false.
     !> Section points, canonical one first; for period 0 lower and upper corner of the box.
     real(wp) :: points(most_coordinates, longest_period) = 0
     !> Scales of the coordinates, and for each point the metric in scaled coordinates in which the map contracts.
@@ -98,6 +103,7 @@ contains
     found = 0
     do k = 1, size(catalogue)
       associate (attractor => catalogue(k))
+        if (attractor%any_place) cycle
         if (attractor%rests) then
           if (.not. slipped) found = k
         else
@@ -129,17 +135,22 @@ contains
   end function squared_distance
 
   !> Index of the motion that is not periodic whose regime is `regime` and whose box of section points holds `point`, or
-  !> of two bodies that go on moving as one; 0 if none.
+  !> of two bodies that go on moving as one, or that has been reached at any place; 0 if none.
   pure integer function find_box(catalogue, point, regime) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: regime
     real(wp) :: margin(most_coordinates)
-    integer :: k, n
+    integer :: k, i, n
     found = 0
     do k = 1, size(catalogue)
       if (catalogue(k)%features%regime /= regime) cycle
       if (catalogue(k)%rests .and. regime == regime_stuck) found = k
+      if (catalogue(k)%any_place) then
+        do i = 1, catalogue(k)%period
+          if (squared_distance(catalogue(k), i, point(2:)) <= catalogue(k)%capture_radius**2) found = k
+        end do
+      end if
       if (found > 0) return
       if (catalogue(k)%period /= 0 .or. catalogue(k)%rests) cycle
       n = catalogue(k)%coordinates
@@ -160,7 +171,8 @@ contains
       packed = [real(attractor%id, wp), real(attractor%period, wp), real(attractor%coordinates, wp), &
         merge(1.0_wp, 0.0_wp, attractor%rests), real(f%regime, wp), real(f%word, wp), &
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
-        f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%scale, &
+        f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
+        merge(1.0_wp, 0.0_wp, attractor%any_place), attractor%scale, &
         reshape(attractor%points, [size(attractor%points)]), reshape(attractor%metric, [size(attractor%metric)])]
     end associate
   end function pack_attractor
@@ -178,7 +190,9 @@ contains
                                     packed(11), packed(12), packed(13))
     attractor%multiplier = packed(14)
     attractor%capture_radius = packed(15)
-    attractor%scale = packed(16:packed_scalars)
+    attractor%section = packed(16:19)
+    attractor%any_place = packed(20) > 0
+    attractor%scale = packed(21:packed_scalars)
     metric = packed_scalars + size(attractor%points)
     attractor%points = reshape(packed(packed_scalars + 1:metric), shape(attractor%points))
     attractor%metric = reshape(packed(metric + 1:), shape(attractor%metric))

@@ -95,7 +95,7 @@ contains
     if (allocated(moving%pair)) then
       floor = 1e-3_wp*moving%pair%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
     end if
-    scale = scales_of(moving, max((tally%x_max - tally%x_min)/2, floor, tiny(floor)))
+    scale = max(scales_of(moving, max((tally%x_max - tally%x_min)/2, floor)), tiny(floor))
   end function scale_of
 
   !> Newton's method on P^period(z) - z, derivatives by central differences, steps no longer than a fifth of

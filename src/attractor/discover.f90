@@ -10,7 +10,7 @@ module discover
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
   use strobe, only: advance_strobe_period, coordinates_of, features_over, has_section, rest_lasts, scales_of, section_point, &
-    start_strobe, strobe_t
+    section_state, start_strobe, strobe_t, without_stops
   use trajectory, only: span_t
   implicit none
   private
@@ -63,7 +63,11 @@ contains
   !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
   pure logical function holds(catalogue, found)
     type(attractor_t), intent(in) :: catalogue(:), found
-    holds = find_capture(catalogue, found%points(:, 1), .not. found%rests) > 0
+    if (found%any_place) then
+      holds = find_box(catalogue, [0.0_wp, found%points(:, 1)], found%features%regime) > 0
+    else
+      holds = find_capture(catalogue, found%points(:, 1), .not. found%rests) > 0
+    end if
   end function holds
 
   !> Runs for `patience` [s] unless captured before; `regime` is that of the run.
@@ -106,7 +110,8 @@ contains
     type(strobe_t) :: later
     type(tally_t) :: tally
     real(wp) :: points(most_coordinates, 0:2*longest_period)
-    integer :: i, p, reason, n
+    type(motion_t) :: free
+    integer :: i, p, reason, n, first
     later = strobe
     call reset_tally(tally, later%state)
     points(:, 0) = section_point(moving, later)
@@ -124,12 +129,24 @@ contains
       found%coordinates = n
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0
+      found%section = section_state(moving, points(:, 0))
       return
     end if
+    first = 1
+    call without_stops(moving, free, ok)
+    ok = ok .and. tally%impacts == 0
+    if (ok) first = 2
     associate (sizes => scales_of(moving, (tally%x_max - tally%x_min)/2))
       do p = 1, max_period
-        if (.not. returns(points(:n, :2*max_period), p, sizes(:n))) cycle
-        call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
+        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n))) cycle
+        if (first == 1) then
+          call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
+          if (ok) found%section = section_state(moving, found%points(:, 1))
+        else
+          call refine_cycle(free, points(first:n, 2*max_period), p, found, ok)
+          found%any_place = .true.
+          if (ok) found%section = section_state(moving, [points(1, 2*max_period), found%points(:, 1)])
+        end if
         if (ok) return
       end do
     end associate
@@ -179,9 +196,11 @@ contains
               found%points(:, 2) >= catalogue(k)%points(:, 1))) then
         catalogue(k)%points(:, 1) = min(catalogue(k)%points(:, 1), found%points(:, 1))
         catalogue(k)%points(:, 2) = max(catalogue(k)%points(:, 2), found%points(:, 2))
+        catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
         return
       end if
     end do
+    found%section = section_state(moving, found%points(:, 1))
     catalogue = [catalogue, found]
   end subroutine add_aperiodic
 

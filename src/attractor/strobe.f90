@@ -3,28 +3,30 @@
 
 !> A machine of one body or two as the stroboscopic map sees it: a state that moves from section to section, and the
 !> coordinates that fix it there. Those of one body are x and v. Of two, what nothing depends on is left out: the driving
-!> body where its motion is given or nothing ties it, the position of the driven one where no stop bounds it.
+!> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
+!> velocity of both where nothing ties either to the ground.
 module strobe
   use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck
+  use contact_law, only: contact_t
   use energy, only: energy_of_body, record_with_book
   use kinds, only: wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, record_sample, state_t, tally_t
-  use pair, only: driven_by_controller, driven_by_motion
+  use pair, only: driven_by_controller, driven_by_force, driven_by_motion
   use pair_flight, only: body_state, driver_of, energy_of
-  use pair_modes, only: at_integral, at_v1, at_v2, at_x1, at_x2, pair_state_t
+  use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
   use pair_motion, only: advance_pair, advance_pair_period, start_pair
   implicit none
   private
 
-  public :: coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, scales_of, advance_strobe, &
-    advance_strobe_period, features_over, rest_lasts, energy_now, record_end
+  public :: strobe_t, coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, section_state, &
+    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, rest_lasts, energy_now, record_end
 
   !> Coordinates of two bodies.
   integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5
 
   !> `state` is that of the body, or of the driven one of two.
-  type, public :: strobe_t
+  type :: strobe_t
     type(state_t) :: state
     type(pair_state_t) :: pair
   end type strobe_t
@@ -42,10 +44,39 @@ contains
       counts(of_v2) = .true.
       if (machine%drive == driven_by_motion) return
       counts(of_x1) = machine%stiffness > 0 .or. machine%drive == driven_by_controller
-      counts(of_v1) = .true.
+      counts(of_v1) = .not. floats(moving)
       counts(of_integral) = abs(machine%integral) > 0
     end associate
   end function counts_of
+
+  !> The same two bodies without stops, if that takes away just the first coordinate, the place; else nothing.
+  pure subroutine without_stops(moving, free, found)
+    type(motion_t), intent(in) :: moving
+    type(motion_t), intent(out) :: free
+    logical, intent(out) :: found
+    found = .false.
+    if (.not. allocated(moving%pair)) return
+    free = moving
+    free%machine%contact = contact_t()
+    associate (machine => free%pair%machine)
+      machine%contact = contact_t()
+      machine%upper = huge(1.0_wp)
+      machine%lower = -huge(1.0_wp)
+    end associate
+    associate (before => counts_of(moving), after => counts_of(free))
+      found = before(of_place) .and. .not. after(of_place) .and. all(before(of_v2:) .eqv. after(of_v2:))
+    end associate
+  end subroutine without_stops
+
+  !> Whether two bodies may as well be looked at from a frame that moves along.
+  pure logical function floats(moving)
+    type(motion_t), intent(in) :: moving
+    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
+    associate (machine => moving%pair%machine)
+      floats = machine%drive == driven_by_force .and. .not. machine%stiffness > 0 .and. .not. machine%damping > 0 .and. &
+               (machine%carried .or. (machine%upper >= unreachable .and. machine%lower <= -unreachable))
+    end associate
+  end function floats
 
   !> Number of coordinates on the section.
   pure integer function coordinates_of(moving) result(n)
@@ -92,7 +123,8 @@ contains
       return
     end if
     associate (y => before%pair%y)
-      strobe%pair = start_pair(moving%pair, y(at_x2), y(at_v2), y([at_x1, at_v1]), angle, y(at_integral))
+      strobe%pair = start_pair(moving%pair, y(at_x2) - merge(y(at_ramp), 0.0_wp, moving%pair%machine%carried), y(at_v2), &
+                               [y(at_x1) - y(at_ramp), y(at_v1)], angle, y(at_integral))
     end associate
     strobe%state = body_state(strobe%pair)
   end function resume_strobe
@@ -134,23 +166,44 @@ contains
     end if
     all_of_them = strobe%pair%y([at_x2, at_v2, at_x1, at_v1, at_integral])
     if (moving%pair%machine%carried) all_of_them(of_place) = all_of_them(of_place) - all_of_them(of_x1)
+    if (floats(moving)) all_of_them(of_v2) = all_of_them(of_v2) - all_of_them(of_v1)
+    ! A reference that runs away takes the driving body along.
+    all_of_them(of_x1) = all_of_them(of_x1) - strobe%pair%y(at_ramp)
     n = coordinates_of(moving)
     point(:n) = pack(all_of_them, counts_of(moving))
   end function section_point
 
-  !> Sizes of the coordinates in a motion over `half_range` [m] of the position.
+  !> x, v at a point of the section, and those of the driving body of two (0 of one).
+  pure function section_state(moving, point) result(state)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    real(wp) :: state(4)
+    type(strobe_t) :: strobe
+    strobe = strobe_at(moving, point)
+    state = 0
+    if (allocated(moving%pair)) state(3:) = driver_of(strobe%pair)
+    state(:2) = [strobe%state%x, strobe%state%v]
+  end function section_state
+
+  !> Sizes of the coordinates in a motion over `half_range` [m] of the position. Two bodies may drift: then they are those of
+  !> what the stops or the forces allow.
   pure function scales_of(moving, half_range) result(scales)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
-    real(wp) :: scales(most_coordinates), w
+    real(wp) :: scales(most_coordinates), w, length
+    logical :: counts(most_coordinates)
     integer :: n
     w = moving%machine%drive_frequency
     scales = 1
     if (.not. allocated(moving%pair)) then
       scales(:2) = half_range*[1.0_wp, w]
     else
-      n = coordinates_of(moving)
-      scales(:n) = pack(half_range*[1.0_wp, w, 1.0_wp, w, 1/w], counts_of(moving))
+      counts = counts_of(moving)
+      n = count(counts)
+      length = half_range
+      if (moving%pair%machine%carried) length = min(length, (moving%pair%machine%upper - moving%pair%machine%lower)/2)
+      if (.not. counts(of_place)) length = min(length, moving%pair%force_scale/(moving%machine%mass*w**2))
+      scales(:n) = pack(length*[1.0_wp, w, 1.0_wp, w, 1/w], counts)
     end if
   end function scales_of
 

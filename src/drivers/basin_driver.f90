@@ -21,6 +21,7 @@ module basin_driver
   use refinement, only: automatic_block, last_origin
   use refinement_report, only: add_refinement, report_refinement
   use refined_tile, only: layers_of, pilot_share
+  use pair, only: is_pair
   use session, only: describe_file, open_session, session_t
   use shard, only: describe_shard, finish_shard, shard_path
   use status, only: last_reason, exit_done, reason_names, reason_settled
@@ -144,7 +145,7 @@ contains
     logical, intent(in) :: complete
     type(schema_t) :: extra
     call sum_counts(session, work)
-    call add_catalogue(extra, work%catalogues, work%captured)
+    call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
     call finish_tiles(session, file, complete, extra)
     call report_shares(session, work)
