@@ -82,6 +82,8 @@ contains
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       call take_step(march, pressed, guards, time_end - pressed%start, fallen)
+      tally%steps = tally%steps + 1
+      if (tally%steps > options%step_budget) fallen = march_failed
       call look_along(march, pressed, state%touch_speed, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing

@@ -16,7 +16,7 @@ module pair_motion
   use pair_impact, only: collide_pair, rest_on_stop
   use pair_modes, only: at_control, at_integral, at_v1, at_v2, at_x1, at_x2, control_now, mode_of_slip, &
     mode_together, pair_motion_t, pair_state_t, refresh, stands
-  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_failed
+  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed
   implicit none
   private
 
@@ -103,6 +103,7 @@ contains
       if (reason /= 0) return
       before = state%time
       call move_once(moving, state, time_end, stalls >= most_stalls, tally, reason, log)
+      if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (any(state%y /= state%y)) reason = reason_not_finite
       if (.not. abs(state%y(at_x2)) <= moving%options%domain) reason = reason_left_domain
       stalls = merge(0, stalls + 1, state%time > before)
