@@ -21,7 +21,12 @@ _CONTACT = {
     "lower": (r"$x_\mathrm{lower}$", "m"),
 }
 _BODIES = {"mass": ("$m_1$", "kg"), "driven_mass": ("$m_2$", "kg"), "friction": ("$b$", "N")}
-_STOP = {"restitution": ("$k$", ""), "stiffness": ("$K$", ""), "exponent": ("$n$", ""), "damping": ("damping", "")}
+_STOP = {
+    "restitution": ("$k$", ""),
+    "stiffness": ("$K$", ""),
+    "exponent": ("$n$", ""),
+    "damping": ("damping", ""),
+}
 _START = {"x0": ("$x_0$", "m"), "v0": ("$v_0$", "m/s")}
 _LAW_NAMES = {
     "none": "no",
@@ -71,11 +76,18 @@ def describe_case(result: xr.Dataset) -> list[str]:
 def _two_bodies(case: dict, axes: set[str]) -> list[str]:
     """The bodies, the friction between them, the drive and the stop; what is an axis is left out."""
     body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
-    pieces = [", ".join(_values(body, _BODIES, "body", axes)), f"drive: {drive.get('law', 'none')}".replace("_", " ")]
+    pieces = [
+        ", ".join(_values(body, _BODIES, "body", axes)),
+        f"drive: {drive.get('law', 'none')}".replace("_", " "),
+    ]
     law = str(contact.get("law", "none"))
     if law != "none":
         carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
-        stop = [f"stop on {carrier}"] if law.startswith("newton") else [f"stop on {carrier}", law.replace("_", "-")]
+        stop = (
+            [f"stop on {carrier}"]
+            if law.startswith("newton")
+            else [f"stop on {carrier}", law.replace("_", "-")]
+        )
         pieces.append(", ".join([*stop, *_values(contact, _STOP, "contact", axes)]))
     return pieces
 

@@ -19,7 +19,7 @@ _NAMES = {0: "run-up", 1: "run-down"}
 
 
 def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
-    """Return largest velocity and stroboscopic velocities of the driven body, with the regimes of each run as bands."""
+    """Return the largest and the stroboscopic velocities of the driven body, with the regimes as bands."""
     figure = style.new_figure(style.DOUBLE_COLUMN, 105.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     values = result[name].values
@@ -32,7 +32,13 @@ def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
         marks = {"linestyle": "", "marker": "o", "color": _COLOURS[int(code)], "markeredgewidth": 0.6}
         shape = {"markersize": 3.4, "markerfacecolor": "none"} if code == 0 else {"markersize": 1.5}
         top.plot(values, largest, **marks, **shape)
-        bottom.plot(np.repeat(values, strobe.shape[1]), strobe.ravel(), **marks, **shape, rasterized=strobe.size > 2000)
+        bottom.plot(
+            np.repeat(values, strobe.shape[1]),
+            strobe.ravel(),
+            **marks,
+            **shape,
+            rasterized=strobe.size > 2000,
+        )
         handles.append(Line2D([], [], **marks, **shape, label=_NAMES[int(code)]))
     edges = spans(result, name)
     for lower, upper, regime in edges:
@@ -52,7 +58,7 @@ def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
 
 
 def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:
-    """Return intervals of the parameter with the regime of the first run in them, bounded by its limits where known."""
+    """Return intervals of the parameter and the regime of the first run in them, bounded by the limits."""
     values = result[name].values
     place = int(np.flatnonzero(result["reason"].transpose("direction", name).values.any(axis=1))[0])
     codes = result["regime"].isel(direction=place).values
@@ -60,7 +66,9 @@ def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:
     order = np.argsort(values)
     values, codes = values[order], codes[order]
     limits = table(result, "limits")
-    middles = np.sort((limits["lower"].values + limits["upper"].values) / 2) if "lower" in limits else np.zeros(0)
+    middles = (
+        np.sort((limits["lower"].values + limits["upper"].values) / 2) if "lower" in limits else np.zeros(0)
+    )
     found = []
     start = values[0]
     for k in range(1, values.size + 1):
@@ -82,5 +90,6 @@ def limit_texts(result: xr.Dataset) -> list[str]:
         return ["one regime throughout"]
     columns = (limits[key].values for key in ("name", "lower", "upper"))
     return [
-        f"{flag_text(str(text))} {lower:.6g} to {upper:.6g}" for text, lower, upper in zip(*columns, strict=True)
+        f"{flag_text(str(text))} {lower:.6g} to {upper:.6g}"
+        for text, lower, upper in zip(*columns, strict=True)
     ]

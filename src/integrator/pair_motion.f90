@@ -264,11 +264,8 @@ contains
       state%y(at_control) = control_now(moving, state)
       state%y(at_integral) = state%y(at_integral) &
         + machine%sample_time*(sum(moving%reference*state%y) - state%y(at_x1))
-      if (machine%contact%soft .and. state%mode == mode_stick) then
-        call start_together(moving, state)
-      else if (state%mode == mode_stick .or. state%mode == mode_held) then
-        call mode_together(moving, state)
-      end if
+      if (state%mode == mode_stick) call start_together(moving, state)
+      if (state%mode == mode_held) call mode_together(moving, state)
     end associate
   end subroutine take_sample
 
