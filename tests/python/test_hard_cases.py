@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions that are given up, cost too much or are hardly meant: the file is right, and the program says so."""
+"""Motions that are given up, cost too much or are hardly meant: the file is right and the program tells."""
 
 import csv
 
@@ -97,7 +97,7 @@ def test_a_blow_after_the_end_is_told(separatrix, tmp_path):
     [
         ("trajectory.samples_per_period=2000000000", "allowed at most 20000000 samples in all"),
         (
-            'contact={law="kelvin_voigt",stiffness=1e4,upper=1,tension=0.5}',
+            'contact={law="kelvin_voigt",stiffness=1e4,damping=1,upper=1,tension=0.5}',
             "key 'contact.tension': found 0.5, allowed 0 or 1",
         ),
     ],
