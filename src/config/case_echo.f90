@@ -119,6 +119,7 @@ contains
              line('lanes', quoted(trim(integrator%lanes)))// &
              line('tolerance', to_text(integrator%tolerance))// &
              line('event_budget', to_text(integrator%event_budget))// &
+             line('step_budget', to_text(integrator%step_budget))// &
              newline//'[attractors]'//newline// &
              line('sample', to_text(attractors%sample))// &
              line('seed', to_text(attractors%seed))// &

@@ -52,7 +52,7 @@ contains
     else
       ! What 15 digits do not give, no fewer do.
       text = with_digits(value, 15)
-      read (text, *, iostat=status) back
+      call read_number(text, back, status)
       if (status == 0 .and. abs(back - value) > 0) first = 16
     end if
     do count = first, 17

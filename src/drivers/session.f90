@@ -9,6 +9,7 @@ module session
   use case_echo, only: case_identity
   use case_reader, only: load_case
   use case_type, only: case_t
+  use case_warnings, only: warn_about
   use command_line, only: command_t
   use errors, only: error_t
   use files, only: give_lock, take_lock
@@ -104,6 +105,7 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
+    call warn_about(self%the_case, self%journal)
   end subroutine begin
 
   subroutine unlock(session)

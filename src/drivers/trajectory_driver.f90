@@ -10,7 +10,7 @@ module trajectory_driver
   use command_line, only: command_t
   use contact_law, only: barrier_positions, contact_at_speed, force_on_body
   use drive_law, only: foot_motion
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
   use journal, only: duration_text
@@ -23,7 +23,7 @@ module trajectory_driver
   use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
-  use status, only: exit_done, reason_name, reason_time_over
+  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
   use text, only: to_text
   use text_table, only: table_t
   use trajectory, only: outcome_t, run_trajectory, span_t
@@ -31,6 +31,9 @@ module trajectory_driver
   private
 
   public :: run_trajectory_command
+
+  !> Most samples of a trajectory: some hundred bytes each.
+  real(wp), parameter :: most_samples = 2e7_wp
 
 contains
 
@@ -56,6 +59,7 @@ contains
     span%stop_when_captured = .false.
     call slice_motion(grid, 0_int64, moving, error)
     if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
+    if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate .or. command%dry_run) then
@@ -73,11 +77,12 @@ contains
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     if (allocated(moving%pair)) call add_driver_events(log, schema)
     call add_energy(moving, log, schema)
-    call add_book(log%book, schema)
+    call add_book(log%book, outcome%reason == reason_time_over, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
-      if (.not. allocated(error) .and. len(command%csv) > 0) call write_events(command%csv, log, error)
+      if (.not. allocated(error) .and. len(command%csv) > 0) &
+        call write_events(command%csv, log, allocated(moving%pair), error)
       if (.not. allocated(error) .and. len(command%record) > 0) then
         call write_record(command%record, session%the_case, moving, grid%start, error)
       end if
@@ -86,6 +91,17 @@ contains
     call report(session, moving, outcome, log, path)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
+
+  !> Code 65 if the samples of so many drive periods are more than fit into memory.
+  subroutine check_samples(the_case, periods, error)
+    type(case_t), intent(in) :: the_case
+    real(wp), intent(in) :: periods
+    type(error_t), allocatable, intent(out) :: error
+    if (periods*the_case%trajectory%samples_per_period <= most_samples) return
+    call fail(error, exit_bad_case, "key 'trajectory.samples_per_period': found "// &
+              to_text(the_case%trajectory%samples_per_period)//' over '//to_text(periods, 6)//' drive periods, allowed '// &
+              'at most '//to_text(nint(most_samples))//' samples in all')
+  end subroutine check_samples
 
   !> Attributes: the drive, the barriers, and the steady values over the window.
   subroutine describe_motion(moving, span, outcome, log, schema)
@@ -175,16 +191,18 @@ contains
                              data=foot)
   end subroutine add_foot
 
-  !> Where the energy went by the end.
-  subroutine add_book(book, schema)
+  !> Where the energy went by the end, or until the motion was given up.
+  subroutine add_book(book, complete, schema)
     type(book_t), intent(in) :: book
+    logical, intent(in) :: complete
     type(schema_t), intent(inout) :: schema
     call schema%add_attribute('', 'energy_start', book%at_start)
-    call schema%add_attribute('', 'energy_end', book%at_end)
     call schema%add_attribute('', 'energy_lost_to_friction', book%friction)
     call schema%add_attribute('', 'energy_lost_to_damping', book%damping)
     call schema%add_attribute('', 'energy_lost_to_contacts', book%contact)
     call schema%add_attribute('', 'energy_put_in', book%work)
+    if (.not. complete) return
+    call schema%add_attribute('', 'energy_end', book%at_end)
     call schema%add_attribute('', 'energy_closing_error', closing_error(book))
   end subroutine add_book
 
@@ -192,13 +210,10 @@ contains
   subroutine add_driver_events(log, schema)
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: driver(2, log%events)
-    driver = 0
-    if (log%events > 0) driver = log%event_driver(:, :log%events)
     call schema%add_variable('event_driver_x', type_float64, ['event'], units='m', &
-                             long_name='position of the driving body', data=driver(1, :))
+                             long_name='position of the driving body', data=log%event_driver(1, :log%events))
     call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
-                             long_name='velocity of the driving body', data=driver(2, :))
+                             long_name='velocity of the driving body', data=log%event_driver(2, :log%events))
   end subroutine add_driver_events
 
   !> Where the energy went over time.
@@ -233,18 +248,24 @@ contains
 
   end subroutine add_energy
 
-  !> The events as a table at full precision.
-  subroutine write_events(path, log, error)
+  !> The events as a table at full precision, of two bodies with the driving one.
+  subroutine write_events(path, log, pair, error)
     character(len=*), intent(in) :: path
+    logical, intent(in) :: pair
     type(log_t), intent(in) :: log
     type(error_t), allocatable, intent(out) :: error
     type(table_t) :: table
+    character(len=:), allocatable :: driver
     integer :: i
     call table%create(path)
-    call table%line('kind,time,x,v_before,v_after')
+    driver = ''
+    if (pair) driver = ',driver_x,driver_v'
+    call table%line('kind,time,x,v_before,v_after'//driver)
     do i = 1, log%events
+      if (pair) driver = ','//to_text(log%event_driver(1, i))//','//to_text(log%event_driver(2, i))
       call table%line(trim(event_names(log%event_kind(i)))//','//to_text(log%event_data(1, i))//','// &
-                      to_text(log%event_data(2, i))//','//to_text(log%event_data(3, i))//','//to_text(log%event_data(4, i)))
+                      to_text(log%event_data(2, i))//','//to_text(log%event_data(3, i))//','// &
+                      to_text(log%event_data(4, i))//driver)
     end do
     call table%close(error)
   end subroutine write_events
@@ -257,8 +278,8 @@ contains
     character(len=*), intent(in) :: path
     associate (f => outcome%window, journal => session%journal)
       if (outcome%reason /= reason_time_over) then
-        call journal%line('end', 'given up before the end: '//reason_name(outcome%reason)//'; '//to_text(log%events)// &
-          ' events until then')
+        call journal%line('end', 'given up before the end: '//explained(outcome%reason)//'; '//to_text(log%events)// &
+          ' events recorded until then')
         call journal%line('written', 'wrote '//path)
         return
       end if
@@ -273,5 +294,13 @@ contains
       call journal%line('written', 'wrote '//path)
     end associate
   end subroutine report
+
+  !> The reason, and what counts where that is not plain.
+  pure function explained(reason) result(text)
+    integer, intent(in) :: reason
+    character(len=:), allocatable :: text
+    text = reason_name(reason)
+    if (reason == reason_event_budget) text = text//' (flights count, those between samples of a controller, too)'
+  end function explained
 
 end module trajectory_driver

@@ -65,6 +65,8 @@ contains
       last = h >= remaining
       h = min(h, remaining)
       outcome = flight_failed
+      tally%steps = tally%steps + 1
+      if (tally%steps > options%step_budget) exit
       if (.not. h > 2*spacing(state%time + tiny(h))) exit
       call try_step(machine, slip, options%tolerance, state%time, y, h, slopes, next, error)
       if (.not. error <= 1) then

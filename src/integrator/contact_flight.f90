@@ -87,6 +87,8 @@ contains
       until = next_sample(machine%drive, pressed%start + march%time, time_end)
       call take_step(march, pressed, guards, until - pressed%start, fallen)
       if (fallen == march_time_over .and. until < time_end) fallen = march_goes_on
+      tally%steps = tally%steps + 1
+      if (tally%steps > options%step_budget) fallen = march_failed
       call look_along(march, pressed, state%touch_speed, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing

@@ -26,7 +26,7 @@ module motion
   use pair_modes, only: pair_motion_t
   use rest, only: chatter_time, hold, mode_from_rest
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
-    reason_step_failed
+    reason_step_budget, reason_step_failed
   implicit none
   private
 
@@ -113,6 +113,7 @@ contains
       case default
         call rest_on(moving, state, time_end, tally, log)
       end select
+      if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (.not. (abs(state%x) <= moving%options%domain)) reason = reason_left_domain
       if (state%x /= state%x .or. state%v /= state%v .or. state%time /= state%time) reason = reason_not_finite
       stalls = merge(0, stalls + 1, state%time > before)

@@ -50,6 +50,8 @@ module motion_state
     real(wp) :: tolerance = 1e-13_wp
     !> Events after which a trajectory is given up.
     integer(int64) :: event_budget = 1000000_int64
+    !> Steps of adaptive flights after which a trajectory is given up.
+    integer(int64) :: step_budget = 5000000_int64
     !> |x| beyond which the body has left the domain [m].
     real(wp) :: domain = 1e6_wp
     !> Doubles per vector where many bodies fly together; 0 = one by one.
@@ -58,7 +60,8 @@ module motion_state
 
   !> Counts and extremes since the last reset.
   type, public :: tally_t
-    integer(int64) :: events = 0
+    !> Flights, and steps of adaptive ones.
+    integer(int64) :: events = 0, steps = 0
     integer(int64) :: impacts = 0, chatters = 0, sticks = 0, slips = 0
     real(wp) :: impact_speed_sum = 0, last_impact_speed = 0
     real(wp) :: x_max = -huge(1.0_wp), x_min = huge(1.0_wp), v_max = -huge(1.0_wp)
@@ -152,12 +155,14 @@ contains
     type(tally_t), intent(inout) :: tally
     type(state_t), intent(in) :: state
     logical :: wants_v_max
-    integer(int64) :: events
+    integer(int64) :: events, steps
     wants_v_max = tally%wants_v_max
     events = tally%events
+    steps = tally%steps
     tally = tally_t()
     tally%wants_v_max = wants_v_max
     tally%events = events
+    tally%steps = steps
     call note_position(tally, state)
     tally%v_max = state%v
     select case (state%mode)
@@ -195,6 +200,7 @@ contains
     real(wp), intent(in) :: interval
     log%sample_interval = interval
     allocate (log%event_kind(256), log%event_data(4, 256), log%sample_mode(4096), log%sample_data(3, 4096))
+    allocate (log%event_driver(2, 256), log%sample_driver(2, 256), log%sample_book(5, 256), log%sample_touch(1, 256))
   end subroutine open_log
 
   !> Writes an event down: state just before it and the velocity just after; `driver` is x, v of the driving body of two.

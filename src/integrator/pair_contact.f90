@@ -100,6 +100,8 @@ contains
     call begin_march(march, pressing, moving%options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       call take_step(march, pressing, guards_of(moving, pressing, hold), time_end - pressing%start, fell)
+      tally%steps = tally%steps + 1
+      if (tally%steps > moving%options%step_budget) fell = march_failed
       call look_along(moving, pressing, march, start, book, tally, log)
       if (fell == cut) then
         pressing%pushing = .not. pressing%pushing

@@ -10,7 +10,7 @@ module pair_impact
     word_chatter_upper, word_lower, word_upper
   use pair, only: driven_by_motion, impact_mass
   use pair_flight, only: body_state, driver_of, fly_pair, guard_none
-  use pair_modes, only: at_v1, at_v2, at_x1, at_x2, mode_of_slip, mode_together, pair_motion_t, pair_state_t
+  use pair_modes, only: at_v1, at_v2, at_x1, at_x2, mode_of_slip, mode_together, pair_motion_t, pair_state_t, stands
   implicit none
   private
 
@@ -30,6 +30,7 @@ contains
     type(log_t), intent(inout), optional :: log
     type(pair_state_t) :: before
     real(wp) :: speed, k, mass, driving_speed
+    logical :: rounding
     before = state
     state%touch = side
     state%y(at_x2) = merge(moving%machine%upper, moving%machine%lower, side > 0)
@@ -40,19 +41,17 @@ contains
     if (moving%machine%carried) speed = side*(state%y(at_v2) - state%y(at_v1))
     if (speed > 0) then
       k = restitution_at(moving%machine%contact, speed)
-      if (moving%clamped .or. speed <= moving%negligible_speed) k = 0
+      rounding = stands(moving, state, speed)
+      if (moving%clamped .or. speed <= moving%negligible_speed .or. rounding) k = 0
       call set_relative_velocity(moving, state, -side*k*speed)
-      tally%impacts = tally%impacts + 1
-      tally%last_impact_speed = speed
-      tally%impact_speed_sum = tally%impact_speed_sum + speed
-      call append_word(tally, merge(word_upper, word_lower, side > 0))
+      if (.not. rounding) call count_impact(tally, speed, merge(word_upper, word_lower, side > 0))
       if (present(log)) then
         log%book%contact = log%book%contact + 0.5_wp*mass*speed**2*(1 - k**2)
         if (moving%machine%carried .and. moving%machine%drive == driven_by_motion) then
           log%book%work = log%book%work - side*mass*(1 + k)*speed*driving_speed
         end if
-        call record_event(log, merge(event_impact_upper, event_impact_lower, side > 0), body_state(before), &
-                          state%y(at_v2), driver_of(before))
+        if (.not. rounding) call record_event(log, merge(event_impact_upper, event_impact_lower, side > 0), &
+                                              body_state(before), state%y(at_v2), driver_of(before))
       end if
       if (k*speed > 0) then
         call leave_stop(moving, state, side)
@@ -65,6 +64,16 @@ contains
     end if
     call rest_on_stop(moving, state)
   end subroutine collide_pair
+
+  pure subroutine count_impact(tally, speed, word)
+    type(tally_t), intent(inout) :: tally
+    real(wp), intent(in) :: speed
+    integer, intent(in) :: word
+    tally%impacts = tally%impacts + 1
+    tally%last_impact_speed = speed
+    tally%impact_speed_sum = tally%impact_speed_sum + speed
+    call append_word(tally, word)
+  end subroutine count_impact
 
   !> Gives m2 the velocity `relative` [m/s] against its stop; two bodies keep their momentum.
   pure subroutine set_relative_velocity(moving, state, relative)
@@ -112,7 +121,8 @@ contains
       return
     end if
     state%y(at_v2) = 0
-    if (.not. abs(state%y(at_v1)) > 0) then
+    if (stands(moving, state, state%y(at_v1))) then
+      if (moving%machine%drive /= driven_by_motion) state%y(at_v1) = 0
       call mode_together(moving, state)
       return
     end if

@@ -15,8 +15,8 @@ module pair_motion
     guard_press, guard_separate, guard_slip, guard_upper
   use pair_impact, only: collide_pair, rest_on_stop
   use pair_modes, only: at_control, at_integral, at_v1, at_v2, at_x1, at_x2, control_now, mode_of_slip, &
-    mode_together, pair_motion_t, pair_state_t, refresh
-  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_failed
+    mode_together, pair_motion_t, pair_state_t, refresh, stands
+  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed
   implicit none
   private
 
@@ -66,20 +66,21 @@ contains
     end associate
   end function start_pair
 
-  !> Mode of bodies with equal velocities; a rigid stop on the ground only counts once they meet it.
+  !> Mode of bodies with equal velocities; a rigid stop on the ground only counts where they rest on it.
   pure subroutine start_together(moving, state)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
     integer :: touch
+    logical :: rests
     if (state%pressed /= 0) then
       call mode_pressed(moving, state)
       return
     end if
     touch = state%touch
-    if (moving%machine%contact%soft) state%touch = 0
-    if (.not. moving%machine%carried) state%touch = 0
+    rests = .not. moving%machine%contact%soft .and. (moving%machine%carried .or. stands(moving, state, state%y(at_v2)))
+    if (.not. rests) state%touch = 0
     call mode_together(moving, state)
-    state%touch = touch
+    if (.not. rests) state%touch = touch
   end subroutine start_together
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
@@ -102,6 +103,7 @@ contains
       if (reason /= 0) return
       before = state%time
       call move_once(moving, state, time_end, stalls >= most_stalls, tally, reason, log)
+      if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (any(state%y /= state%y)) reason = reason_not_finite
       if (.not. abs(state%y(at_x2)) <= moving%options%domain) reason = reason_left_domain
       stalls = merge(0, stalls + 1, state%time > before)
@@ -149,7 +151,10 @@ contains
     held = stalled .and. abs(state%y(at_v1) - state%y(at_v2)) <= moving%negligible_speed
     if (held) then
       stop_time = min(stop_time, state%time + 1e-9_wp*moving%machine%period)
-      if (state%mode /= mode_held) then
+      if (state%touch /= 0 .and. .not. moving%machine%carried) then
+        state%y(at_v2) = 0
+        state%mode = mode_held
+      else
         state%y(at_v2) = state%y(at_v1)
         state%mode = mode_stick
       end if
