@@ -71,12 +71,13 @@ template <bool damping, bool layer> inline void begin_flight(const lane_machine 
   g.start_a = fresh ? k.a + a : g.start_a;
   g.start_j = fresh ? k.j - m.natural * m.natural * v - 2 * m.decay * a : g.start_j;
   g.found = fresh ? vec{} : g.found;
-  g.skip = fresh ? vec{} : g.skip;
+  if (layer)
+    g.skip = fresh ? vec{} : g.skip;
   g.status = fresh ? all(lane_flying) : g.status;
 }
 
 // Keeps the event that is `step` after the evaluated point, where `accept`.
-template <bool damping>
+template <bool damping, bool layer>
 inline void keep_event(const lane_machine &m, const kinematics &k, mask accept, mask hit, vec span, vec step,
                        lane_group &g) {
   vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, re = k.re, im = k.im;
@@ -88,6 +89,8 @@ inline void keep_event(const lane_machine &m, const kinematics &k, mask accept, 
   g.end_v = accept ? k.v + step * (k.a + half * (k.j + third * k.s)) : g.end_v;
   g.end_a = accept ? k.a + step * (k.j + half * k.s) : g.end_a;
   g.end_j = accept ? k.j + step * k.s : g.end_j;
+  if (layer)
+    g.end_s = accept ? k.s : g.end_s;
   g.end_re = accept ? re : g.end_re;
   g.end_im = accept ? im : g.end_im;
 }
@@ -118,7 +121,7 @@ inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barri
     mask beyond = close & ~hit & (g.direction * (barrier - turn_x) <= 0.0);
     mask accept = seek & close & ~beyond;
     if (any(accept)) {
-      keep_event<damping>(m, k, accept, hit, next, step, g);
+      keep_event<damping, layer>(m, k, accept, hit, next, step, g);
       seek = seek & ~accept;
       if (!any(seek))
         break;
@@ -176,7 +179,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   turning turn;
   bool turns = layer && any(due & ~hit);
   if (turns) {
-    turn = turn_in_layer(m, g);
+    turn = turn_in_layer(m, due & ~hit, g);
     plain = hit ? plain : turn.sound;
     gap = hit ? gap : g.direction * (barrier - turn.x);
   }
@@ -238,40 +241,89 @@ template <bool damping> inline void take_stops(const lane_machine &m, lane_group
   g.start = section ? g.start - m.period : g.start;
 }
 
+// Lanes with a layer that come to a stop. Those that need not stop at this section: their motion is noted, and the
+// clock starts anew. Those within the layer at that time are `left` to the scalar code.
+inline void pass_sections(const lane_machine &m, int first, mask stops, lane_group &g, lane_batch &batch) {
+  mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
+  mask passing = stops & ~within & (g.sections > 0.5);
+  g.status = stops & ~passing ? (within ? all(lane_left) : all(lane_stopped)) : g.status;
+  if (!any(passing))
+    return;
+  kinematics k = evaluate<false>(m, g, g.until - g.start);
+  for (int i = 0; i < width; i++) {
+    if (passing[i]) {
+      batch.section_x[(int)g.passed[i]][first + i] = k.x[i];
+      batch.section_v[(int)g.passed[i]][first + i] = k.v[i];
+    }
+  }
+  g.passed = passing ? g.passed + 1.0 : g.passed;
+  g.sections = passing ? g.sections - 1.0 : g.sections;
+  g.x = passing ? k.x : g.x;
+  g.v = passing ? k.v : g.v;
+  g.time = passing ? vec{} : g.time;
+  g.start = passing ? g.start - m.period : g.start;
+}
+
+// Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that failed.
+template <bool damping, bool layer>
+inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
+  mask left = find_events<damping, layer>(m, seek, upward, barrier, g), found = seek & ~left;
+  if (layer)
+    left = left | find_edge(m, found, g);
+  return left | (found & ~prove<damping, layer>(m, found, g));
+}
+
 // Flies the lanes of one vector until each has stopped or is left to the scalar code.
-template <bool damping, bool layer> void fly(const lane_machine &m, int first, lane_batch &batch) {
+template <bool damping> void fly(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
-  load(batch, first, g);
-  begin_flight<damping, layer>(m, g);
+  load<false>(batch, first, g);
+  begin_flight<damping, false>(m, g);
   mask flying = g.status == lane_flying;
   while (any(flying)) {
-    mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5);
+    mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
     vec barrier = upward ? all(m.upper) : all(m.lower);
-    mask left = {};
-    if (any(seek)) {
-      left = find_events<damping, layer>(m, seek, upward, barrier, g);
-      mask found = seek & ~left;
-      if (layer) {
-        end_derivatives(m, found, g);
-        left = left | find_edge(m, found, g);
-      }
-      left = left | (found & ~prove<damping, layer>(m, found, g));
-    }
+    if (any(seek))
+      left = look_ahead<damping, false>(m, seek, upward, barrier, g);
     mask stops = flying & ~left & (g.start + g.span >= g.until);
-    if (layer) {
-      mask within = (g.until < g.start + g.skip) | (g.until > g.start + g.reach);
-      left = left | (stops & within);
-      stops = stops & ~within;
-    }
     g.status = stops ? all(lane_stopped) : g.status;
     flying = flying & ~left & ~stops;
     if (any(flying))
-      left = left | take_events<damping, layer>(m, flying, upward, barrier, g);
+      left = left | take_events<damping, false>(m, flying, upward, barrier, g);
     g.status = left ? all(lane_left) : g.status;
     flying = flying & ~left;
   }
   take_stops<damping>(m, g);
-  store(g, first, batch);
+  store<false>(g, first, batch);
+}
+
+// The same with a Stribeck layer, until one lane has stopped or is left. Turnings are dear here: a lane that has
+// come to one waits until all have. Before that the impacts are taken, and then the sections passed.
+void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
+  lane_group g;
+  load<true>(batch, first, g);
+  mask occupied = g.status != lane_idle;
+  begin_flight<false, true>(m, g);
+  mask flying = g.status == lane_flying;
+  while (any(flying) && !any(occupied & ~flying)) {
+    mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
+    vec barrier = upward ? all(m.upper) : all(m.lower);
+    if (any(seek))
+      left = look_ahead<false, true>(m, seek, upward, barrier, g);
+    g.status = left ? all(lane_left) : g.status;
+    flying = g.status == lane_flying;
+    mask stops = flying & (g.start + g.span >= g.until), due = flying & ~stops & (g.hits > 0.5);
+    if (!any(due) && any(stops))
+      pass_sections(m, first, stops, g, batch);
+    else if (!any(due))
+      due = flying;
+    if (any(due)) {
+      left = take_events<false, true>(m, due, upward, barrier, g);
+      g.status = left ? all(lane_left) : g.status;
+    }
+    flying = g.status == lane_flying;
+  }
+  take_stops<false>(m, g);
+  store<true>(g, first, batch);
 }
 
 } // namespace
@@ -280,11 +332,11 @@ template <bool damping, bool layer> void fly(const lane_machine &m, int first, l
   extern "C" void name(const lane_machine *m, lane_batch *batch) {                                           \
     for (int first = 0; first < lanes; first += width)                                                       \
       if (m->layer.excess > 0)                                                                               \
-        fly<false, true>(*m, first, *batch);                                                                 \
+        fly_through_layers(*m, first, *batch);                                                               \
       else if (m->decay > 0)                                                                                 \
-        fly<true, false>(*m, first, *batch);                                                                 \
+        fly<true>(*m, first, *batch);                                                                        \
       else                                                                                                   \
-        fly<false, false>(*m, first, *batch);                                                                \
+        fly<false>(*m, first, *batch);                                                                       \
   }
 
 #endif

@@ -15,6 +15,8 @@
 
 namespace {
 
+enum { most_improvements = 3 };
+
 // Speed per time since V = 0, by its derivatives there, and what follows from them.
 struct course {
   vec rate, curl, snap, crackle, pop;
@@ -64,47 +66,77 @@ struct passage {
   mask sound;
 };
 
-// The passage of a body whose Coulomb course is c. Inward the time runs backwards, from rest to the edge.
-// `bound` is that of the seventh derivative of the position.
-template <bool outward> passage pass_layer(const lane_machine &m, const course &c, vec bound) {
+// The values at the nodes while a passage is being integrated.
+struct nodes {
+  vec inverse[layer_nodes], before[layer_nodes], time[layer_nodes], total;
+};
+
+// From what is known of 1/D: P, and with it a better 1/D for the lanes `seek`. Returns the largest change.
+template <bool outward>
+inline vec improve(const lane_machine &m, const course &c, mask seek, nodes &n) {
   const lane_layer &l = m.layer;
   const double(&table)[layer_nodes][layer_nodes] = outward ? l.from_rest : l.from_edge;
-  const double *first = outward ? l.first_from_rest : l.first_from_edge;
-  const double *second = outward ? l.second_from_rest : l.second_from_edge;
-  vec share = l.excess / c.rate, total = {}, lowest = c.rate;
-  vec before[layer_nodes], inverse[layer_nodes], lost[layer_nodes] = {}, moment[layer_nodes] = {};
+  vec lost[layer_nodes] = {}, moment[layer_nodes] = {}, total = {}, change = {};
   for (int i = 0; i < layer_nodes; i++) {
-    vec guess = share * (outward ? first[i] + share * second[i] : first[i] - share * second[i]);
-    vec speed = l.speed[i] + guess;
-    before[i] = acceleration_at(c, speed);
-    lowest = before[i] < lowest ? before[i] : lowest;
-    inverse[i] = 1.0 / (outward ? before[i] - l.force[i] : before[i] + l.force[i]);
-    vec slope = l.force[i] * inverse[i], late = slope * time_at(c, speed);
+    vec slope = l.force[i] * n.inverse[i], late = slope * n.time[i];
     total += l.weight[i] * slope;
     for (int k = 0; k < layer_nodes; k++) {
       lost[k] += table[i][k] * slope;
       moment[k] += table[i][k] * late;
     }
   }
-  vec rest = outward ? vec{} : time_at(c, total), change = {};
+  n.total = seek ? total : n.total;
   const double stiffness = m.natural * m.natural;
-  passage p = {};
   for (int i = 0; i < layer_nodes; i++) {
     vec speed = l.speed[i] + lost[i], t = time_at(c, speed);
-    vec x = (acceleration_at(c, speed) - before[i] + stiffness * (lost[i] * t - moment[i])) * inverse[i];
+    vec now = acceleration_at(c, speed) + stiffness * (lost[i] * t - moment[i]);
+    vec x = (now - n.before[i]) * n.inverse[i];
     change = magnitude(x) > change ? magnitude(x) : change;
-    vec part = (l.weight[i] * l.force[i]) * inverse[i] * (1.0 - x * (1.0 - x));
-    vec angle = m.natural * (t - rest), z = angle * angle;
+    n.inverse[i] = seek ? n.inverse[i] * (1.0 - x * (1.0 - x)) : n.inverse[i];
+    n.before[i] = seek ? now : n.before[i];
+    n.time[i] = seek ? t : n.time[i];
+  }
+  return change;
+}
+
+// The passage of a body whose Coulomb course is c. Inward the time runs backwards, from rest to the edge.
+// `bound` is that of the seventh derivative of the position.
+template <bool outward> passage pass_layer(const lane_machine &m, const course &c, mask due, vec bound) {
+  const lane_layer &l = m.layer;
+  const double *first = outward ? l.first_from_rest : l.first_from_edge;
+  const double *second = outward ? l.second_from_rest : l.second_from_edge;
+  vec share = l.excess / c.rate, lowest = c.rate;
+  nodes n;
+  for (int i = 0; i < layer_nodes; i++) {
+    vec guess = share * (outward ? first[i] + share * second[i] : first[i] - share * second[i]);
+    vec speed = l.speed[i] + guess;
+    n.before[i] = acceleration_at(c, speed);
+    lowest = n.before[i] < lowest ? n.before[i] : lowest;
+    n.inverse[i] = 1.0 / (outward ? n.before[i] - l.force[i] : n.before[i] + l.force[i]);
+    n.time[i] = time_at(c, speed);
+  }
+  n.total = vec{};
+  vec least = outward ? c.rate - l.excess : c.rate, bend = magnitude(c.curl) / least, unit = l.thickness / least;
+  // What the series leaves out, over the whole layer.
+  vec unit2 = unit * unit, bend2 = bend * bend;
+  vec cut = unit2 * unit2 * unit * (bound / least + 105 * (bend2 * bend2 * bend));
+  due = due & (c.rate > 0.0) & (lowest > 0.25 * c.rate);
+  if (outward)
+    due = due & (share <= l.steepest);
+  passage p = {};
+  for (int round = 0; round < most_improvements && any(due & ~p.sound); round++) {
+    vec change = improve<outward>(m, c, ~p.sound, n);
+    // What another round would change.
+    vec left = change * n.total * (bend / least);
+    p.sound = p.sound | (due & ((left + cut) * n.total <= l.precision) & (change < 1e-4));
+  }
+  vec rest = outward ? vec{} : time_at(c, n.total);
+  for (int i = 0; i < layer_nodes; i++) {
+    vec part = (l.weight[i] * l.force[i]) * n.inverse[i];
+    vec angle = m.natural * (n.time[i] - rest), z = angle * angle;
     p.even += part * (1.0 - z * (0.5 - (1.0 / 24) * z));
     p.odd += part * angle * (1.0 - (1.0 / 6) * z);
   }
-  // What another round would change, and what the series leaves out, each over the whole layer.
-  vec least = outward ? c.rate - l.excess : c.rate, unit = l.thickness / least, bend = magnitude(c.curl) / least;
-  vec unit5 = unit * unit * unit * unit * unit, bend5 = bend * bend * bend * bend * bend;
-  vec rounds = change * total * total * (bend / least), cut = total * unit5 * (bound / least + 105 * bend5);
-  p.sound = (c.rate > 0.0) & (lowest > 0.25 * c.rate) & (rounds + cut <= l.precision) & (change < 1e-4);
-  if (outward)
-    p.sound = p.sound & (share <= l.steepest);
   return p;
 }
 
@@ -112,7 +144,7 @@ template <bool outward> passage pass_layer(const lane_machine &m, const course &
 // barrier. Returns the lanes where the edge was not found.
 inline mask find_edge(const lane_machine &m, mask found, lane_group &g) {
   vec d = g.direction, speed, rate, curl;
-  course c = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, d * g.end_c, -d * g.end_p);
+  course c = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, vec{}, vec{});
   vec t = time_at(c, all(m.layer.edge));
   follow(c, t, speed, rate, curl);
   mask hit = g.hits > 0.5;
@@ -134,19 +166,21 @@ struct turning {
   mask sound;
 };
 
-inline turning turn_in_layer(const lane_machine &m, const lane_group &g) {
+inline turning turn_in_layer(const lane_machine &m, mask due, const lane_group &g) {
   const double stiffness = m.natural * m.natural;
+  vec end_c, end_p;
+  end_derivatives(m, g, end_c, end_p);
   turning r;
   vec d = g.direction, bound = derivative_bound(m, g);
-  course in = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, d * g.end_c, -d * g.end_p);
-  passage inward = pass_layer<false>(m, in, bound);
+  course in = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, d * end_c, -d * end_p);
+  passage inward = pass_layer<false>(m, in, due, bound);
   r.early = time_at(in, inward.even);
   vec h = -r.early, half = 0.5 * h, third = (1.0 / 3) * h, fourth = 0.25 * h, fifth = 0.2 * h;
-  vec p = g.end_p, c = g.end_c + h * p, s = g.end_s + h * (g.end_c + half * p);
-  vec j = g.end_j + h * (g.end_s + half * (g.end_c + third * p));
-  vec a = g.end_a + h * (g.end_j + half * (g.end_s + third * (g.end_c + fourth * p)));
-  vec v = h * (g.end_a + half * (g.end_j + third * (g.end_s + fourth * (g.end_c + fifth * p))));
-  vec path = half * (g.end_a + third * (g.end_j + fourth * (g.end_s + fifth * g.end_c)));
+  vec p = end_p, c = end_c + h * p, s = g.end_s + h * (end_c + half * p);
+  vec j = g.end_j + h * (g.end_s + half * (end_c + third * p));
+  vec a = g.end_a + h * (g.end_j + half * (g.end_s + third * (end_c + fourth * p)));
+  vec v = h * (g.end_a + half * (g.end_j + third * (g.end_s + fourth * (end_c + fifth * p))));
+  vec path = half * (g.end_a + third * (g.end_j + fourth * (g.end_s + fifth * end_c)));
   // How far the body is off the old course, and what that and the reversed friction do to the derivatives.
   vec off = -d * inward.odd * (1 / m.natural), jump = (2 * m.kinetic) * d - stiffness * off;
   r.x = g.end_x + h * path + off;
@@ -156,7 +190,7 @@ inline turning turn_in_layer(const lane_machine &m, const lane_group &g) {
   c -= stiffness * (stiffness * v);
   p += stiffness * (stiffness * jump);
   course out = course_of(-d * a, -d * j, -d * s, -d * c, -d * p);
-  passage outward = pass_layer<true>(m, out, bound);
+  passage outward = pass_layer<true>(m, out, due & inward.sound, bound);
   r.re = g.end_re;
   r.im = g.end_im;
   turn_on<false, 6>(m, h, r.re, r.im);

@@ -9,20 +9,25 @@
 #include "lane_types.hpp"
 #include "lane_vectors.hpp"
 
+#include <cstddef>
+
 namespace {
 
 typedef lane_fields<vec> lane_group;
 
-enum { members = sizeof(lane_batch) / sizeof(double[lanes]) };
+enum {
+  members = sizeof(lane_batch::fields) / sizeof(double[lanes]),
+  plain_members = offsetof(lane_fields<double[lanes]>, sections) / sizeof(double[lanes])
+};
 
-inline void load(const lane_batch &batch, int first, lane_group &g) {
-  for (int i = 0; i < members; i++)
-    memcpy((vec *)&g + i, (const double *)&batch + i * lanes + first, sizeof(vec));
+template <bool layer> inline void load(const lane_batch &batch, int first, lane_group &g) {
+  for (int i = 0; i < (layer ? members : plain_members); i++)
+    memcpy((vec *)&g + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
 }
 
-inline void store(const lane_group &g, int first, lane_batch &batch) {
-  for (int i = 0; i < members; i++)
-    memcpy((double *)&batch + i * lanes + first, (const vec *)&g + i, sizeof(vec));
+template <bool layer> inline void store(const lane_group &g, int first, lane_batch &batch) {
+  for (int i = 0; i < (layer ? members : plain_members); i++)
+    memcpy((double *)&batch.fields + i * lanes + first, (const vec *)&g + i, sizeof(vec));
 }
 
 // Position and four derivatives, and the free part exp(lambda s) Z.
@@ -86,26 +91,22 @@ inline vec derivative_bound(const lane_machine &m, const lane_group &g) {
   return m.bound_periodic + m.bound_free * size;
 }
 
-// Derivatives 4 to 6 of the position at the ends of the flights `found`, without damping.
-inline void end_derivatives(const lane_machine &m, mask found, lane_group &g) {
+// Derivatives 5 and 6 of the position at the end of the flight, without damping.
+inline void end_derivatives(const lane_machine &m, const lane_group &g, vec &crackle, vec &pop) {
   vec sine, cosine;
   sine_cosine((g.start + g.span) * m.drive_frequency, sine, cosine);
-  const double stiffness = m.natural * m.natural;
-  vec snap = stiffness * (m.natural * g.end_im), crackle = (stiffness * stiffness) * g.end_re;
-  vec pop = -stiffness * snap, c = cosine, s = sine;
+  const double stiffness = m.natural * m.natural, fourth = stiffness * stiffness;
+  crackle = fourth * g.end_re;
+  pop = (-stiffness * fourth * (1 / m.natural)) * g.end_im;
+  vec c = cosine, s = sine;
   for (int n = 0; n < m.harmonics; n++) {
-    double w = (n + 1) * m.drive_frequency, w2 = w * w, w4 = w2 * w2;
-    vec part = w4 * (m.cosine[n] * c + m.sine[n] * s);
-    snap += part;
-    crackle += (w * w4) * (m.sine[n] * c - m.cosine[n] * s);
-    pop -= w2 * part;
+    double w = (n + 1) * m.drive_frequency, w2 = w * w, w5 = w * w2 * w2;
+    crackle += w5 * (m.sine[n] * c - m.cosine[n] * s);
+    pop -= (w * w5) * (m.cosine[n] * c + m.sine[n] * s);
     vec next = c * cosine - s * sine;
     s = s * cosine + c * sine;
     c = next;
   }
-  g.end_s = found ? snap : g.end_s;
-  g.end_c = found ? crackle : g.end_c;
-  g.end_p = found ? pop : g.end_p;
 }
 
 } // namespace

@@ -5,7 +5,7 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64, layer_nodes = 14 };
+enum { lanes = 16, most_harmonics = 64, layer_nodes = 14, most_sections = 32 };
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
 struct lane_layer {
@@ -66,13 +66,20 @@ template <class T> struct lane_fields {
   // The event found at the end of the flight: 1 = found, when, whether at a barrier, the motion just before
   // it.
   T found, span, hits, end_x, end_v, end_a, end_j, end_re, end_im;
-  // With a Stribeck layer: the time since the start of the flight at which the body leaves the layer (`start_v`,
-  // ... are those then), and at which it enters it again or hits, with its motion; higher derivatives at the
-  // end.
-  T skip, reach, reach_v, reach_a, reach_j, end_s, end_c, end_p;
   // Counts and extremes since the caller last took them away.
   T flights, impacts, speed_sum, last_speed, margin;
+  // From here on with a Stribeck layer only. Sections that the lane passes over before it stops at one, and
+  // that it has passed.
+  T sections, passed;
+  // The time since the start of the flight at which the body leaves the layer (`start_v`, ... are those then),
+  // and at which it enters it again or hits, with its motion. Fourth derivative at the end of the flight.
+  T skip, reach, reach_v, reach_a, reach_j, end_s;
 };
-typedef lane_fields<double[lanes]> lane_batch;
+
+struct lane_batch {
+  lane_fields<double[lanes]> fields;
+  // The motion on the sections passed.
+  double section_x[most_sections][lanes], section_v[most_sections][lanes];
+};
 
 #endif

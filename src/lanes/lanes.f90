@@ -17,9 +17,11 @@ module lanes
   implicit none
   private
 
-  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, take_counts, fly_lanes
+  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, section_state, take_counts, fly_lanes
 
   integer, parameter, public :: lane_count = 16
+  !> Sections that a lane can pass over in one go.
+  integer, parameter, public :: most_sections = 32
   integer, parameter :: most_harmonics = 64
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
@@ -30,9 +32,9 @@ module lanes
 
   !> Of a Stribeck layer with exponent 1 and 2, in units of v_s: the edge, where the excess friction is below 1e-14 of that at
   !> rest, a speed a little below, and the length of the variable of the nodes.
-  real(wp), parameter :: edges(2) = [34.0_wp, 5.83_wp], levels(2) = [32.3_wp, 5.68_wp], lengths(2) = [6.0_wp, 2.0_wp]
+  real(wp), parameter :: edges(2) = [34.0_wp, 5.83_wp], levels(2) = [32.3_wp, 5.68_wp], lengths(2) = [4.0_wp, 2.0_wp]
   !> The nodes are enough up to this share of the excess friction in the acceleration.
-  real(wp), parameter :: steepest = 0.25_wp
+  real(wp), parameter :: steepest = 0.4_wp
 
   !> Mirrors `lane_layer` of lane_types.hpp.
   type, bind(c) :: layer_t
@@ -58,8 +60,9 @@ module lanes
     real(c_double), dimension(lane_count) :: status = lane_idle, until = 0, time = 0, x = 0, v = 0, start = 0, &
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
-      skip = 0, reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0, end_c = 0, end_p = 0, &
-      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double)
+      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, passed = 0, &
+      skip = 0, reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
+    real(c_double), dimension(lane_count, most_sections) :: section_x = 0, section_v = 0
   end type lane_batch_t
 
   !> A machine ready to fly in lanes.
@@ -69,6 +72,11 @@ module lanes
     !> Doubles per vector.
     integer :: width = 2
     type(machine_t) :: machine
+    !> A body must be so fast [m/s] to be put into a lane: out of its Stribeck layer.
+    real(wp) :: slowest = 0
+    !> All lanes stop at every section, so that those set off together, whose first flights take longer to find, stay
+    !> together. With a Stribeck layer, whose passages are dear, none waits for another.
+    logical :: in_step = .true.
   end type lane_flow_t
 
   interface
@@ -147,7 +155,7 @@ contains
       layer%steepest = steepest
       speeds = sum([(n*flow%machine%drive_frequency*sqrt(flow%machine%cosine(n)**2 + flow%machine%sine(n)**2), &
                      n=1, flow%machine%harmonics)])
-      layer%precision = 4*epsilon(1.0_wp)*speeds
+      layer%precision = 16*epsilon(1.0_wp)*speeds
       ! The speed rises while q falls from 1 to its last.
       last = exponential(-edges(delta)/lengths(delta))
       q = 0.5_wp*(1 + last) - 0.5_wp*(1 - last)*node
@@ -166,6 +174,8 @@ contains
       layer%second_from_rest = 0.5_wp*matmul(layer%from_rest, share**2)
       layer%second_from_edge = 0.5_wp*matmul(layer%from_edge, share**2)
       ! A body that leaves a barrier within the layer is left to the event loop.
+      flow%slowest = layer%edge
+      flow%in_step = .false.
       flow%machine%slow = max(flow%machine%slow, layer%edge)
     end associate
   end subroutine set_layer
@@ -195,17 +205,15 @@ contains
     end do
   end subroutine set_response
 
-  !> Puts a slipping body into a lane, which will fly it until `until` [s after the section]. `new`: without memory of
-  !> flights before.
-  pure subroutine occupy_lane(flow, lane, state, until, new, batch)
+  !> Puts a slipping body into a lane, which will fly it to the section. `new`: without memory of flights before.
+  pure subroutine occupy_lane(flow, lane, state, new, batch)
     type(lane_flow_t), intent(in) :: flow
     integer, intent(in) :: lane
     type(state_t), intent(in) :: state
-    real(wp), intent(in) :: until
     logical, intent(in) :: new
     type(lane_batch_t), intent(inout) :: batch
     batch%status(lane) = lane_fresh
-    batch%until(lane) = until
+    batch%until(lane) = flow%machine%period
     batch%time(lane) = state%time
     batch%x(lane) = state%x
     batch%v(lane) = state%v
@@ -225,6 +233,15 @@ contains
     state = state_t(x=batch%x(lane), v=batch%v(lane), time=batch%time(lane), mode=mode_slip_plus)
     if (batch%direction(lane) < 0) state%mode = mode_slip_minus
   end function lane_state
+
+  !> The body in a lane on the section number `section` that the lane passed over.
+  pure function section_state(batch, lane, section) result(state)
+    type(lane_batch_t), intent(in) :: batch
+    integer, intent(in) :: lane, section
+    type(state_t) :: state
+    state = state_t(x=batch%section_x(lane, section), v=batch%section_v(lane, section), mode=mode_slip_plus)
+    if (state%v < 0) state%mode = mode_slip_minus
+  end function section_state
 
   !> Moves what a lane has counted to a tally.
   pure subroutine take_counts(batch, lane, tally)
