@@ -18,14 +18,13 @@ module layer_transit
 
   public :: prepare_transit, cross_layer, gauss
 
-  integer, parameter, public :: points = 14
-  integer, parameter :: pieces = 3, order = 16, most_rounds = 30
+  integer, parameter :: points = 14, pieces = 3, order = 16, most_rounds = 30
   !> Ends of the pieces in units of v_s, for delta = 1 and 2; the last end is the edge of the layer.
   real(wp), parameter :: inner_ends(2, 2) = reshape([2.0_wp, 6.0_wp, 1.0_wp, 2.5_wp], [2, 2])
   !> Gauss points are too few for more than double precision: the reference library goes without.
   logical, parameter :: precise_enough = epsilon(1.0_wp) > 1e-17_wp
   !> The acceleration may not fall below this share of that at the start.
-  real(wp), parameter :: smallest_share = 0.25_wp
+  real(wp), parameter :: smallest_share = 0.1_wp
 
   type, public :: transit_t
     logical :: available = .false.
@@ -198,43 +197,46 @@ contains
     end do
   end function polynomial
 
-  !> Gauss-Legendre points on [-1, 1], weights, and the integrals of the Lagrange polynomials from -1 to each point.
+  !> Gauss-Legendre points on [-1, 1], as many as `node` has room for, weights, and the integrals of the Lagrange polynomials
+  !> from -1 to each point (first index).
   pure subroutine gauss(node, weight, integral)
-    real(wp), intent(out) :: node(points), weight(points), integral(points, points)
-    real(wp) :: p(-1:points), table(-1:points, points), slope, sine, cosine
-    integer :: j, k, m, i
-    do j = 1, points
-      call sine_cosine(pi*(j - 0.25_wp)/(points + 0.5_wp), sine, cosine)
+    real(wp), intent(out) :: node(:), weight(:), integral(:, :)
+    real(wp) :: p(-1:size(node)), table(-1:size(node), size(node)), slope, sine, cosine
+    integer :: j, k, m, i, n
+    n = size(node)
+    do j = 1, n
+      call sine_cosine(pi*(j - 0.25_wp)/(n + 0.5_wp), sine, cosine)
       node(j) = -cosine
       do i = 1, 20
-        p = legendre(node(j))
-        slope = points*(node(j)*p(points) - p(points - 1))/(node(j)**2 - 1)
-        node(j) = node(j) - p(points)/slope
+        p = legendre(n, node(j))
+        slope = n*(node(j)*p(n) - p(n - 1))/(node(j)**2 - 1)
+        node(j) = node(j) - p(n)/slope
       end do
-      p = legendre(node(j))
+      p = legendre(n, node(j))
       table(:, j) = p
-      slope = points*(node(j)*p(points) - p(points - 1))/(node(j)**2 - 1)
+      slope = n*(node(j)*p(n) - p(n - 1))/(node(j)**2 - 1)
       weight(j) = 2/((1 - node(j)**2)*slope**2)
     end do
-    do j = 1, points
-      do k = 1, points
+    do j = 1, n
+      do k = 1, n
         integral(j, k) = (node(j) + 1)*weight(k)/2
-        do m = 1, points - 1
+        do m = 1, n - 1
           integral(j, k) = integral(j, k) + weight(k)/2*table(m, k)*(table(m + 1, j) - table(m - 1, j))
         end do
       end do
     end do
   end subroutine gauss
 
-  !> Legendre polynomials of degree 0 to `points`; index -1 is unused.
-  pure function legendre(t) result(p)
+  !> Legendre polynomials of degree 0 to `n`; index -1 is unused.
+  pure function legendre(n, t) result(p)
+    integer, intent(in) :: n
     real(wp), intent(in) :: t
-    real(wp) :: p(-1:points)
+    real(wp) :: p(-1:n)
     integer :: m
     p(-1) = 0
     p(0) = 1
     p(1) = t
-    do m = 1, points - 1
+    do m = 1, n - 1
       p(m + 1) = ((2*m + 1)*t*p(m) - m*p(m - 1))/(m + 1)
     end do
   end function legendre

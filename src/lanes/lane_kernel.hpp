@@ -267,10 +267,21 @@ inline void pass_sections(const lane_machine &m, int first, mask stops, lane_gro
 // Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that failed.
 template <bool damping, bool layer>
 inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
-  mask left = find_events<damping, layer>(m, seek, upward, barrier, g), found = seek & ~left;
-  if (layer)
-    left = left | find_edge(m, found, g);
-  return left | (found & ~prove<damping, layer>(m, found, g));
+  mask left = {};
+  for (int attempt = 0; attempt < (layer ? 2 : 1) && any(seek); attempt++) {
+    if (attempt > 0) {
+      g.found = seek ? vec{} : g.found;
+      g.up_span = seek ? 0.5 * g.up_span : g.up_span;
+      g.down_span = seek ? 0.5 * g.down_span : g.down_span;
+    }
+    left = find_events<damping, layer>(m, seek, upward, barrier, g);
+    mask found = seek & ~left;
+    if (layer)
+      left = left | find_edge(m, found, g);
+    left = left | (found & ~prove<damping, layer>(m, found, g));
+    seek = left;
+  }
+  return left;
 }
 
 // Flies the lanes of one vector until each has stopped or is left to the scalar code.

@@ -9,7 +9,7 @@ module lanes
   use elementary, only: exponential, logarithm
   use exact_flow, only: flow_t
   use kinds, only: wp
-  use layer_transit, only: gauss, points
+  use layer_transit, only: gauss
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use rest, only: chatter_speed
@@ -22,7 +22,7 @@ module lanes
   integer, parameter, public :: lane_count = 16
   !> Sections that a lane can pass over in one go.
   integer, parameter, public :: most_sections = 32
-  integer, parameter :: most_harmonics = 64
+  integer, parameter :: most_harmonics = 64, points = 12
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
@@ -30,11 +30,11 @@ module lanes
   !> A harmonic is too near resonance for the periodic response if that grows to more than this multiple of the forcing.
   real(wp), parameter :: largest_amplification = 500
 
-  !> Of a Stribeck layer with exponent 1 and 2, in units of v_s: the edge, where the excess friction is below 1e-14 of that at
+  !> Of a Stribeck layer with exponent 1 and 2, in units of v_s: the edge, where the excess friction is below 1e-11 of that at
   !> rest, a speed a little below, and the length of the variable of the nodes.
-  real(wp), parameter :: edges(2) = [34.0_wp, 5.83_wp], levels(2) = [32.3_wp, 5.68_wp], lengths(2) = [4.0_wp, 2.0_wp]
+  real(wp), parameter :: edges(2) = [26.0_wp, 5.1_wp], levels(2) = [25.0_wp, 5.0_wp], lengths(2) = [5.0_wp, 2.0_wp]
   !> The nodes are enough up to this share of the excess friction in the acceleration.
-  real(wp), parameter :: steepest = 0.4_wp
+  real(wp), parameter :: steepest = 0.35_wp
 
   !> Mirrors `lane_layer` of lane_types.hpp.
   type, bind(c) :: layer_t
