@@ -23,6 +23,8 @@ module layer_transit
   real(wp), parameter :: inner_ends(2, 2) = reshape([2.0_wp, 6.0_wp, 1.0_wp, 2.5_wp], [2, 2])
   !> Gauss points are too few for more than double precision: the reference library goes without.
   logical, parameter :: precise_enough = epsilon(1.0_wp) > 1e-17_wp
+  !> A crossing is expected to last no longer than this multiple of its duration at the acceleration at its start.
+  real(wp), parameter :: longest = 2
   !> The acceleration may not fall below this share of that at the start.
   real(wp), parameter :: smallest_share = 0.1_wp
 
@@ -36,8 +38,8 @@ module layer_transit
     real(wp) :: speed(points, pieces, 2) = 0, excess(points, pieces, 2) = 0
     !> On [-1, 1]: weights, and integrals from -1 to each point.
     real(wp) :: weight(points) = 0, integral(points, points) = 0
-    !> Sum over harmonics of the size of the (order + 1)th derivative of the forcing.
-    real(wp) :: remainder = 0
+    !> Sum over harmonics of the size of the (n + 1)th derivative of the forcing, over (n + 1)!.
+    real(wp) :: remainder(order) = 0
   end type transit_t
 
 contains
@@ -48,8 +50,8 @@ contains
     type(flow_t), intent(in) :: flow
     real(wp), intent(in) :: exit
     type(transit_t), intent(out) :: transit
-    real(wp) :: node(points)
-    integer :: which, k, n, delta
+    real(wp) :: node(points), w, size_of_next
+    integer :: which, k, n, i, delta
     associate (law => machine%friction)
       delta = nint(law%stribeck_exponent)
       transit%available = precise_enough .and. flow%available .and. law%layer_speed > 0 &
@@ -71,8 +73,12 @@ contains
       end do
     end associate
     do n = 1, flow%harmonics
-      transit%remainder = transit%remainder + sqrt(flow%f_cos(n)**2 + flow%f_sin(n)**2) &
-                          *(n*flow%drive_frequency)**(order + 1)
+      w = n*flow%drive_frequency
+      size_of_next = sqrt(flow%f_cos(n)**2 + flow%f_sin(n)**2)*w
+      do i = 1, order
+        size_of_next = size_of_next*w/(i + 1)
+        transit%remainder(i) = transit%remainder(i) + size_of_next
+      end do
     end do
   end subroutine prepare_transit
 
@@ -86,8 +92,8 @@ contains
     real(wp), intent(in) :: time_end
     real(wp), intent(inout) :: time, x
     logical, intent(out) :: ok
-    real(wp) :: taylor(0:order), elapsed, y, start_rate, factorial
-    integer :: k, i, which
+    real(wp) :: taylor(0:order), elapsed, y, start_rate
+    integer :: k, i, which, degree
     call expand_forcing(flow, time, taylor)
     which = merge(1, 2, inward)
     elapsed = 0
@@ -95,37 +101,47 @@ contains
     start_rate = direction*(taylor(0) - flow%natural**2*y)
     ok = (start_rate < 0) .eqv. inward
     if (.not. ok) return
+    degree = min(order, enough_terms(transit, abs(start_rate), longest*transit%ends(pieces, which)/abs(start_rate)))
     do i = 1, pieces
       k = merge(pieces + 1 - i, i, inward)
-      call cross_piece(transit, flow, taylor, real(direction, wp), which, k, inward, start_rate, elapsed, y, ok)
+      call cross_piece(transit, flow, taylor(:degree), real(direction, wp), which, k, inward, start_rate, elapsed, y, ok)
       if (.not. ok) return
     end do
-    factorial = 1
-    do i = 2, order + 1
-      factorial = factorial*i
-    end do
-    ok = time + elapsed <= time_end .and. transit%remainder*elapsed**(order + 1) &
-         <= epsilon(1.0_wp)*factorial*abs(start_rate)
+    ok = time + elapsed <= time_end .and. enough_terms(transit, abs(start_rate), elapsed) <= degree
     if (.not. ok) return
     time = time + elapsed
     x = y + flow%equilibrium(direction)
   end subroutine cross_layer
 
+  !> Degree up to which the forcing must be expanded for its error over `elapsed` [s] to be rounding beside `rate` [m/s^2];
+  !> `order` + 1 if that is not enough.
+  pure integer function enough_terms(transit, rate, elapsed) result(degree)
+    type(transit_t), intent(in) :: transit
+    real(wp), intent(in) :: rate, elapsed
+    real(wp) :: power
+    power = elapsed
+    do degree = 1, order
+      power = power*elapsed
+      if (transit%remainder(degree)*power <= epsilon(1.0_wp)*rate) return
+    end do
+  end function enough_terms
+
   !> One piece: fixed-point iteration for time and place at the Gauss points.
   pure subroutine cross_piece(transit, flow, taylor, direction, which, k, inward, start_rate, elapsed, y, ok)
     type(transit_t), intent(in) :: transit
     type(flow_t), intent(in) :: flow
-    real(wp), intent(in) :: taylor(0:order), direction, start_rate
+    real(wp), intent(in) :: taylor(0:), direction, start_rate
     integer, intent(in) :: which, k
     logical, intent(in) :: inward
     real(wp), intent(inout) :: elapsed, y
     logical, intent(out) :: ok
-    real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half
+    real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half, change, last_change
     integer :: round, i
     half = 0.5_wp*(transit%ends(k, which) - transit%ends(k - 1, which))
     time = elapsed
     place = y
     ok = .false.
+    change = huge(change)
     do round = 1, most_rounds
       rate = direction*(polynomial(taylor, time) - flow%natural**2*place) &
              - 2*flow%decay*transit%speed(:, k, which) - transit%excess(:, k, which)
@@ -150,7 +166,10 @@ contains
           place = place + transit%integral(:, i)*run(i)
         end do
       end if
-      if (maxval(abs(time - before)) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
+      last_change = change
+      change = maxval(abs(time - before))
+      ! What the next round would change.
+      if (change*min(1.0_wp, change/last_change) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
         elapsed = elapsed + dot_product(transit%weight, inverse)
         y = y + dot_product(transit%weight, run)
         ok = .true.
@@ -188,11 +207,11 @@ contains
 
   !> Values at `t` of a polynomial, coefficients by rising power.
   pure function polynomial(coefficients, t) result(total)
-    real(wp), intent(in) :: coefficients(0:order), t(points)
+    real(wp), intent(in) :: coefficients(0:), t(points)
     real(wp) :: total(points)
     integer :: i
-    total = coefficients(order)
-    do i = order - 1, 0, -1
+    total = coefficients(ubound(coefficients, 1))
+    do i = ubound(coefficients, 1) - 1, 0, -1
       total = total*t + coefficients(i)
     end do
   end function polynomial
