@@ -141,7 +141,7 @@ contains
     time = elapsed
     place = y
     ok = .false.
-    change = huge(change)
+    change = 0
     do round = 1, most_rounds
       rate = direction*(polynomial(taylor, time) - flow%natural**2*place) &
              - 2*flow%decay*transit%speed(:, k, which) - transit%excess(:, k, which)
@@ -169,7 +169,7 @@ contains
       last_change = change
       change = maxval(abs(time - before))
       ! What the next round would change.
-      if (change*min(1.0_wp, change/last_change) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
+      if (change*min(1.0_wp, change/max(last_change, tiny(change))) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
         elapsed = elapsed + dot_product(transit%weight, inverse)
         y = y + dot_product(transit%weight, run)
         ok = .true.

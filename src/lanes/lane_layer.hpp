@@ -168,19 +168,19 @@ struct turning {
 
 inline turning turn_in_layer(const lane_machine &m, mask due, const lane_group &g) {
   const double stiffness = m.natural * m.natural;
-  vec end_c, end_p;
-  end_derivatives(m, g, end_c, end_p);
+  vec end_s, end_c, end_p;
+  end_derivatives(m, g, end_s, end_c, end_p);
   turning r;
   vec d = g.direction, bound = derivative_bound(m, g);
-  course in = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, d * end_c, -d * end_p);
+  course in = course_of(-d * g.end_a, d * g.end_j, -d * end_s, d * end_c, -d * end_p);
   passage inward = pass_layer<false>(m, in, due, bound);
   r.early = time_at(in, inward.even);
   vec h = -r.early, half = 0.5 * h, third = (1.0 / 3) * h, fourth = 0.25 * h, fifth = 0.2 * h;
-  vec p = end_p, c = end_c + h * p, s = g.end_s + h * (end_c + half * p);
-  vec j = g.end_j + h * (g.end_s + half * (end_c + third * p));
-  vec a = g.end_a + h * (g.end_j + half * (g.end_s + third * (end_c + fourth * p)));
-  vec v = h * (g.end_a + half * (g.end_j + third * (g.end_s + fourth * (end_c + fifth * p))));
-  vec path = half * (g.end_a + third * (g.end_j + fourth * (g.end_s + fifth * end_c)));
+  vec p = end_p, c = end_c + h * p, s = end_s + h * (end_c + half * p);
+  vec j = g.end_j + h * (end_s + half * (end_c + third * p));
+  vec a = g.end_a + h * (g.end_j + half * (end_s + third * (end_c + fourth * p)));
+  vec v = h * (g.end_a + half * (g.end_j + third * (end_s + fourth * (end_c + fifth * p))));
+  vec path = half * (g.end_a + third * (g.end_j + fourth * (end_s + fifth * end_c)));
   // How far the body is off the old course, and what that and the reversed friction do to the derivatives.
   vec off = -d * inward.odd * (1 / m.natural), jump = (2 * m.kinetic) * d - stiffness * off;
   r.x = g.end_x + h * path + off;

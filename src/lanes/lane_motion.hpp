@@ -91,18 +91,21 @@ inline vec derivative_bound(const lane_machine &m, const lane_group &g) {
   return m.bound_periodic + m.bound_free * size;
 }
 
-// Derivatives 5 and 6 of the position at the end of the flight, without damping.
-inline void end_derivatives(const lane_machine &m, const lane_group &g, vec &crackle, vec &pop) {
+// Derivatives 4 to 6 of the position at the end of the flight, without damping.
+inline void end_derivatives(const lane_machine &m, const lane_group &g, vec &snap, vec &crackle, vec &pop) {
   vec sine, cosine;
   sine_cosine((g.start + g.span) * m.drive_frequency, sine, cosine);
   const double stiffness = m.natural * m.natural, fourth = stiffness * stiffness;
+  snap = (fourth * (1 / m.natural)) * g.end_im;
   crackle = fourth * g.end_re;
-  pop = (-stiffness * fourth * (1 / m.natural)) * g.end_im;
+  pop = -stiffness * snap;
   vec c = cosine, s = sine;
   for (int n = 0; n < m.harmonics; n++) {
-    double w = (n + 1) * m.drive_frequency, w2 = w * w, w5 = w * w2 * w2;
-    crackle += w5 * (m.sine[n] * c - m.cosine[n] * s);
-    pop -= (w * w5) * (m.cosine[n] * c + m.sine[n] * s);
+    double w = (n + 1) * m.drive_frequency, w2 = w * w, w4 = w2 * w2;
+    vec part = w4 * (m.cosine[n] * c + m.sine[n] * s);
+    snap += part;
+    crackle += (w * w4) * (m.sine[n] * c - m.cosine[n] * s);
+    pop -= w2 * part;
     vec next = c * cosine - s * sine;
     s = s * cosine + c * sine;
     c = next;
