@@ -26,7 +26,7 @@ module layer_transit
   !> A crossing is expected to last no longer than this multiple of its duration at the acceleration at its start.
   real(wp), parameter :: longest = 2
   !> The acceleration may not fall below this share of that at the start.
-  real(wp), parameter :: smallest_share = 0.1_wp
+  real(wp), parameter :: smallest_share = 0.25_wp
 
   type, public :: transit_t
     logical :: available = .false.

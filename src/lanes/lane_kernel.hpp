@@ -229,8 +229,8 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
 }
 
 // The state of the lanes that have come to where they stop. The end of the period starts the clock anew.
-template <bool damping> inline void take_stops(const lane_machine &m, lane_group &g) {
-  mask stopped = g.status == lane_stopped;
+template <bool damping> inline void take_stops(const lane_machine &m, mask sent, lane_group &g) {
+  mask stopped = sent & (g.status == lane_stopped);
   if (!any(stopped))
     return;
   kinematics k = evaluate<damping>(m, g, g.until - g.start);
@@ -289,7 +289,7 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
   lane_group g;
   load<false>(batch, first, g);
   begin_flight<damping, false>(m, g);
-  mask flying = g.status == lane_flying;
+  mask flying = g.status == lane_flying, sent = flying;
   while (any(flying)) {
     mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
     vec barrier = upward ? all(m.upper) : all(m.lower);
@@ -303,7 +303,7 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
     g.status = left ? all(lane_left) : g.status;
     flying = flying & ~left;
   }
-  take_stops<damping>(m, g);
+  take_stops<damping>(m, sent, g);
   store<false>(g, first, batch);
 }
 
@@ -312,10 +312,10 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
 void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
   load<true>(batch, first, g);
-  mask occupied = g.status != lane_idle;
+  mask sent = (g.status == lane_fresh) | (g.status == lane_flying);
   begin_flight<false, true>(m, g);
   mask flying = g.status == lane_flying;
-  while (any(flying) && !any(occupied & ~flying)) {
+  while (any(flying) && !any(sent & ~flying)) {
     mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
     vec barrier = upward ? all(m.upper) : all(m.lower);
     if (any(seek))
@@ -333,7 +333,7 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
     }
     flying = g.status == lane_flying;
   }
-  take_stops<false>(m, g);
+  take_stops<false>(m, sent, g);
   store<true>(g, first, batch);
 }
 

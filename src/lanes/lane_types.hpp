@@ -5,7 +5,7 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64, layer_nodes = 12, most_sections = 32 };
+enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_sections = 32 };
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
 struct lane_layer {

@@ -22,7 +22,7 @@ module lanes
   integer, parameter, public :: lane_count = 16
   !> Sections that a lane can pass over in one go.
   integer, parameter, public :: most_sections = 32
-  integer, parameter :: most_harmonics = 64, points = 12
+  integer, parameter :: most_harmonics = 64, points = 10
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
@@ -32,7 +32,7 @@ module lanes
 
   !> Of a Stribeck layer with exponent 1 and 2, in units of v_s: the edge, where the excess friction is below 1e-11 of that at
   !> rest, a speed a little below, and the length of the variable of the nodes.
-  real(wp), parameter :: edges(2) = [26.0_wp, 5.1_wp], levels(2) = [25.0_wp, 5.0_wp], lengths(2) = [5.0_wp, 2.0_wp]
+  real(wp), parameter :: edges(2) = [26.0_wp, 5.1_wp], levels(2) = [25.0_wp, 5.0_wp], lengths(2) = [4.0_wp, 2.0_wp]
   !> The nodes are enough up to this share of the excess friction in the acceleration.
   real(wp), parameter :: steepest = 0.35_wp
 
