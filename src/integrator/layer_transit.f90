@@ -18,7 +18,7 @@ module layer_transit
 
   public :: prepare_transit, cross_layer, gauss
 
-  integer, parameter :: points = 14, pieces = 3, order = 16, most_rounds = 30
+  integer, parameter :: points = 16, pieces = 3, order = 16, most_rounds = 30
   !> Ends of the pieces in units of v_s, for delta = 1 and 2; the last end is the edge of the layer.
   real(wp), parameter :: inner_ends(2, 2) = reshape([2.0_wp, 6.0_wp, 1.0_wp, 2.5_wp], [2, 2])
   !> Gauss points are too few for more than double precision: the reference library goes without.
