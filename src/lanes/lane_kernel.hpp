@@ -54,8 +54,7 @@ inline mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, vec
 // A body set off: the free part of its motion. One within a Stribeck layer is left to the scalar code.
 template <bool damping, bool layer> inline void begin_flight(const lane_machine &m, lane_group &g) {
   if (layer)
-    g.status =
-        (g.status == lane_fresh) & (g.direction * g.v < m.layer.edge) ? all(lane_left) : g.status;
+    g.status = (g.status == lane_fresh) & (g.direction * g.v < m.layer.edge) ? all(lane_left) : g.status;
   mask fresh = g.status == lane_fresh;
   if (!any(fresh))
     return;
@@ -136,8 +135,8 @@ inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barri
   return seek;
 }
 
-// Is each of so many equal pieces of the flights proven to have no event on the way? With a layer: from its edge
-// to its edge, the speed staying above.
+// Is each of so many equal pieces of the flights proven to have no event on the way? With a layer: from its
+// edge to its edge, the speed staying above.
 template <bool damping, bool layer>
 inline mask prove_pieces(const lane_machine &m, int pieces, vec bound, const lane_group &g) {
   vec h = (1.0 / pieces) * (layer ? g.reach - g.skip : g.span), d = g.direction;
@@ -241,8 +240,8 @@ template <bool damping> inline void take_stops(const lane_machine &m, mask sent,
   g.start = section ? g.start - m.period : g.start;
 }
 
-// Lanes with a layer that come to a stop. Those that need not stop at this section: their motion is noted, and the
-// clock starts anew. Those within the layer at that time are `left` to the scalar code.
+// Lanes with a layer that come to a stop. Those that need not stop at this section: their motion is noted,
+// and the clock starts anew. Those within the layer at that time are `left` to the scalar code.
 inline void pass_sections(const lane_machine &m, int first, mask stops, lane_group &g, lane_batch &batch) {
   mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
   mask passing = stops & ~within & (g.sections > 0.5);
@@ -264,7 +263,8 @@ inline void pass_sections(const lane_machine &m, int first, mask stops, lane_gro
   g.start = passing ? g.start - m.period : g.start;
 }
 
-// Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that failed.
+// Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that
+// failed.
 template <bool damping, bool layer>
 inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
   mask left = {};
@@ -307,8 +307,8 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
   store<false>(g, first, batch);
 }
 
-// The same with a Stribeck layer, until one lane has stopped or is left. Turnings are dear here: a lane that has
-// come to one waits until all have. Before that the impacts are taken, and then the sections passed.
+// The same with a Stribeck layer, until one lane has stopped or is left. Turnings are dear here: a lane that
+// has come to one waits until all have. Before that the impacts are taken, and then the sections passed.
 void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
   load<true>(batch, first, g);

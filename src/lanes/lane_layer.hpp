@@ -72,10 +72,9 @@ struct nodes {
 };
 
 // From what is known of 1/D: P, and with it a better 1/D for the lanes `seek`. Returns the largest change.
-template <bool outward>
-inline vec improve(const lane_machine &m, const course &c, mask seek, nodes &n) {
+template <bool outward> inline vec improve(const lane_machine &m, const course &c, mask seek, nodes &n) {
   const lane_layer &l = m.layer;
-  const double(&table)[layer_nodes][layer_nodes] = outward ? l.from_rest : l.from_edge;
+  const double (&table)[layer_nodes][layer_nodes] = outward ? l.from_rest : l.from_edge;
   vec lost[layer_nodes] = {}, moment[layer_nodes] = {}, total = {}, change = {};
   for (int i = 0; i < layer_nodes; i++) {
     vec slope = l.force[i] * n.inverse[i], late = slope * n.time[i];
@@ -116,7 +115,8 @@ template <bool outward> passage pass_layer(const lane_machine &m, const course &
     n.time[i] = time_at(c, speed);
   }
   n.total = vec{};
-  vec least = outward ? c.rate - l.excess : c.rate, bend = magnitude(c.curl) / least, unit = l.thickness / least;
+  vec least = outward ? c.rate - l.excess : c.rate, bend = magnitude(c.curl) / least,
+      unit = l.thickness / least;
   // What the series leaves out, over the whole layer.
   vec unit2 = unit * unit, bend2 = bend * bend;
   vec cut = unit2 * unit2 * unit * (bound / least + 105 * (bend2 * bend2 * bend));
@@ -140,8 +140,8 @@ template <bool outward> passage pass_layer(const lane_machine &m, const course &
   return p;
 }
 
-// Where the flights of a machine with a layer are Coulomb's to the end: up to the edge of the layer, or to the
-// barrier. Returns the lanes where the edge was not found.
+// Where the flights of a machine with a layer are Coulomb's to the end: up to the edge of the layer, or to
+// the barrier. Returns the lanes where the edge was not found.
 inline mask find_edge(const lane_machine &m, mask found, lane_group &g) {
   vec d = g.direction, speed, rate, curl;
   course c = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, vec{}, vec{});

@@ -71,8 +71,9 @@ template <class T> struct lane_fields {
   // From here on with a Stribeck layer only. Sections that the lane passes over before it stops at one, and
   // that it has passed.
   T sections, passed;
-  // The time since the start of the flight at which the body leaves the layer (`start_v`, ... are those then),
-  // and at which it enters it again or hits, with its motion. Fourth derivative at the end of the flight.
+  // The time since the start of the flight at which the body leaves the layer (`start_v`, ... are those
+  // then), and at which it enters it again or hits, with its motion. Fourth derivative at the end of the
+  // flight.
   T skip, reach, reach_v, reach_a, reach_j, end_s;
 };
 
