@@ -61,7 +61,7 @@ contains
     do while (any(passengers%start > 0))
       call fly_lanes(journey%flow, batch)
       do lane = 1, lane_count
-        if (passengers(lane)%start == 0 .or. abs(batch%status(lane) - lane_flying) < 0.5_wp) cycle
+        if (passengers(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
         call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, &
                     outcomes(passengers(lane)%start))
         if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, &
@@ -129,7 +129,7 @@ contains
     integer :: section
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
     associate (course => passenger%course)
-      do section = 1, nint(batch%passed(lane))
+      do section = 1, int(batch%passed(lane))
         course%state = section_state(batch, lane, section)
         call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
       end do
