@@ -14,7 +14,7 @@ module trajectory
   implicit none
   private
 
-  public :: run_trajectory, begin_course, go_to_stop, pass_stop, conclude
+  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, conclude
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -121,6 +121,25 @@ contains
     end if
     slipped = course%tally%slips > slips
   end subroutine go_to_stop
+
+  !> Moves past a turn of the body to a slip at `speed` [m/s] or faster, if that comes before the next stop.
+  pure subroutine go_past_turn(moving, speed, course)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: speed
+    type(course_t), intent(inout) :: course
+    call advance(moving, course%state, course%until, course%tally, course%reason, slip_speed=speed)
+  end subroutine go_past_turn
+
+  !> Sections to come where nothing is due but the question whether the motion has been captured, and no answer stops it.
+  pure integer function sections_ahead(moving, span, course)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(course_t), intent(in) :: course
+    sections_ahead = 0
+    if (span%stop_when_captured .or. course%phase == phase_extension .or. course%until < moving%machine%period) return
+    ! One is left out in case that rounding shifts the last.
+    sections_ahead = max(0, int((end_of_phase(span, course%phase) - course%elapsed)/moving%machine%period) - 2)
+  end function sections_ahead
 
   !> What is due at a stop, the state being there: has the motion been captured, is a phase over, where to stop next.
   !> `slipped` tells whether the body moved since the last stop.

@@ -90,18 +90,21 @@ contains
   end function start_state
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
-  !> trajectory had to be given up (codes of module `status`).
-  pure subroutine advance(moving, state, time_end, tally, reason, log)
+  !> trajectory had to be given up (codes of module `status`). With `slip_speed` no further than to a slip in the other
+  !> direction that is so fast [m/s].
+  pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
+    real(wp), intent(in), optional :: slip_speed
     real(wp) :: before
-    integer :: stalls
+    integer :: stalls, other
     reason = 0
     stalls = 0
+    other = merge(mode_slip_minus, mode_slip_plus, state%mode == mode_slip_plus)
     do while (state%time < time_end)
       tally%events = tally%events + 1
       if (tally%events > moving%options%event_budget) reason = reason_event_budget
@@ -118,6 +121,8 @@ contains
       if (state%x /= state%x .or. state%v /= state%v .or. state%time /= state%time) reason = reason_not_finite
       stalls = merge(0, stalls + 1, state%time > before)
       if (stalls >= most_stalls) call break_tie(moving, state, time_end)
+      if (.not. present(slip_speed) .or. reason /= 0) cycle
+      if (state%mode == other .and. abs(state%v) >= slip_speed) exit
     end do
   end subroutine advance
 
