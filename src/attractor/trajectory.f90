@@ -6,7 +6,7 @@
 module trajectory
   use attractors, only: attractor_t, features_t, find_box, find_capture
   use kinds, only: int64, wp
-  use motion, only: motion_t
+  use motion, only: advance, motion_t
   use motion_state, only: log_t, reset_tally, tally_t
   use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, rest_lasts, section_point, &
     start_strobe, strobe_t
