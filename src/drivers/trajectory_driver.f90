@@ -81,8 +81,9 @@ contains
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
-      if (.not. allocated(error) .and. len(command%csv) > 0) &
+      if (.not. allocated(error) .and. len(command%csv) > 0) then
         call write_events(command%csv, log, allocated(moving%pair), error)
+      end if
       if (.not. allocated(error) .and. len(command%record) > 0) then
         call write_record(command%record, session%the_case, moving, grid%start, error)
       end if

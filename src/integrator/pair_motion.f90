@@ -149,16 +149,7 @@ contains
     end if
     stop_time = min(time_end, blow, sample)
     held = stalled .and. abs(state%y(at_v1) - state%y(at_v2)) <= moving%negligible_speed
-    if (held) then
-      stop_time = min(stop_time, state%time + 1e-9_wp*moving%machine%period)
-      if (state%touch /= 0 .and. .not. moving%machine%carried) then
-        state%y(at_v2) = 0
-        state%mode = mode_held
-      else
-        state%y(at_v2) = state%y(at_v1)
-        state%mode = mode_stick
-      end if
-    end if
+    if (held) call hold_for_an_instant(moving, state, stop_time)
     before = state%time
     mode = state%mode
     slips = mode /= mode_stick .and. mode /= mode_held
@@ -197,6 +188,21 @@ contains
       if (present(log)) call record_event(log, event_barrier_release, body_state(state), state%y(at_v2), driver_of(state))
     end select
   end subroutine move_once
+
+  !> A tie of forces to the last bit: the bodies move together, or m2 stays on its stop, for an instant.
+  pure subroutine hold_for_an_instant(moving, state, stop_time)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp), intent(inout) :: stop_time
+    stop_time = min(stop_time, state%time + 1e-9_wp*moving%machine%period)
+    if (state%touch /= 0 .and. .not. moving%machine%carried) then
+      state%y(at_v2) = 0
+      state%mode = mode_held
+    else
+      state%y(at_v2) = state%y(at_v1)
+      state%mode = mode_stick
+    end if
+  end subroutine hold_for_an_instant
 
   !> The relative velocity is zero: the forces choose the next mode.
   pure subroutine come_together(moving, state, tally, log)
