@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Working files that HDF5 reads well and that are wrong: resumed or merged to the right content, or refused."""
+"""Working files that HDF5 reads well and that are wrong: they end in the right content, or are refused."""
 
 import random
 import shutil
@@ -69,8 +69,11 @@ def circle(file: h5py.File, name: str) -> None:
 
 
 MORE_CHANGES = [
-    *(stored_as(chunks=True), stored_as(chunks=True, compression="gzip"), stored_as(chunks=True, fletcher32=True)),
-    *(stored_as(chunks=True, maxshape=(None, None)), of_type(">f8"), of_type("f4"), of_type("i8"), of_type("u1")),
+    stored_as(chunks=True),
+    stored_as(chunks=True, compression="gzip"),
+    stored_as(chunks=True, fletcher32=True),
+    stored_as(chunks=True, maxshape=(None, None)),
+    *map(of_type, (">f8", "f4", "i8", "u1")),
     *(longer, transposed, linked, circle),
 ]
 
@@ -138,7 +141,8 @@ def test_wrong_working_files(separatrix, model, tmp_path, amount, figures):
         for reader in ("info", "verify"):
             outcome = life.run(separatrix, reader, SHARE, folder=folder)
             assert outcome.code == 0 or is_refusal(outcome), (told, reader, outcome)
-        assert not [name for name in listing(folder) if name.endswith((".new", ".lock"))], (told, listing(folder))
+        left = [name for name in listing(folder) if name.endswith((".new", ".lock"))]
+        assert not left, (told, left)
         shutil.rmtree(folder)
     assert min(ends.values()) > 0
     figures.update(seed=SEED, changes=len(every), tried=tried, ends=ends)
