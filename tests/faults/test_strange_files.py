@@ -91,7 +91,7 @@ def test_blanks_quotes_and_letters_of_all_alphabets(mpi_separatrix, folder):
 
 def test_a_title_as_long_as_a_book(separatrix, folder):
     text = (folder / "case.toml").read_text().partition("\n")[2]
-    title = "Über alles, was stößt. " * 4000
+    title = "Über alles, was stößt. " * 2600
     life.write_case(folder, f'title = "{title}"\n{text}')
     life.succeed(separatrix, *QUICK, "-o", "map.h5", folder=folder)
     life.succeed(separatrix, "verify", "map.h5", "--sample", "2", folder=folder)
