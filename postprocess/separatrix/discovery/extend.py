@@ -13,6 +13,7 @@ import numpy as np
 from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
+from separatrix.discovery.starts import kept_between
 from separatrix.discovery.verdict import Findings
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
@@ -68,7 +69,18 @@ def extended_case(verdict: dict, findings: Findings) -> str:
         if found:
             unit = "" if found["unit"] == "1" else f" {found['unit']}"
             lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
-    return "\n".join([*lines, fitted.model.to_text(machine_values(fitted))])
+    return "\n".join([*lines, _case_text(fitted)])
+
+
+def _case_text(fitted: Fitted) -> str:
+    """The resolved case of the machine as fitted; its starts stay where its barriers allow."""
+    model, values = fitted.model, machine_values(fitted)
+    lower, upper = (
+        values.get(path, bound) for path, bound in (("contact.lower", -np.inf), ("contact.upper", np.inf))
+    )
+    text = model.to_text({})
+    kept = kept_between(text, lower, upper)
+    return (model if kept == text else type(model).from_text(kept)).to_text(values)
 
 
 def machine_values(fitted: Fitted) -> dict[str, float]:
@@ -144,6 +156,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             length = inside.shape[1]
             group["residual"] = fit.evaluation.residual[rows, :length][inside]
             group["good"] = fit.good[rows]
+            group.attrs["crank_angle"] = problem.crank_angle(number, fit.values, float(prepared.record.t[0]))
             impacts = fit.evaluation.impacts[number]
             group["impacts"] = np.zeros((0, 5)) if impacts is None else impacts
             group["impacts"].attrs["columns"] = "segment time speed_before speed_after side"

@@ -210,6 +210,10 @@ class Problem:
                 return float(value)
         return absent
 
+    def crank_angle(self, number: int, values: np.ndarray, t: float) -> float:
+        """Angle of the crank at time `t` of a record [rad]."""
+        return float(self._crank(number, {"starts": np.array([t])}, values)[0])
+
     def _crank(self, number: int, part: dict, values: np.ndarray) -> np.ndarray:
         prepared = self.prepared[number]
         if prepared.frequency is None:
