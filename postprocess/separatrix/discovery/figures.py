@@ -5,25 +5,19 @@
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import SymLogNorm
-from matplotlib.ticker import NullLocator
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
 
 from separatrix import style
 from separatrix.discovery.options import Options
+from separatrix.discovery.wording import number, words
 
 BEFORE = style.OKABE_ITO[0]
 AFTER = style.OKABE_ITO[1]
 MEASURED = style.OTHER
-_LINE = "#BBBBBB"
-_DIVERGING = "PuOr"
+LINE = "#BBBBBB"
 _MOST_RECORDS = 4
-
-
-def words(name: str) -> str:
-    """An effect's name as words."""
-    return name.replace("_", " ")
 
 
 def gap(verdict: dict) -> Figure:
@@ -34,12 +28,12 @@ def gap(verdict: dict) -> Figure:
     ax = figure.add_subplot()
     for row, use in enumerate(uses):
         found = verdict["gap"][use]
-        ax.plot([found["before"], found["after"]], [row, row], color=_LINE, linewidth=2.5, zorder=1)
+        ax.plot([found["before"], found["after"]], [row, row], color=LINE, linewidth=2.5, zorder=1)
         ax.plot(found["before"], row, "D", color=BEFORE, markersize=5, zorder=2)
         ax.plot(found["after"], row, "o", color=AFTER, markersize=5, zorder=3)
         for key, side in (("before", 1), ("after", -1)):
             ax.annotate(
-                f"{found[key]:.4g}",
+                number(found[key]),
                 (found[key], row),
                 (4, 7 * side),
                 textcoords="offset points",
@@ -80,7 +74,7 @@ def ranking(verdict: dict) -> Figure | None:
     figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     rows = np.arange(len(order))
-    colours = [AFTER if name in verdict["effects"] else _LINE for name in order]
+    colours = [AFTER if name in verdict["effects"] else LINE for name in order]
     sizes = np.maximum([d_prime[name] for name in order], 0.1)
     left.barh(rows, sizes - 0.1, left=0.1, color=colours, height=0.7)
     visible = Options().visible
@@ -96,9 +90,10 @@ def ranking(verdict: dict) -> Figure | None:
             right.plot(one["training"], row, "s", color=AFTER, markersize=3.5, markerfacecolor="none")
             right.plot(one["held_out"], row, "o", color=BEFORE, markersize=3)
         right.axhline(row, color="#EEEEEE", linewidth=0.5, zorder=0)
-    gains = [abs(one[key]) for one in verdict["candidates"] for key in ("training", "held_out")]
-    _symlog(right, "x", 10, max(gains, default=10))
-    right.axvline(0, color=_LINE, linewidth=0.6, zorder=0)
+    gains = [0.0, *(one[key] for one in verdict["candidates"] for key in ("training", "held_out"))]
+    _symlog(right, "x", 10, max(np.abs(gains)))
+    right.set_xlim(5 * min(gains) - 5, 5 * max(gains) + 5)
+    right.axvline(0, color=LINE, linewidth=0.6, zorder=0)
     right.set_xlabel("log-likelihood gained over the base machine")
     handles = [
         Line2D([], [], linestyle="", marker="s", color=AFTER, markerfacecolor="none", label="training"),
@@ -138,97 +133,15 @@ def confusability(verdict: dict) -> Figure | None:
     return figure
 
 
-def _symlog(ax: Axes, name: str, threshold: float, largest: float) -> None:
-    """A scale that is logarithmic beyond a threshold, with at most about four labels on each side."""
+def _symlog(ax: Axes, name: str, threshold: float, largest: float, most: int = 3) -> None:
+    """A scale that is logarithmic beyond a threshold, with about `most` labels on each side."""
     getattr(ax, f"set_{name}scale")("symlog", linthresh=threshold, linscale=0.8)
     decades = np.log10(max(largest / threshold, 1))
-    step = max(1, int(np.ceil(decades / 3)))
+    step = max(1, int(np.ceil(decades / most)))
     powers = np.arange(np.ceil(np.log10(threshold)), np.log10(max(largest, 1.0)) + 1e-9, step)
     ticks = 10.0**powers
     getattr(ax, f"set_{name}ticks")([*-ticks[::-1], 0, *ticks], minor=False)
     getattr(ax, f"{name}axis").set_minor_locator(NullLocator())
-
-
-def where_lines(details: h5py.File) -> Figure | None:
-    """The missing force over time, drive phase, position, velocity, low speed and time since an impact."""
-    names = [name for name in details["where"] if "velocity_edges" not in details["where"][name]]
-    order = (
-        "time",
-        "drive phase",
-        "position",
-        "velocity",
-        "low speed",
-        "time since the last impact",
-    )
-    names.sort(key=lambda name: order.index(name) if name in order else len(order))
-    if not names:
-        return None
-    rows = -(-len(names) // 3)
-    figure = style.new_figure(style.DOUBLE_COLUMN, 12.0 + 46.0 * rows)
-    figure.set_layout_engine("constrained")
-    axes = figure.subplots(rows, 3, squeeze=False).ravel()
-    for ax in axes[len(names) :]:
-        ax.set_visible(False)
-    for letter, ax, name in zip("abcdefghi", axes, names, strict=False):
-        _draw_bins(ax, details["where"][name])
-        unit = details["where"][name].attrs["unit"]
-        ax.set_xlabel(f"{name} ({unit})")
-        ax.set_title(f"{letter})", loc="left")
-    for ax in axes[::3]:
-        ax.set_ylabel("missing force (N)")
-    handles = [
-        Line2D([], [], linestyle="", marker="o", color=BEFORE, markersize=3.5, label="flagged"),
-        Line2D(
-            [], [], linestyle="", marker="o", color=MEASURED, markersize=3.5, markerfacecolor="white",
-            label="within chance",
-        ),
-    ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside upper center", ncols=2)
-    return figure
-
-
-def _draw_bins(ax: Axes, group: h5py.Group) -> None:
-    edges, force, error = group["edges"][:], group["force"][:], group["error"][:]
-    flagged, known = group["flagged"][:].astype(bool), np.isfinite(group["error"][:])
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    ax.axhline(0, color=_LINE, linewidth=0.6, zorder=0)
-    for chosen, colour, face in ((flagged, BEFORE, BEFORE), (~flagged, MEASURED, "white")):
-        part = chosen & known
-        ax.errorbar(
-            middle[part], force[part], 1.96 * error[part], half[part], linestyle="", marker="o",
-            markersize=3, color=colour, markerfacecolor=face, elinewidth=0.7,
-        )  # fmt: skip
-
-
-def where_plane(details: h5py.File) -> Figure | None:
-    """The missing force over position and velocity."""
-    found = [group for group in details["where"].values() if "velocity_edges" in group]
-    if not found:
-        return None
-    group = found[0]
-    x, v = group["edges"][:], group["velocity_edges"][:]
-    shape = (x.size - 1, v.size - 1)
-    force = np.where(np.isfinite(group["error"][:]), group["force"][:], np.nan).reshape(shape)
-    error, flagged = group["error"][:].reshape(shape), group["flagged"][:].astype(bool).reshape(shape)
-    figure = style.new_figure(style.SINGLE_COLUMN, 68.0)
-    figure.set_layout_engine("constrained")
-    ax = figure.add_subplot()
-    largest = float(np.nanmax(np.abs(force))) if np.isfinite(force).any() else 1.0
-    largest = largest or 1.0
-    norm = SymLogNorm(linthresh=0.05 * largest, vmin=-largest, vmax=largest)
-    image = ax.pcolormesh(x, v, force.T, cmap=_DIVERGING, norm=norm, edgecolor="white", linewidth=0.4)
-    for i, j in np.ndindex(*shape):
-        if np.isfinite(error[i, j]):
-            tone = abs(float(norm(force[i, j])) - 0.5)
-            ax.text(
-                0.5 * (x[i] + x[i + 1]), 0.5 * (v[j] + v[j + 1]),
-                f"{force[i, j]:.2g}" + ("*" if flagged[i, j] else ""),
-                ha="center", va="center", fontsize=5.0, color="white" if tone > 0.35 else "black",
-            )  # fmt: skip
-    ax.set_xlabel("position $x$ (m)")
-    ax.set_ylabel("velocity $v$ (m/s)")
-    figure.colorbar(image, ax=ax, label="missing force (N)")
-    return figure
 
 
 def _records(details: h5py.File, use: str) -> list[str]:
@@ -268,7 +181,7 @@ def residuals(details: h5py.File) -> Figure | None:
         beside.set_ylim(max(floor, 1e-9), 1.0)
         if largest > 30:
             _symlog(ax, "y", 5, largest)
-            _symlog(beside, "x", 5, largest)
+            _symlog(beside, "x", 5, largest, 1)
         ax.set_title(f"{name}, {use.replace('_', ' ')}", loc="left")
         ax.set_ylabel("residual / noise")
         means.axhline(1, color="black", linestyle=":")

@@ -3,7 +3,9 @@
 """Sections of text, tables and figures as one self-contained HTML page and as a PDF of A4 pages."""
 
 import base64
+import functools
 import io
+import logging
 import textwrap
 from dataclasses import dataclass, field
 from html import escape
@@ -11,17 +13,17 @@ from pathlib import Path
 
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 from separatrix import style
 from separatrix.labels import plain
-from separatrix.layout import compose
 from separatrix.version import __version__
 
-_DPI = 200
 _PAGE = (210.0, 297.0)  # mm
 _MARGIN = 18.0
 _WIDTH = 100  # characters of a line of text
 _TABLE_WIDTH = 108
+_CAPTION_WIDTH = 125
 _MM_PER_POINT = 25.4 / 72
 
 
@@ -40,6 +42,15 @@ class Picture:
     name: str
     figure: Figure
     caption: str
+
+    @functools.cached_property
+    def png(self) -> bytes:
+        """The figure as a picture fit for print."""
+        buffer = io.BytesIO()
+        self.figure.savefig(
+            buffer, format="png", dpi=style.PNG_DPI, metadata={"Software": f"separatrix {__version__}"}
+        )
+        return buffer.getvalue()
 
 
 @dataclass
@@ -88,9 +99,7 @@ def _html(one: str | list[str] | Table | Picture) -> str:
         head = "".join(f"<th>{escape(cell)}</th>" for cell in one.head)
         rows = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in one.rows)
         return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
-    buffer = io.BytesIO()
-    one.figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": f"separatrix {__version__}"})
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    data = base64.b64encode(one.png).decode("ascii")
     width = round(one.figure.get_figwidth() * 25.4 * 4.6)
     caption = escape(one.caption)
     return (
@@ -100,32 +109,29 @@ def _html(one: str | list[str] | Table | Picture) -> str:
 
 
 def write_pdf(path: Path, title: str, sections: list[Section]) -> None:
-    """Write text on A4 pages and each figure on a page of its own size, behind the text of its section.
-
-    The figures get their captions here: write the HTML page first.
-    """
-    with PdfPages(
-        path, metadata={"Title": title, "Creator": f"separatrix {__version__}", "CreationDate": None}
-    ) as pdf:
+    """Write A4 pages of text, tables and figures."""
+    # it finds the fonts of matplotlib too old
+    logging.getLogger("fontTools").setLevel(logging.ERROR)
+    about = {"Title": title, "Creator": f"separatrix {__version__}", "CreationDate": None}
+    with PdfPages(path, metadata=about) as pdf:
         sheet = _Sheet(pdf)
         sheet.line(title, size=16, weight="bold", after=4)
         for section in sections:
             sheet.keep(24)
             sheet.line(section.title, size=12, weight="bold", before=5, after=1.5)
-            pictures = [one for one in section.body if isinstance(one, Picture)]
             for one in section.body:
-                if not isinstance(one, Picture):
-                    _set(sheet, one)
-            if pictures:
-                sheet.close()
-            for picture in pictures:
-                compose(picture.figure, plain(section.title), [plain(picture.caption)])
-                pdf.savefig(picture.figure)
+                _set(sheet, one)
         sheet.close()
 
 
-def _set(sheet: "_Sheet", one: str | list[str] | Table) -> None:
-    if isinstance(one, str):
+def _set(sheet: "_Sheet", one: str | list[str] | Table | Picture) -> None:
+    if isinstance(one, Picture):
+        caption = textwrap.wrap(one.caption, _CAPTION_WIDTH)
+        sheet.picture(one, room=3.2 * len(caption))
+        for line in caption:
+            sheet.line(line, size=7.0)
+        sheet.skip(3.0)
+    elif isinstance(one, str):
         for line in textwrap.wrap(one, _WIDTH):
             sheet.line(line)
         sheet.skip(1.5)
@@ -190,6 +196,17 @@ class _Sheet:
             family=family,
         )
         self._y += height + after
+
+    def picture(self, one: Picture, room: float) -> None:
+        """Place a figure in its own size, with `room` mm below it on the same page."""
+        width, height = (25.4 * size for size in one.figure.get_size_inches())
+        self.keep(height + room)
+        left, low = 0.5 * (_PAGE[0] - width), _PAGE[1] - self._y - height
+        place = (left / _PAGE[0], low / _PAGE[1], width / _PAGE[0], height / _PAGE[1])
+        ax = self._figure.add_axes(place)
+        ax.imshow(imread(io.BytesIO(one.png)), aspect="auto", interpolation="none")
+        ax.set_axis_off()
+        self._y += height + 1.5
 
     def skip(self, room: float) -> None:
         """Leave room in mm."""

@@ -10,7 +10,7 @@ import h5py
 from matplotlib.figure import Figure
 
 from separatrix import style
-from separatrix.discovery import figures
+from separatrix.discovery import figures, where_figures
 from separatrix.discovery.motion import compare
 from separatrix.discovery.options import Options
 from separatrix.discovery.pages import Picture, Section, write_html, write_pdf
@@ -78,7 +78,7 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
     _show(
         by_key["where"],
         "where-lines",
-        figures.where_lines(details),
+        where_figures.where_lines(details),
         "The force that the base machine lacks in bins of equal numbers of samples; vertical bars are 95 % "
         "intervals, "
         "horizontal ones the bins. Filled: differs from zero by more than chance, given the number of bins.",
@@ -86,7 +86,7 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
     _show(
         by_key["where"],
         "where-plane",
-        figures.where_plane(details),
+        where_figures.where_plane(details),
         "The force that the base machine lacks (N) by position and velocity; a star marks what differs "
         "from zero by more "
         "than chance, given the number of bins.",

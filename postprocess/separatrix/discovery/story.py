@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The story of a verdict in words and tables; every number is one of verdict.json."""
 
-from separatrix.discovery.figures import words
 from separatrix.discovery.options import Options
 from separatrix.discovery.pages import Section, Table
+from separatrix.discovery.wording import digits_of, number, probability, with_unit, words
 
 GATES = {
     "converged": "the fit converged",
@@ -16,16 +16,6 @@ GATES = {
     "adequate": "what is left is noise",
     "drop": "each of the effects is needed beside the other",
 }
-
-
-def number(value: float | None, digits: int = 4) -> str:
-    """A number of the verdict as text."""
-    return "unknown" if value is None else f"{value:.{digits}g}"
-
-
-def with_unit(value: float | None, unit: str, digits: int = 4) -> str:
-    """A number of the verdict with its unit; none for pure numbers."""
-    return number(value, digits) + ("" if unit == "1" or value is None else f" {unit}")
 
 
 def sections(verdict: dict) -> list[Section]:
@@ -64,10 +54,10 @@ def _summary(verdict: dict) -> Section:
     lines = [f"Verdict: {verdict['outcome']}. {said}"]
     for path, one in verdict["parameters"].items():
         if path.startswith("effect."):
-            low, high = one["interval_95"]
+            digits = digits_of(one["value"], one["standard_error"])
+            low, high = (number(bound, digits) for bound in one["interval_95"])
             lines.append(
-                f"{path} = {with_unit(one['value'], one['unit'])}, 95 % interval {number(low)} to "
-                f"{number(high)}."
+                f"{path} = {with_unit(one['value'], one['unit'], digits)}, 95 % interval {low} to {high}."
             )
     for use, one in verdict["gap"].items():
         change = (
@@ -137,7 +127,7 @@ def _gap(verdict: dict) -> Section:
         for use, one in verdict["gap"].items()
     ]
     explained = [
-        [name, number(one["gain"]), str(one["rank"]), number(one["p"], 2)]
+        [name, number(one["gain"]), str(one["rank"]), probability(one["p"])]
         for name, one in verdict["ceiling"].items()
     ]
     return Section(
@@ -181,7 +171,7 @@ def _missing(verdict: dict) -> Section:
             [gate, GATES[gate], "passed" if passed else "failed"] for gate, passed in verdict["gates"].items()
         ]
         body += [
-            f"Gates of {names(verdict)}, family-wise p = {number(verdict['p_value'], 2)}:",
+            f"Gates of {names(verdict)}, family-wise p = {probability(verdict['p_value'])}:",
             Table(["gate", "meaning", ""], rows),
         ]
     else:
@@ -261,16 +251,19 @@ def _foretold(verdict: dict) -> str:
 
 
 def _parameters(verdict: dict) -> Section:
-    rows = [
-        [
-            path,
-            number(one["value"], 6),
-            number(one["standard_error"], 2),
-            f"{number(one['interval_95'][0], 6)} to {number(one['interval_95'][1], 6)}",
-            "" if one["unit"] == "1" else one["unit"],
-        ]
-        for path, one in verdict["parameters"].items()
-    ]
+    rows = []
+    for path, one in verdict["parameters"].items():
+        digits = digits_of(one["value"], one["standard_error"])
+        low, high = (number(bound, digits) for bound in one["interval_95"])
+        rows.append(
+            [
+                path,
+                number(one["value"], digits),
+                number(one["standard_error"], 2),
+                f"{low} to {high}",
+                "" if one["unit"] == "1" else one["unit"],
+            ]
+        )
     body: list = [Table(["parameter", "value", "standard error", "95 % interval", "unit"], rows)]
     if not rows:
         body = ["No parameter was fitted."]
