@@ -117,7 +117,8 @@ def write_pdf(path: Path, title: str, sections: list[Section]) -> None:
         sheet = _Sheet(pdf)
         sheet.line(title, size=16, weight="bold", after=4)
         for section in sections:
-            sheet.keep(24)
+            first = section.body[0] if section.body else ""
+            sheet.keep(24 + (25.4 * first.figure.get_figheight() if isinstance(first, Picture) else 0))
             sheet.line(section.title, size=12, weight="bold", before=5, after=1.5)
             for one in section.body:
                 _set(sheet, one)
