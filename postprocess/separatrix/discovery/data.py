@@ -124,10 +124,17 @@ def fit_stages(
             fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
             values = fit.values
         known = (stage, fit)
-    starts, improved = rescued(problem, fit, data.smoothed_starts(stages[-1]), data.smoothed_errors(stages[-1]))
-    if improved.any():
-        fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
-    return problem, fit
+    return problem, polished(data, problem, fit, stages[-1], most, fixed)
+
+
+def polished(
+    data: Data, problem: Problem, fit: Fit, stage: int, most: int, fixed: np.ndarray | None = None
+) -> Fit:
+    """The fit after its suspicious segments were tried from other starts."""
+    starts, improved = rescued(problem, fit, data.smoothed_starts(stage), data.smoothed_errors(stage))
+    if not improved.any():
+        return fit
+    return minimise(problem, fit.values, starts, most=most, fixed=fixed)
 
 
 def scales_of(data: Data, model) -> Scales:

@@ -92,7 +92,7 @@ def remeasured(bench: Bench, first: Round) -> Fitted | None:
 
 def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one)[0]]
+    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
     pool = converged or found.judged
     best = pool[0]
     scale = max(1.0, best.fitted.fit.reduced_chi2)
@@ -110,7 +110,7 @@ def _pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], 
         helps = any(low > 0 for low, _ in bounds)
         best.gates["hold-out"] = bool(helps and all(high > _HARM for _, high in bounds))
     best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best)[0]
+    best.gates["admissible"] = admissible(best, base)[0]
     best.gates["stable"] = stable(best, base, options) >= _INCLUSION
 
 
@@ -170,7 +170,7 @@ def _with_more(
             if made is not None:
                 pairs.append(_over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one)[0]]
+    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
     if not pairs:
         return _give_up(decision)
     pairs.sort(key=lambda one: -one.evidence)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.catalogue import Candidate
-from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.data import Data, fit_stages, polished
 from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.problem import Problem
 from separatrix.discovery.screen import Screened
@@ -90,7 +90,8 @@ def _try(
     """One start: at full length from the fitted base, or through the stages, from the case as it stands if far."""
     if kind == "linear":
         problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-        return problem, minimise(problem, values, base.fit.starts, most=most)
+        fit = minimise(problem, values, base.fit.starts, most=most)
+        return problem, polished(data, problem, fit, data.last, most)
     stages = [1, data.last]
     if kind == "far":
         stages = list(range(data.last + 1))

@@ -64,10 +64,10 @@ def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tu
         reached = _cost(trial)
         better = reached < cost
         damping = np.where(better, 0.2 * damping, 10 * damping)
-        gained = float(np.sum(np.where(better & np.isfinite(cost), cost - reached, 0)))
         starts[better] += step[better]
+        idle = not np.any(better & ((cost == np.inf) | (reached < cost - 0.01)))
         cost = np.where(better, reached, cost)
-        if not better.any() or gained < 0.1:
+        if idle:
             break
         current = problem.evaluate(values, starts)
     return starts, cost
