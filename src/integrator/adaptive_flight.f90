@@ -41,8 +41,8 @@ module adaptive_flight
 contains
 
   !> Flies from `state` (mode slip_plus or slip_minus) up to `time_end` [s after the section], `barrier` [m]
-  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, or at
-  !> the time. The state returned is that just before the event.
+  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, at
+  !> the time, or before it outside of the domain. The state returned is that just before the event.
   pure subroutine fly_adaptive(machine, options, state, time_end, exit_speed, barrier, tally, outcome, log)
     type(oscillator_t), intent(in) :: machine
     type(options_t), intent(in) :: options
@@ -81,6 +81,9 @@ contains
         y = next
         slopes(:, 1) = slopes(:, 13)
         h = h*min(5.0_wp, 0.9_wp/eighth_root(max(error, 1e-10_wp)))
+        outcome = flight_time_over
+        ! An unstable spring drives a body to infinity within a finite time.
+        if (abs(y(1)) > options%domain) exit
         cycle
       end if
       call land(machine, slip, options%tolerance, outcome, state%time, y, h, fraction, slopes, next)
