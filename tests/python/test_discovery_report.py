@@ -6,7 +6,6 @@ import base64
 import io
 import json
 import re
-import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from matplotlib.image import imread
 from program import CASE
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
-from separatrix.discovery.starts import kept_between
 
 SECTIONS = [
     "verdict", "compared", "gap", "where", "missing", "confusable", "residuals", "impacts", "held-out",
@@ -308,16 +306,3 @@ def test_no_program_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     make(tmp_path, "named")
     html, _ = write_report(tmp_path, tmp_path / "base.toml")
     assert "No maps before and after: the program separatrix was not found" in html.read_text()
-
-
-def test_starts_stay_between_the_barriers(separatrix: Path, tmp_path: Path) -> None:
-    text = CASE.replace('to = "1.1 m"', "to = 1.1").replace('x0 = "0.4 m"', "x0 = 0.4")
-    kept = kept_between(text, -np.inf, 1.0999).replace('upper = "1.1 m"', "upper = 1.0999")
-    (tmp_path / "kept.toml").write_text(kept)
-    (tmp_path / "given.toml").write_text(text.replace('upper = "1.1 m"', "upper = 1.0999"))
-    codes = [
-        subprocess.run([separatrix, "basin", tmp_path / name, "--validate"], capture_output=True).returncode
-        for name in ("kept.toml", "given.toml")
-    ]
-    assert codes == [0, 65]
-    assert kept_between(text, -np.inf, np.inf) == text

@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -13,7 +14,6 @@ import numpy as np
 from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
-from separatrix.discovery.starts import kept_between
 from separatrix.discovery.verdict import Findings
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
@@ -69,18 +69,36 @@ def extended_case(verdict: dict, findings: Findings) -> str:
         if found:
             unit = "" if found["unit"] == "1" else f" {found['unit']}"
             lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
-    return "\n".join([*lines, _case_text(fitted)])
+    return "\n".join([*lines, machine_text(fitted)])
 
 
-def _case_text(fitted: Fitted) -> str:
-    """The resolved case of the machine as fitted; its starts stay where its barriers allow."""
-    model, values = fitted.model, machine_values(fitted)
-    lower, upper = (
-        values.get(path, bound) for path, bound in (("contact.lower", -np.inf), ("contact.upper", np.inf))
-    )
-    text = model.to_text({})
-    kept = kept_between(text, lower, upper)
-    return (model if kept == text else type(model).from_text(kept)).to_text(values)
+def machine_text(fitted: Fitted) -> str:
+    """The resolved case of the fitted machine; starts and axes that its barriers would cut off end at them."""
+    values = machine_values(fitted)
+    try:
+        return fitted.model.to_text(values)
+    except SeparatrixError:
+        ends = [values.get("contact.lower", -np.inf), values.get("contact.upper", np.inf)]
+        text = within_barriers(fitted.model.to_text({}), *ends)
+        return type(fitted.model).from_text(text).to_text(values)
+
+
+def within_barriers(text: str, lower: float, upper: float) -> str:
+    """A resolved case in which positions to start from lie between the barriers."""
+    table, axis, lines = "", "", []
+    for line in text.splitlines():
+        header = re.fullmatch(r"\[+(.*?)\]+", line.strip())
+        key, equals, value = (part.strip() for part in line.partition("="))
+        if header:
+            table, axis = header.group(1), ""
+        elif equals and key == "name":
+            axis = value.strip('"')
+        if equals and ((table == "axis" and axis == "x0" and key in ("from", "to")) or key == "x0"):
+            numbers = re.findall(r"[-+0-9.eE]+", value)
+            kept = [repr(float(np.clip(float(number), lower, upper))) for number in numbers]
+            line = f"{key} = [{', '.join(kept)}]" if value.startswith("[") else f"{key} = {kept[0]}"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
 
 
 def machine_values(fitted: Fitted) -> dict[str, float]:

@@ -198,6 +198,12 @@ def minimise(
     return _finished(problem, values, starts, current, decrement, iterations, ~_open_at(values, lower, upper))
 
 
+def again(problem: Problem, fit: Fit) -> Fit:
+    """The same values and starts, evaluated with the noise as it is known now."""
+    current = problem.evaluate(fit.values, fit.starts)
+    return _finished(problem, fit.values, fit.starts, current, fit.decrement, fit.iterations, fit.at_bound)
+
+
 def _finished(problem, values, starts, current, decrement, iterations, at_bound) -> Fit:
     weights = _weights(current, robust=False)[0]
     blocks = blocks_of(current.by_start, current.by_parameter, current.residual, weights)

@@ -12,8 +12,9 @@ from separatrix.discovery.heldout import Prediction
 from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, gain_over
 
-_INCLUSION = 0.9
 _BLOCKS = 2
+# share of the base's segments that a candidate must be able to follow
+_FOLLOWED = 0.9
 
 
 @dataclass
@@ -93,10 +94,11 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     return float(np.mean(sums > one.parameters))
 
 
-def admissible(one: Judged) -> tuple[bool, str]:
+def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
     """Signs and bounds: the effect is not at a bound, differs from nothing, and what it is added to stays sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
     errors = np.sqrt(np.diag(one.fitted.covariance))
+    base_good = int(base.fit.good.sum())
     clear = []
     for i in one.fitted.added:
         if fit.at_bound[i]:
@@ -104,6 +106,8 @@ def admissible(one: Judged) -> tuple[bool, str]:
         # the logarithm of a number says by its error whether the number is known at all
         size = 1.0 if free[i].positive else abs(fit.values[i])
         clear.append(size > 1.96 * errors[i] > 0)
+    if fit.good.sum() < _FOLLOWED * max(1, base_good):
+        return False, "the machine with it cannot follow some segments that the base can"
     if not clear:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):
