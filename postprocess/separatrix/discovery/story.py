@@ -168,10 +168,11 @@ def _missing(verdict: dict) -> Section:
     body: list = []
     if verdict["gates"]:
         rows = [
-            [gate, GATES.get(gate, ""), "passed" if passed else "failed"] for gate, passed in verdict["gates"].items()
+            [gate, GATES.get(gate, ""), "passed" if passed else "failed"]
+            for gate, passed in verdict["gates"].items()
         ]
         body += [
-            f"Gates of {names(verdict)}, family-wise p = {probability(verdict['p_value'])}:",
+            f"Gates of {names(verdict)}, family-wise p: {probability(verdict['p_value'])}:",
             Table(["gate", "meaning", ""], rows),
         ]
     else:
