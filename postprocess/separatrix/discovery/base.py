@@ -57,7 +57,9 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
         elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m")
+            prepared.note(
+                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
+            )
     if any(one.record.v is not None for one in data.prepared):
         factors, _ = noise_of(problem, fit, 1, mass)
         for number, prepared in enumerate(data.prepared):

@@ -115,7 +115,9 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     }
     if phase is not None:
         waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
-        forces["phase"] = np.stack(waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2)
+        forces["phase"] = np.stack(
+            waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2
+        )
         forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
     since = after_impacts(problem, fit)
     if np.isfinite(since).sum() > 100:
