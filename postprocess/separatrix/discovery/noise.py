@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Size and memory of the noise of records, from what segments of half a period leave over.
 
-A wrong model does little over half a period that a free start and a force that is constant over quarters of it could not
-undo. What is left is noise, less what these unknowns took away: its power and the product of its neighbours are
-compared with what noise of correlation r^|k| would leave.
+A wrong model does little over half a period that a free start and a force that is constant over quarters of
+it could not undo. What is left is noise, less what these unknowns took away: its power and the product of its
+neighbours are compared with what noise of correlation r^|k| would leave.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ _OUTLIER = 2.5
 
 
 def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dict[int, float], float]:
-    """Factor on the assumed standard deviation of each record, and the correlation of neighbours in all of them."""
+    """Factor on the assumed standard deviation by record, and the correlation of neighbours in all."""
     cleaned, left, record = _cleaned(problem, fit, channel, mass)
     length = problem.segments.inside.shape[1]
     if record.size < 4:
