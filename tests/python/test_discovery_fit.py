@@ -51,7 +51,9 @@ def test_a_closed_parameter_stays(table):
     by_start, by_parameter, residual, weights = table
     open_ = np.array([True, False, True, True])
     _, step, _ = gauss_newton_step(blocks_of(by_start, by_parameter, residual, weights), open_)
-    _, other, _ = gauss_newton_step(blocks_of(by_start, by_parameter[:, :, open_], residual, weights), open_[open_])
+    _, other, _ = gauss_newton_step(
+        blocks_of(by_start, by_parameter[:, :, open_], residual, weights), open_[open_]
+    )
     assert step[1] == 0
     assert step[open_] == pytest.approx(other, abs=1e-12)
 

@@ -12,7 +12,13 @@ from separatrix.discovery.cli import main
 from separatrix.discovery.records import read_record
 from separatrix.errors import SeparatrixError
 
-HEAD = ["# units: s, m", "# sampling_rate_hz: 100", "# sensor_noise_sigma_m: 0.001", "# drive_ratio: 1.2", "# phase: 0"]
+HEAD = [
+    "# units: s, m",
+    "# sampling_rate_hz: 100",
+    "# sensor_noise_sigma_m: 0.001",
+    "# drive_ratio: 1.2",
+    "# phase: 0",
+]
 
 
 def rows(count: int = 400) -> tuple[np.ndarray, np.ndarray]:
@@ -128,6 +134,10 @@ def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault)
 
 
 def test_usage(capsys):
-    for arguments in (["base.toml"], ["base.toml", "r.csv", "--out", "o", "--seed", "-1"], ["--effects", "magic"]):
+    for arguments in (
+        ["base.toml"],
+        ["base.toml", "r.csv", "--out", "o", "--seed", "-1"],
+        ["--effects", "magic"],
+    ):
         assert main(arguments) == 64
         assert "separatrix-discover: " in capsys.readouterr().err

@@ -30,7 +30,11 @@ def records(separatrix: Path, folder: Path, effect: str) -> list[Path]:
     made = []
     for seed, (name, ratio) in enumerate(RATIOS.items()):
         path = folder / f"{name}.csv"
-        settings = (f"drive.ratio={ratio}", "run.duration=9", f'record={{rate=200, noise="1 mm", seed={seed}}}')
+        settings = (
+            f"drive.ratio={ratio}",
+            "run.duration=9",
+            f'record={{rate=200, noise="1 mm", seed={seed}}}',
+        )
         words = [word for setting in settings for word in ("--set", setting)]
         succeed(separatrix, "trajectory", "true.toml", "--force", "--record", path, *words, folder=folder)
         made.append(path)
@@ -40,39 +44,51 @@ def records(separatrix: Path, folder: Path, effect: str) -> list[Path]:
 def asked(folder: Path, made: list[Path], out: str, *more: str) -> dict:
     """The verdict on these records."""
     first, second, held_out = map(str, made)
-    arguments = [str(folder / "base.toml"), first, second, "--hold-out", held_out, "--out", str(folder / out), "-q"]
+    arguments = [
+        str(folder / "base.toml"),
+        first,
+        second,
+        "--hold-out",
+        held_out,
+        "--out",
+        str(folder / out),
+        "-q",
+    ]
     assert main([*arguments, *more]) == 0
     return json.loads((folder / out / "verdict.json").read_text())
 
 
 def test_a_hidden_spring_is_named_added_and_foretells(separatrix, tmp_path):
-    made = records(separatrix, tmp_path, "[effect.cubic_spring]\nstiffness = 40\n")
+    made = records(separatrix, tmp_path, "[effect.cubic_spring]\nstiffness = 15\n")
     verdict = asked(tmp_path, made, "out")
     assert (verdict["outcome"], verdict["effects"]) == ("named", ["cubic_spring"])
     assert all(verdict["gates"].values())
     found = verdict["parameters"]["effect.cubic_spring.stiffness"]
     assert found["unit"] == "N/m^3"
-    assert abs(found["value"] - 40) < 4 * found["standard_error"] < 8
+    assert abs(found["value"] - 15) < 4 * found["standard_error"] < 8
     gap = verdict["gap"]["held_out"]
-    assert gap["before"] > 1.5
+    assert gap["before"] > 1.3
     assert gap["after"] < 1.15
     assert verdict["where"]
     succeed(separatrix, "trajectory", "out/extended.toml", "--validate", folder=tmp_path)
     assert "cubic_spring added" in (tmp_path / "out" / "extended.toml").read_text()
     with h5py.File(tmp_path / "out" / "details.h5") as file:
-        assert np.array(file["confusability/matrix"]) == pytest.approx(np.array(verdict["confusability"]["matrix"]))
+        assert np.array(file["confusability/matrix"]) == pytest.approx(
+            np.array(verdict["confusability"]["matrix"])
+        )
         after = np.std(file["held_out/held_out/after/residual"])
         assert after < np.std(file["held_out/held_out/before/residual"])
 
 
 def test_nothing_is_found_where_nothing_is_and_twice_the_same(separatrix, tmp_path):
     made = records(separatrix, tmp_path, "")
-    verdict = asked(tmp_path, made, "out")
+    few = ("--effects", "cubic_spring,viscous,offset_force,stribeck")
+    verdict = asked(tmp_path, made, "out", *few)
     assert (verdict["outcome"], verdict["effects"]) == ("none", [])
     assert not (tmp_path / "out" / "extended.toml").exists()
     # what would have been seen is at most a few per cent of the forces of the machine
     assert 0 < verdict["detectable"]["cubic_spring"]["size"] < 60
-    again = asked(tmp_path, made, "again")
+    again = asked(tmp_path, made, "again", *few)
     for one in (verdict, again):
         del one["runtime_s"]
     assert again == verdict

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The base machine fitted honestly: noise measured on the way, phases found, several starts if one is not enough."""
+"""The base machine fitted honestly: noise measured, phases found, several starts."""
 
 from dataclasses import replace
 
@@ -57,7 +57,9 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
         elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m")
+            prepared.note(
+                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
+            )
     if any(one.record.v is not None for one in data.prepared):
         factors, _ = noise_of(problem, fit, 1, mass)
         for number, prepared in enumerate(data.prepared):
@@ -84,7 +86,7 @@ def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
 
 
 def find_phases(data: Data, model, free: list[Free]) -> None:
-    """Search the crank angle of the records that do not state it, on short segments with all else as in the case."""
+    """Search the crank angle of the records that do not state it, all else as in the case."""
     missing = [i for i, one in enumerate(data.prepared) if one.frequency is not None and not one.phase_stated]
     if not missing:
         return

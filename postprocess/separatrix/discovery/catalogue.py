@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The effects that can be named: their parameters, sizes to start from, and what they cannot be told from.
 
-A size to start from is a few per cent of what the machine's own forces, lengths and speeds are in the records.
+A size to start from is a few per cent of what the machine's own forces, lengths and speeds are in the
+records.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from separatrix.errors import SeparatrixError
 
 @dataclass(frozen=True)
 class Scales:
-    """Typical sizes in the records: mass, deviation, speed, force, impact speed, friction, extremes of x, sampling."""
+    """Typical sizes in the records, in SI units."""
 
     mass: float
     length: float
@@ -32,10 +33,12 @@ class Scales:
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of the catalogue. `starts` gives, per parameter, the sizes to start from; the first is the usual one.
+    """One row of the catalogue. `starts` gives, per parameter, the sizes to start from; the first is the
+    usual one.
 
-    `linear`: the parameters that the residual is linear in near zero (both signs are tried where bounds allow);
-    `positive`: those that are fitted by their logarithm. `needs`: families or paths that the base machine must have.
+    `linear`: the parameters that the residual is linear in near zero (both signs are tried where bounds
+    allow); `positive`: those that are fitted by their logarithm. `needs`: families or paths that the base
+    machine must have.
     """
 
     name: str
@@ -203,7 +206,7 @@ def _has(model, need: str) -> bool:
 
 
 def _free_side(model, scales: Scales) -> list[float] | str:
-    """Places for a second barrier: just inside of the extreme that the records show on the side without one."""
+    """Places for a second barrier: inside of the extreme of the records on the side without one."""
     upper, lower = ("contact.upper" in model.parameters, "contact.lower" in model.parameters)
     if upper == lower:
         return "the machine has no side without a barrier" if upper else "the machine has no barrier"

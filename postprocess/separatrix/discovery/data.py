@@ -52,7 +52,7 @@ class Data:
         ).reshape(-1, 2)
 
     def carried_starts(self, stage: int, known: int, fit: Fit) -> np.ndarray:
-        """Starts of a stage from the motion fitted at stage `known`, and from the smoother where it failed."""
+        """Starts of a stage from the motion fitted at stage `known`; from the smoother where it failed."""
         starts = self.smoothed_starts(stage)
         old, new = self.stages[known], self.stages[stage]
         for r, record in enumerate(self.prepared):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forward selection: which effects, if any, may be named; what cannot be told apart; what the catalogue lacks."""
+"""Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
 
 from dataclasses import dataclass, field
 
@@ -72,7 +72,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
 
 
 def remeasured(bench: Bench, first: Round) -> Fitted | None:
-    """The base fitted again where the best candidate shows that the noise is not what the base let it seem."""
+    """The base fitted again where the best candidate shows that the noise is another."""
     leaders = [one for one in first.judged if one.fitted.fit.converged]
     if not leaders:
         return None
@@ -149,7 +149,7 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     if decision.base_ceiling.p < 0.3 * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
-            f"forces that depend on {decision.base_ceiling.best.name} would explain more than chance, no effect does"
+            f"forces that depend on {decision.base_ceiling.best.name} would explain more, no effect does"
         )
     return decision
 

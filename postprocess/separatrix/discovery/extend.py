@@ -3,7 +3,6 @@
 """What is written: the verdict, the case with the effect added, the numbers behind the figures."""
 
 import json
-import os
 import re
 import tempfile
 from pathlib import Path
@@ -31,7 +30,7 @@ def write_all(folder: Path, verdict: dict, findings: Findings) -> list[Path]:
                 made.append(work / "extended.toml")
                 made[-1].write_text(extended_case(verdict, findings), encoding="utf-8")
             for path in made:
-                os.replace(path, folder / path.name)
+                path.replace(folder / path.name)
     except OSError as error:
         raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
     return [folder / path.name for path in made]
@@ -73,7 +72,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
 
 
 def machine_text(fitted: Fitted) -> str:
-    """The resolved case of the fitted machine; starts and axes that its barriers would cut off end at them."""
+    """The resolved case of the fitted machine; starts and axes end at its barriers."""
     values = machine_values(fitted)
     try:
         return fitted.model.to_text(values)

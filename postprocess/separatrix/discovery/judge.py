@@ -19,7 +19,7 @@ _FOLLOWED = 0.9
 
 @dataclass
 class Judged:
-    """A candidate with its evidence: log-likelihood gained in training, log score gained on held-out records."""
+    """A candidate with what it gained: log-likelihood in training, log score on held-out records."""
 
     fitted: Fitted
     prediction: Prediction | None
@@ -62,7 +62,7 @@ def detection(one: Judged, tested: int, inflation: float) -> float:
 
 
 def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
-    """Lower and upper 5 % bound of the score gained in each held-out record, by resampling blocks of segments."""
+    """Lower and upper 5 % bound of the score gained in each held-out record, by block bootstrap."""
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
     for number in np.unique(one.prediction.record):
@@ -82,7 +82,7 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 
 
 def stable(one: Judged, base: Fitted, options: Options) -> float:
-    """Share of block bootstraps of the segments in which the effect still pays for its parameters, linearised."""
+    """Share of block bootstraps of the segments in which the effect pays for its parameters."""
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
     added = added[~fit.at_bound[added]]
@@ -95,7 +95,7 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
 
 
 def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
-    """Signs and bounds: the effect is not at a bound, differs from nothing, and what it is added to stays sensible."""
+    """Signs and bounds: the effect is inside of its own, is not nothing, and leaves the drive sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
     errors = np.sqrt(np.diag(one.fitted.covariance))
     base_good = int(base.fit.good.sum())

@@ -61,8 +61,8 @@ def refit(
 ) -> Fitted:
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
-    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start is not tried
-    further.
+    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
+    is not tried further.
     """
     best = None
     values = _base_values(base, candidate)
@@ -87,7 +87,7 @@ def refit(
 def _try(
     data: Data, base: Fitted, candidate: Candidate, kind: str, values: np.ndarray, most: int
 ) -> tuple[Problem, Fit]:
-    """One start: at full length from the fitted base, or through the stages, from the case as it stands if far."""
+    """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
         fit = minimise(problem, values, base.fit.starts, most=most)

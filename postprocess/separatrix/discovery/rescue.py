@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Segments whose start is caught in a wrong minimum, as beside a motion with one impact more: tried from other starts."""
+"""Segments whose start is caught in a wrong minimum (one impact more or less), tried from others."""
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def rescued(
 
 
 def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the start of each segment by itself, the machine fixed, each with a damping of its own; also the chi^2."""
+    """Fit the start of each segment by itself, the machine fixed; also the chi^2."""
     starts = starts.copy()
     current = problem.evaluate(values, starts)
     cost = _cost(current)

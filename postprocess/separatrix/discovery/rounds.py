@@ -97,10 +97,11 @@ def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     return [
         name
         for place, name in enumerate(order)
-        if place < _CERTAIN_REFITS
-        and (screened.gain[name] > _WORTH or place < _FEWEST)
-        or screened.gain[name] > _WORTH
-        and (not options.quick and any(screened.cosine(name, other) > _RELATED for other in order[:3]))
+        if (place < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or place < _FEWEST))
+        or (
+            screened.gain[name] > _WORTH
+            and (not options.quick and any(screened.cosine(name, other) > _RELATED for other in order[:3]))
+        )
     ]
 
 
