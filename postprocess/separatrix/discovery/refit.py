@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A candidate fitted with everything else free, from several starts; and two fits compared fairly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.catalogue import Candidate
+from separatrix.discovery.data import Data, fit_stages, polished
+from separatrix.discovery.fit import Fit, minimise
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.screen import Screened
+
+# a fit this good needs no other start
+_FINE = 1.03
+_HOPELESS = 4.0
+# log-likelihood by which a candidate is out of the race
+_BEATEN = 15.0
+# usual sizes beyond which a linearised estimate is not believed
+_FARTHEST = 25.0
+
+
+@dataclass
+class Fitted:
+    """A machine with all its free parameters at their best values."""
+
+    names: tuple[str, ...]
+    model: object
+    problem: Problem
+    fit: Fit
+    added: tuple[int, ...]
+    tries: int = 1
+
+    @property
+    def paths(self) -> list[str]:
+        """Paths of the parameters of the effect that was added last."""
+        return [self.problem.free[i].path for i in self.added]
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of all free parameters, starts projected out, enlarged where the fit is worse than the noise."""
+        matrix = self.fit.reduced.matrix[self.fit.good].sum(axis=0)
+        open_ = np.flatnonzero(~self.fit.at_bound & (np.diag(matrix) > 0))
+        covariance = np.zeros_like(matrix)
+        if open_.size:
+            inner = matrix[np.ix_(open_, open_)]
+            scale = 1 / np.sqrt(np.diag(inner))
+            scaled = np.linalg.pinv(inner * np.outer(scale, scale), rcond=1e-10, hermitian=True)
+            covariance[np.ix_(open_, open_)] = scaled * np.outer(scale, scale)
+        return covariance * max(1.0, self.fit.reduced_chi2)
+
+
+def refit(
+    data: Data,
+    base: Fitted,
+    candidate: Candidate,
+    screened: Screened | None,
+    rival: Fitted | None = None,
+    quick: bool = False,
+) -> Fitted:
+    """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
+
+    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
+    is not tried further.
+    """
+    best = None
+    values = _base_values(base, candidate)
+    settled = rival is not None and rival.fit.converged and rival.fit.reduced_chi2 < _FINE
+    for tries, (kind, start) in enumerate(_starts(candidate, screened), start=1):
+        tried = values.copy()
+        tried[list(candidate.added)] = start
+        problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
+        found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
+        if best is None or gain_over(found, best)[0] > 0:
+            best = found
+        best.tries = tries
+        if best.fit.converged and best.fit.reduced_chi2 < _FINE and (quick or kind != "far"):
+            break
+        if settled and gain_over(best, rival)[0] < -_BEATEN:
+            break
+        if quick and tries == 2:
+            break
+    return best
+
+
+def _try(
+    data: Data, base: Fitted, candidate: Candidate, kind: str, values: np.ndarray, most: int
+) -> tuple[Problem, Fit]:
+    """One start: at full length from the fitted base, or through the stages; far: from the case."""
+    if kind == "linear":
+        problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+        fit = minimise(problem, values, base.fit.starts, most=most)
+        return problem, polished(data, problem, fit, data.last, most)
+    stages = [1, data.last]
+    if kind == "far":
+        stages = list(range(data.last + 1))
+        nominal = np.array([one.value for one in candidate.free])
+        values = np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
+    return fit_stages(
+        data, candidate.model, candidate.free, values, stages=stages, most=min(most, 12), hopeless=_HOPELESS
+    )
+
+
+def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
+    known = {
+        (one.path, one.record): value for one, value in zip(base.problem.free, base.fit.values, strict=True)
+    }
+    return np.array([known.get((one.path, one.record), one.value) for one in candidate.free])
+
+
+def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, np.ndarray]]:
+    name = candidate.names[-1]
+    lower = np.array([candidate.free[i].lower for i in candidate.added])
+    upper = np.array([candidate.free[i].upper for i in candidate.added])
+    starts = []
+    if screened is not None and name in screened.step:
+        guess = screened.origin[name].copy()
+        live = screened.live[name]
+        if live.any():
+            sizes = np.array([candidate.free[i].size for i in candidate.added])
+            guess[live] += screened.step[name] * sizes[live]
+            far = _FARTHEST * np.where(candidate.linear, sizes, np.inf)
+            guess = np.clip(np.clip(guess, -far, far), lower, upper)
+            # away from zero, where its other parameters could not move
+            guess = np.where((guess == 0) & candidate.linear, 0.01 * sizes, guess)
+            starts.append(("linear", guess))
+        else:
+            starts.append(("near", guess))
+    starts += [("near", start) for start in candidate.starts[1:2] if not candidate.linear.all()]
+    starts += [("far", start) for start in candidate.starts[:2]]
+    return [(kind, np.clip(start, lower, upper)) for kind, start in starts]
+
+
+def common(one: Fitted, other: Fitted) -> np.ndarray:
+    """Segments that both fits can be judged by."""
+    return one.fit.good & other.fit.good
+
+
+def gain_over(one: Fitted, other: Fitted) -> tuple[float, np.ndarray]:
+    """Log-likelihood of `one` over that of `other`, and its parts by segment."""
+    both = common(one, other)
+    parts = np.where(both, 0.5 * (other.fit.chi2 - one.fit.chi2), 0.0)
+    return float(parts.sum()), parts
