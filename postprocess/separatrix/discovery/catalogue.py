@@ -57,6 +57,9 @@ class Effect:
 
 _FAR = 20.0
 _SLIDING = "while the body slides, friction that differs with the direction by a constant is a constant force"
+_GAIN = (
+    "where friction, barrier and the scale of the drive are fitted, a gain of the sensor is a constant force"
+)
 _SHIFT = "where the position of the barrier is fitted, a shifted sensor is a constant force"
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -80,7 +83,7 @@ CATALOGUE: tuple[Effect, ...] = (
         "asymmetric_friction",
         lambda s: {"coulomb": [0.02 * s.force], "viscous": [0.02 * s.force / s.speed]},
         ("coulomb", "viscous"),
-        equivalent={"offset_force": _SLIDING, "sensor_bias": _SHIFT},
+        equivalent={"offset_force": _SLIDING, "sensor_bias": _SHIFT, "sensor_gain": _GAIN},
     ),
     Effect(
         "position_dependent_friction",
@@ -93,7 +96,7 @@ CATALOGUE: tuple[Effect, ...] = (
         "offset_force",
         lambda s: {"force": [0.02 * s.force]},
         ("force",),
-        equivalent={"asymmetric_friction": _SLIDING, "sensor_bias": _SHIFT},
+        equivalent={"asymmetric_friction": _SLIDING, "sensor_bias": _SHIFT, "sensor_gain": _GAIN},
     ),
     Effect(
         "restitution_slope",
@@ -124,9 +127,15 @@ CATALOGUE: tuple[Effect, ...] = (
         lambda s: {"bias": [0.01 * s.length]},
         ("bias",),
         sensor=True,
-        equivalent={"offset_force": _SHIFT, "asymmetric_friction": _SHIFT},
+        equivalent={"offset_force": _SHIFT, "asymmetric_friction": _SHIFT, "sensor_gain": _GAIN},
     ),
-    Effect("sensor_gain", lambda s: {"gain": [0.01]}, ("gain",), sensor=True),
+    Effect(
+        "sensor_gain",
+        lambda s: {"gain": [0.01]},
+        ("gain",),
+        sensor=True,
+        equivalent={"offset_force": _GAIN, "asymmetric_friction": _GAIN, "sensor_bias": _GAIN},
+    ),
     Effect("sensor_delay", lambda s: {"delay": [0.2 * s.interval]}, ("delay",), sensor=True),
 )
 
