@@ -3,13 +3,13 @@
 """What is written: the verdict, the case with the effect added, the numbers behind the figures."""
 
 import json
-import re
 import tempfile
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from separatrix.discovery.catalogue import within_barriers
 from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
@@ -80,24 +80,6 @@ def machine_text(fitted: Fitted) -> str:
         ends = [values.get("contact.lower", -np.inf), values.get("contact.upper", np.inf)]
         text = within_barriers(fitted.model.to_text({}), *ends)
         return type(fitted.model).from_text(text).to_text(values)
-
-
-def within_barriers(text: str, lower: float, upper: float) -> str:
-    """A resolved case in which positions to start from lie between the barriers."""
-    table, axis, lines = "", "", []
-    for line in text.splitlines():
-        header = re.fullmatch(r"\[+(.*?)\]+", line.strip())
-        key, equals, value = (part.strip() for part in line.partition("="))
-        if header:
-            table, axis = header.group(1), ""
-        elif equals and key == "name":
-            axis = value.strip('"')
-        if equals and ((table == "axis" and axis == "x0" and key in ("from", "to")) or key == "x0"):
-            numbers = re.findall(r"[-+0-9.eE]+", value)
-            kept = [repr(float(np.clip(float(number), lower, upper))) for number in numbers]
-            line = f"{key} = [{', '.join(kept)}]" if value.startswith("[") else f"{key} = {kept[0]}"
-        lines.append(line)
-    return "\n".join(lines) + "\n"
 
 
 def machine_values(fitted: Fitted) -> dict[str, float]:
