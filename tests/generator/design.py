@@ -16,12 +16,19 @@ BLOCK = 40
 SHARES = {"none": 8, "outside": 6, "pair": 4}
 TARGETS = (3.0, 5.0, 10.0, 30.0)
 LEVELS = (0.001, 0.005, 0.01, 0.03, 0.05)
-PERIODS = 20
+PERIODS = 12
 ATTEMPTS = 12
 MEMORY = 0.5
 MARGIN = 1.2
 """A size is accepted from its target to so many times its target."""
-SCATTER = {"stiffness": 0.02, "coulomb": 0.1, "viscous": 0.1, "restitution": 0.04, "upper": 0.005, "scale": 0.02}
+SCATTER = {
+    "stiffness": 0.02,
+    "coulomb": 0.1,
+    "viscous": 0.1,
+    "restitution": 0.04,
+    "upper": 0.005,
+    "scale": 0.02,
+}
 """Standard deviation of the true machine from its base case, relative."""
 NEEDS_DRY = ("stribeck", "static_excess", "dahl", "asymmetric_friction", "position_dependent_friction")
 
@@ -124,7 +131,9 @@ def _regime(random: np.random.Generator, name: str) -> str:
         parts = name.split("+")
         if any(part in its.friction for part in parts):
             continue
-        if "coulomb" not in its.friction and any(part in NEEDS_DRY or part == "drifting_friction" for part in parts):
+        if "coulomb" not in its.friction and any(
+            part in NEEDS_DRY or part == "drifting_friction" for part in parts
+        ):
             continue
         if name == "asymmetric_viscous" and regime != "damped":
             continue
@@ -141,7 +150,7 @@ def _ratios(random: np.random.Generator, regime: str) -> list[float]:
 
 
 def _experiments(random: np.random.Generator, regime: str) -> list[Experiment]:
-    samples = int(random.choice([50, 100, 400], p=[0.5, 0.4, 0.1]))
+    samples = int(random.choice([50, 100, 400], p=[0.6, 0.35, 0.05]))
     upper = REGIMES[regime].upper
     return [
         Experiment(
@@ -170,7 +179,9 @@ def _draw(random: np.random.Generator, number: int, kind: str, name: str, target
     regime = _regime(random, name)
     its = REGIMES[regime]
     nominal = its.machine()
-    scatter = {key: getattr(nominal, key) * (1 + SCATTER[key] * random.standard_normal()) for key in its.unknowns}
+    scatter = {
+        key: getattr(nominal, key) * (1 + SCATTER[key] * random.standard_normal()) for key in its.unknowns
+    }
     base = nominal.copy(**scatter)
     experiments = _experiments(random, regime)
     case = Case(
@@ -192,7 +203,9 @@ def _draw(random: np.random.Generator, number: int, kind: str, name: str, target
         seed=[],
     )
     if name == "second_barrier":
-        lowest = [experiment.states(experiment.driven(base), COARSE)[0][:, X].min() for experiment in experiments]
+        lowest = [
+            experiment.states(experiment.driven(base), COARSE)[0][:, X].min() for experiment in experiments
+        ]
         case.hidden[0].shape["lowest"] = float(min(lowest))
     if name:
         _choose_sizes(case)

@@ -18,7 +18,7 @@ class Effect:
     path: str
     """Parameter of the case file that is the size; nothing for what the catalogue lacks."""
     field: str
-    """Parameter of the machine or sensor that is the size; the depth below the motion for a second barrier."""
+    """Parameter of the machine or sensor that is the size; for a second barrier its depth in the motion."""
     sizes: tuple[float, float]
     """Smallest and largest size worth asking for; from invisible to large, so a stiffness falls."""
     signed: bool = False
@@ -75,7 +75,13 @@ CATALOGUE = {
     "coulomb": Effect("force", "coulomb", (1e-3, 4)),
     "quadratic_drag": Effect("coefficient", "quadratic", (1e-4, 1)),
     "stribeck": Effect(
-        "excess", "stribeck", (1e-3, 3), False, _stribeck, ("stribeck_velocity",), {"stribeck_velocity": "velocity"}
+        "excess",
+        "stribeck",
+        (1e-3, 3),
+        False,
+        _stribeck,
+        ("stribeck_velocity",),
+        {"stribeck_velocity": "velocity"},
     ),
     "static_excess": Effect("force", "static_excess", (1e-3, 5)),
     "dahl": Effect("stiffness", "dahl", (1e4, 10)),

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from simulator import NOWHERE, V, X, Machine, simulate, simulate_pieces, state
+from simulator import NOWHERE, Machine, V, X, simulate, simulate_pieces, state
 
 GRAVITY = 9.81
 STIFFNESS = 9 * math.pi**2

@@ -21,7 +21,10 @@ QUANTUM = math.sqrt(6)
 FRICTION = {
     ("coulomb",): 'law = "coulomb"\nkinetic_coefficient = {coefficient!r}',
     ("viscous",): 'law = "viscous"\ndamping = {damping!r}',
-    ("coulomb", "viscous"): 'law = "coulomb_viscous"\nkinetic_coefficient = {coefficient!r}\ndamping = {damping!r}',
+    (
+        "coulomb",
+        "viscous",
+    ): 'law = "coulomb_viscous"\nkinetic_coefficient = {coefficient!r}\ndamping = {damping!r}',
 }
 
 
@@ -110,7 +113,9 @@ def truth_of(case: Case) -> dict:
         "parameters": {path: value for hidden in case.hidden for path, value in hidden.parameters.items()},
         "target": case.target,
         "d_prime": case.d_prime,
-        "beyond": {name: {"d_prime": worst, "besides": other} for name, (worst, other) in case.beyond.items()},
+        "beyond": {
+            name: {"d_prime": worst, "besides": other} for name, (worst, other) in case.beyond.items()
+        },
         "regime": case.regime,
         "noise": case.level,
         "colour": case.colour,

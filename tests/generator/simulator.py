@@ -21,8 +21,8 @@ NOWHERE = 1e30
 """Where a barrier is that is not there."""
 
 SCALARS = (
-    "mass stiffness free_length mean cosine sine scale angle frequency phase coulomb viscous restitution upper"
-    " quadratic stribeck stribeck_velocity static_excess dahl"
+    "mass stiffness free_length mean cosine sine scale angle frequency phase coulomb viscous restitution"
+    " upper quadratic stribeck stribeck_velocity static_excess dahl"
     " asymmetric_coulomb asymmetric_viscous friction_slope cubic offset"
     " restitution_slope contact_stiffness contact_damping lower"
     " ripple_sine ripple_cosine ripple_harmonic"
@@ -71,7 +71,9 @@ def library() -> ctypes.CDLL:
     """The compiled simulator; compiled once per version of its source."""
     source = FOLDER / "machine.c"
     text = source.read_bytes() + (FOLDER / "machine.h").read_bytes() + " ".join(FLAGS).encode()
-    folder = Path(os.environ.get("SEPARATRIX_GENERATOR", Path(tempfile.gettempdir()) / f"generator-{os.getuid()}"))
+    folder = Path(
+        os.environ.get("SEPARATRIX_GENERATOR", Path(tempfile.gettempdir()) / f"generator-{os.getuid()}")
+    )
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     path = folder / f"machine-{hashlib.sha256(text).hexdigest()[:16]}.so"
     if not path.is_file():

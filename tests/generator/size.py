@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many standard errors large an effect is, and how much of it no other effect of the catalogue can imitate.
+"""How many standard errors large an effect is, and how much of it no other effect can imitate.
 
-The records are cut into segments of half a drive period whose starts are free. The columns of derivatives are finite
-differences at the true machine. d' is the size of the effect over its standard error where the unknowns of the base
-machine, the phase of the drive and the further parameters of the effect are fitted as well.
+The records are cut into segments of half a drive period whose starts are free. The columns of
+derivatives are finite differences at the true machine. d' is the size of the effect over its standard
+error where the unknowns of the base machine, the phase of the drive and the further parameters of the
+effect are fitted as well.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from effects import CATALOGUE
 from experiment import Experiment
-from simulator import NOWHERE, V, X, Machine, simulate_pieces
+from simulator import NOWHERE, Machine, V, X, simulate_pieces
 
 COARSE = 400
 """Steps per drive period."""
@@ -93,7 +94,7 @@ class Segments:
         return high - low
 
     def _mask_grazing(self) -> None:
-        """Leave out segments whose impacts a start within the noise would change: no derivative tells of them."""
+        """Leave out segments whose impacts another start within the noise would change."""
         for place, sigma in zip((X, V), self.noise.sigma, strict=True):
             move = np.zeros_like(self.starts)
             move[:, place] = GRAZING * sigma
@@ -118,7 +119,11 @@ class Segments:
         if name in ("sensor_bias", "sensor_gain", "sensor_delay"):
             change = np.zeros_like(self.base)
             gain = 1 + self.experiment.sensor.get("sensor_gain", 0.0)
-            unit = {"sensor_bias": 1.0, "sensor_gain": self.base[:, :, X] / gain, "sensor_delay": -self.base[:, :, V]}
+            unit = {
+                "sensor_bias": 1.0,
+                "sensor_gain": self.base[:, :, X] / gain,
+                "sensor_delay": -self.base[:, :, V],
+            }
             change[:, :, X] = unit[name]
             return self.without_starts(change)
         value = getattr(self.driven, name)
