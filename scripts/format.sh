@@ -21,7 +21,7 @@ scripts/bootstrap.sh
 tools=.venv/bin
 failed=0
 present=()
-for folder in src apps tests postprocess scripts; do
+for folder in src include apps tests postprocess scripts; do
   if [[ -d $folder ]]; then
     present+=("$folder")
   fi

@@ -62,6 +62,7 @@ class Reference:
         results = np.zeros((len(starts), 6))
         pointer = ctypes.POINTER(ctypes.c_double)
         failed = self.entry(
+            ctypes.c_int(len(self.rows)),
             self.rows,
             self.lengths,
             self.values,

@@ -7,6 +7,7 @@ module case_check
   use case_parameters, only: is_start, parameter_value, set_parameter
   use case_source, only: case_source_t, report
   use case_type, only: case_t, contact_law, drive_law, friction_law, restoring_law
+  use effect_check, only: refuse_effects
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
@@ -68,7 +69,7 @@ contains
                   ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
     end if
     if (laws(contact_law)%name /= 'none') call check_barriers(source, laws(contact_law), at)
-    call check_bodies(source, laws)
+    call check_bodies(source, laws, at)
     if (needs_spring(laws(drive_law)%name) .and. laws(restoring_law)%name /= 'linear') then
       call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
                   '", allowed with "linear": the ratio refers to its natural frequency')
@@ -86,19 +87,21 @@ contains
     needs_spring = drive == 'harmonic' .or. drive == 'fourier' .or. drive == 'crank_lever_rod'
   end function needs_spring
 
-  !> One body and two have laws of their own.
-  subroutine check_bodies(source, laws)
+  !> One body and two have laws of their own, and effects laws that they belong to.
+  subroutine check_bodies(source, laws, at)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: at
     type(pair_t) :: pair
     type(error_t), allocatable :: error
     if (is_pair(laws)) then
       call build_pair(laws, pair, error)
     else
       call refuse_pair(laws, error)
+      if (.not. allocated(error)) call refuse_effects(laws, error)
     end if
     if (.not. allocated(error)) return
-    call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:))
+    call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:)//at)
   end subroutine check_bodies
 
   subroutine check_barriers(source, contact, at)

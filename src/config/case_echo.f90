@@ -7,7 +7,7 @@ module case_echo
   use axis, only: axis_t, linear_values
   use case_type, only: case_t, sweep_t
   use kinds, only: wp
-  use law_table, only: law_choice_t, parameter_row_t, parameters_of
+  use law_table, only: effect_family, law_choice_t, parameter_row_t, parameters_of, table_of
   use refinement, only: refine_t
   use text, only: to_text
   use toml_bindings, only: hash_text
@@ -73,7 +73,8 @@ contains
     character(len=:), allocatable :: text
     type(parameter_row_t), allocatable :: rows(:)
     integer :: i
-    text = newline//'['//trim(law%family)//']'//newline//line('law', quoted(trim(law%name)))
+    text = newline//'['//table_of(law%family, law%name)//']'//newline
+    if (law%family /= effect_family) text = text//line('law', quoted(trim(law%name)))
     rows = parameters_of(law%family, law%name)
     do i = 1, size(rows)
       associate (values => law%parameters(i)%values)

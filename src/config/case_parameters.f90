@@ -1,12 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Parameters by name: 'x0', 'v0', 'crank_angle' of the start, and 'family.parameter' of a law.
+!> Parameters by name: 'x0', 'v0', 'crank_angle' of the start, 'family.parameter' of a law and 'effect.NAME.parameter'.
 module case_parameters
   use case_values, only: allowed_range, any_number, between, bounds_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: change_parameter, largest_angle, law_choice_t, parameter_row_t, parameters_of
+  use law_table, only: change_parameter, largest_angle, law_choice_t, parameter_row_t, parameters_of, table_of
   use status, only: exit_bad_case
   implicit none
   private
@@ -43,7 +43,7 @@ contains
     do i = 1, size(laws)
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
-        if (rows(j)%list .or. trim(rows(j)%family)//'.'//trim(rows(j)%name) /= canonical_name(path)) cycle
+        if (rows(j)%list .or. table_of(rows(j)%family, rows(j)%law)//'.'//trim(rows(j)%name) /= canonical_name(path)) cycle
         law = i
         row = j
       end do
@@ -93,7 +93,7 @@ contains
       do j = 1, size(rows)
         if (rows(j)%list) cycle
         if (len(names) > 0) names = names//', '
-        names = names//trim(rows(j)%family)//'.'//trim(rows(j)%name)
+        names = names//table_of(rows(j)%family, rows(j)%law)//'.'//trim(rows(j)%name)
       end do
     end do
   end function parameter_names
@@ -109,7 +109,7 @@ contains
     if (law > 0) parameter_value = laws(law)%parameters(row)%values(1)
   end function parameter_value
 
-  !> Replaces the scalar parameter `path` ('family.parameter' or 'ratio') in the laws. An unknown
+  !> Replaces the scalar parameter `path` ('family.parameter', 'effect.NAME.parameter' or 'ratio') in the laws. An unknown
   !> name or a value out of bounds gives code 65 and changes nothing. Where break-away friction
   !> equals sliding friction, setting the kinetic coefficient moves the static one with it.
   pure subroutine set_parameter(case_laws, path, value, error)

@@ -5,7 +5,7 @@
 module case_type
   use axis, only: axis_t
   use kinds, only: wp
-  use law_table, only: families, law_choice_t
+  use law_table, only: law_choice_t
   use refinement, only: refine_t
   implicit none
   private
@@ -82,7 +82,8 @@ module case_type
     character(len=:), allocatable :: path, raw_text
     !> The case with every default filled in, itself a case file.
     character(len=:), allocatable :: resolved_text
-    type(law_choice_t) :: laws(size(families))
+    !> One law per family, in the order of `families`, then the effects.
+    type(law_choice_t), allocatable :: laws(:)
     type(start_t) :: start
     type(run_t) :: run
     type(integrator_t) :: integrator

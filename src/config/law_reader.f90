@@ -1,13 +1,13 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables [body], [restoring], [friction], [contact] and [drive], read by the law table.
+!> The tables [body], [restoring], [friction], [contact], [drive] and [effect.NAME], read by the law table.
 module law_reader
   use case_parameters, only: find_parameter, row_bounds
-  use case_source, only: case_source_t, description, enter_table, find, know_all_below, report
+  use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
-  use law_table, only: families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
-    parameters_of
+  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
+    parameters_of, table_of
   use suggest, only: nearest_word
   use toml_bindings, only: toml_string
   implicit none
@@ -17,17 +17,44 @@ module law_reader
 
 contains
 
-  !> Five laws in the order of `families`. A body without a law is a point mass; any other family
+  !> Five laws in the order of `families`, then the effects. A body without a law is a point mass; any other family
   !> without a table has the law 'none'.
   subroutine read_laws(source, choices)
     type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(out) :: choices(size(families))
+    type(law_choice_t), allocatable, intent(out) :: choices(:)
     integer :: i
+    allocate (choices(size(families)))
     do i = 1, size(families)
       call read_law(source, trim(families(i)), choices(i))
     end do
     call resolve_static_friction(choices)
+    call read_effects(source, choices)
   end subroutine read_laws
+
+  !> The tables [effect.NAME], in the order of the law table.
+  subroutine read_effects(source, choices)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), allocatable, intent(inout) :: choices(:)
+    type(law_choice_t) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i, k
+    logical :: found
+    call enter_table(source, effect_family, found)
+    do i = 1, size(laws)
+      if (laws(i)%family /= effect_family) cycle
+      choice = law_choice(effect_family, trim(laws(i)%name))
+      call enter_table(source, table_of(effect_family, laws(i)%name), found)
+      if (found) then
+        call read_parameters(source, choice)
+        choices = [choices, choice]
+      else
+        rows = parameters_of(effect_family, laws(i)%name)
+        do k = 1, size(rows)
+          call know(source, table_of(effect_family, laws(i)%name)//'.'//trim(rows(k)%name))
+        end do
+      end if
+    end do
+  end subroutine read_effects
 
   subroutine read_law(source, family, choice)
     type(case_source_t), intent(inout) :: source
@@ -79,7 +106,7 @@ contains
     integer :: i
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
-      path = trim(rows(i)%family)//'.'//trim(rows(i)%name)
+      path = table_of(rows(i)%family, rows(i)%law)//'.'//trim(rows(i)%name)
       if (rows(i)%list) then
         call take_reals(source, path, row_bounds(rows(i)), choice%parameters(i)%values, &
                         required=.not. rows(i)%optional)

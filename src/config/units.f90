@@ -20,7 +20,7 @@ module units
     real(wp) :: multiplier, divisor
   end type unit_row_t
 
-  type(unit_row_t), parameter :: rows(40) = [ &
+  type(unit_row_t), parameter :: rows(43) = [ &
     unit_row_t('m', 'm', 1.0_wp, 1.0_wp), &
     unit_row_t('mm', 'm', 1.0_wp, 1e3_wp), &
     unit_row_t('cm', 'm', 1.0_wp, 1e2_wp), &
@@ -60,6 +60,9 @@ module units
     unit_row_t('kN s/m', 'N s/m', 1e3_wp, 1.0_wp), &
     unit_row_t('mN s/m', 'N s/m', 1.0_wp, 1e3_wp), &
     unit_row_t('kg/s', 'N s/m', 1.0_wp, 1.0_wp), &
+    unit_row_t('N', 'N', 1.0_wp, 1.0_wp), &
+    unit_row_t('mN', 'N', 1.0_wp, 1e3_wp), &
+    unit_row_t('kN', 'N', 1e3_wp, 1.0_wp), &
     unit_row_t('%', '1', 1.0_wp, 1e2_wp)]
 
 contains

@@ -5,7 +5,7 @@
 module laws_driver
   use journal, only: json_text
   use kinds, only: wp
-  use law_table, only: families, laws, parameter_row_t, parameters_of
+  use law_table, only: effect_family, families, laws, parameter_row_t, parameters_of, table_of
   use text, only: to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
@@ -18,14 +18,15 @@ contains
   !> Prints every law with parameters, units, bounds and source.
   subroutine run_laws(json)
     logical, intent(in) :: json
+    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: effect_family]]
     integer :: i, k
     logical :: first
     if (json) write (output_unit, '(a)') '['
     first = .true.
-    do k = 1, size(families)
-      if (.not. json) write (output_unit, '(a)') '['//trim(families(k))//']'
+    do k = 1, size(listed)
+      if (.not. json) write (output_unit, '(a)') '['//trim(listed(k))//']'
       do i = 1, size(laws)
-        if (laws(i)%family /= families(k)) cycle
+        if (laws(i)%family /= listed(k)) cycle
         if (json) then
           call print_json(i, first)
         else
@@ -42,12 +43,16 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     integer :: i
     associate (row => laws(law))
-      write (output_unit, '(a)') '  law = "'//trim(row%name)//'": '//trim(row%meaning)
+      if (row%family == effect_family) then
+        write (output_unit, '(a)') '  ['//table_of(row%family, row%name)//']: '//trim(row%meaning)
+      else
+        write (output_unit, '(a)') '  law = "'//trim(row%name)//'": '//trim(row%meaning)
+      end if
       if (len_trim(row%source) > 0) write (output_unit, '(a)') '    source: '//trim(row%source)
       rows = parameters_of(trim(row%family), trim(row%name))
     end associate
     do i = 1, size(rows)
-      write (output_unit, '(4x,a20,1x,a6,1x,a)') rows(i)%name, rows(i)%unit, &
+      write (output_unit, '(4x,a20,1x,a9,1x,a)') rows(i)%name, rows(i)%unit, &
         range_text(rows(i))//default_text(rows(i))//': '//trim(rows(i)%meaning)
     end do
   end subroutine print_plain
@@ -66,7 +71,8 @@ contains
         list = list//'{"name": '//json_text(trim(rows(i)%name))//', "unit": '//json_text(trim(rows(i)%unit))// &
           ', "lower": '//bound_json(rows(i)%lower)//', "upper": '//bound_json(rows(i)%upper)// &
           ', "lower_open": '//to_text(rows(i)%lower_open)//', "list": '//to_text(rows(i)%list)// &
-          ', "optional": '//to_text(rows(i)%optional)//', "meaning": '//json_text(trim(rows(i)%meaning))//'}'
+          ', "optional": '//to_text(rows(i)%optional)//', "default": '//default_json(rows(i))// &
+          ', "meaning": '//json_text(trim(rows(i)%meaning))//'}'
       end do
       write (output_unit, '(a)') trim(merge('  ', ', ', first))//'{"family": '//json_text(trim(row%family))// &
         ', "law": '//json_text(trim(row%name))//', "row": '//to_text(law)//', "meaning": '// &
@@ -81,6 +87,14 @@ contains
     text = 'null'
     if (abs(bound) < huge(bound)) text = to_text(bound)
   end function bound_json
+
+  !> The number that an absent parameter takes; null if it must be given, or its absence means something else.
+  pure function default_json(row) result(text)
+    type(parameter_row_t), intent(in) :: row
+    character(len=:), allocatable :: text
+    text = 'null'
+    if (row%optional .and. row%default >= row%lower .and. abs(row%default) < huge(row%default)) text = to_text(row%default)
+  end function default_json
 
   pure function range_text(row) result(text)
     type(parameter_row_t), intent(in) :: row

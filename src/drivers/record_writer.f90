@@ -1,10 +1,11 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A motion as a sensor would have measured it: sampled, delayed, noisy, quantised; a table that looks like a record.
+!> A motion as a sensor would have measured it: sampled, delayed, off by gain and bias, noisy, quantised; a table that looks like a record.
 module record_writer
   use case_type, only: case_t, record_t
   use constants, only: two_pi
+  use effect_law, only: observed
   use elementary, only: logarithm, sine_cosine
   use errors, only: error_t, fail
   use kinds, only: int64, real64, wp
@@ -34,7 +35,10 @@ contains
     count = floor(the_case%run%duration*the_case%record%rate) + 1
     times = [(i/the_case%record%rate, i=0, count - 1)]
     allocate (x(count), driver(count))
-    call sample_positions(moving, start, max(0.0_wp, times - the_case%record%delay), x, driver, reason)
+    associate (sensor => moving%machine%sensor)
+      call sample_positions(moving, start, max(0.0_wp, times - (the_case%record%delay + sensor%delay)), x, driver, reason)
+      x = observed(sensor, x)
+    end associate
     if (reason /= 0) then
       call fail(error, exit_bad_case, 'record: the motion was given up: '//reason_name(reason))
       return

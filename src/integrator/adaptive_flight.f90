@@ -8,6 +8,7 @@
 module adaptive_flight
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use drive_law, only: foot_motion
+  use effect_law, only: dahl_force, slip_memory_t
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     flight_time_over
@@ -15,7 +16,7 @@ module adaptive_flight
   use kinds, only: wp
   use motion_state, only: log_t, mode_slip_plus, options_t, record_sample, sample_due, sample_time, state_t, &
     tally_t
-  use oscillator, only: oscillator_t
+  use oscillator, only: extra_force, oscillator_t
   use polynomial, only: degree, first_fall, maximum_until, value_at
   use restoring_law, only: restoring_force
   implicit none
@@ -34,6 +35,7 @@ module adaptive_flight
     real(wp) :: barrier = 0, exit_speed = 0
     !> Size of position and velocity below which errors are absolute [m, m/s].
     real(wp) :: scale(2) = 1
+    type(slip_memory_t) :: memory
   end type slip_t
 
 contains
@@ -90,6 +92,7 @@ contains
     state%v = y(2)
     if (outcome == flight_barrier) state%x = barrier
     if (outcome == flight_speed_reached .or. slip%direction*state%v < 0) state%v = 0
+    if (machine%effects%dahl_stiffness > 0) state%z = dahl_force(machine%effects, slip%memory, state%x)
   end subroutine fly_adaptive
 
   pure function slip_of(machine, state, exit_speed, barrier) result(slip)
@@ -99,6 +102,7 @@ contains
     type(slip_t) :: slip
     real(wp) :: length
     slip%direction = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
+    slip%memory = slip_memory_t(slip%direction, state%x, state%z)
     slip%barrier = barrier
     slip%exit_speed = exit_speed
     length = 1
@@ -112,11 +116,13 @@ contains
     type(oscillator_t), intent(in) :: machine
     type(slip_t), intent(in) :: slip
     real(wp), intent(in) :: time, y(2)
-    real(wp) :: slope(2), foot
+    real(wp) :: slope(2), foot, stretch
     call foot_motion(machine%drive, machine%drive_frequency*time, foot)
+    stretch = machine%restoring%free_length + foot - y(1)
     slope(1) = y(2)
-    slope(2) = (restoring_force(machine%restoring, machine%restoring%free_length + foot - y(1)) &
+    slope(2) = (restoring_force(machine%restoring, stretch) &
                 + sliding_friction(machine%friction, y(2), slip%direction))/machine%mass
+    if (machine%effects%present) slope(2) = slope(2) + extra_force(machine, slip%memory, y(1), y(2), stretch)/machine%mass
   end function slope
 
   !> Starting step: Hairer, Norsett, Wanner, II.4.
@@ -198,9 +204,9 @@ contains
       do i = 7, 1, -1
         p(0) = p(0) + nested(k, i)
         if (modulo(i, 2) == 1) then
-          p = eoshift(p, -1)
+          p = [0.0_wp, p(:degree - 1)]
         else
-          p = p - eoshift(p, -1)
+          p = p - [0.0_wp, p(:degree - 1)]
         end if
       end do
       path(:, k) = p
@@ -290,9 +296,9 @@ contains
       tally%v_max = max(tally%v_max, y(2), maximum_until(path(:, 2), fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, gauss_points
+    do k = 1, merge(gauss_points, 0, log%book%kept)
       t = fraction*gauss_place(k)
-      call book_instant(machine, state%time + t*h, value_at(path(:, 1), t), value_at(path(:, 2), t), &
+      call book_instant(machine, slip%memory, state%time + t*h, value_at(path(:, 1), t), value_at(path(:, 2), t), &
                         fraction*h*gauss_weight(k), log%book)
     end do
     if (log%sample_interval <= 0) return

@@ -7,6 +7,7 @@
 module contact_flight
   use contact_law, only: contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion
+  use effect_law, only: dahl_force, slip_memory_t
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: power, sliding_friction
@@ -15,7 +16,7 @@ module contact_flight
   use kinds, only: wp
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, sample_due, &
     sample_time, state_t, tally_t
-  use oscillator, only: oscillator_t
+  use oscillator, only: extra_force, oscillator_t
   use polynomial, only: maximum_until, value_at
   use restoring_law, only: restoring_force
   implicit none
@@ -36,6 +37,7 @@ module contact_flight
     real(wp) :: start = 0, surface = 0
     integer :: side = 1, direction = 1
     logical :: pushing = .true.
+    type(slip_memory_t) :: memory
   contains
     procedure :: slope => pressed_slope
   end type pressed_t
@@ -74,6 +76,7 @@ contains
     pressed%start = state%time
     pressed%surface = merge(machine%contact%soft_upper, machine%contact%soft_lower, side > 0)
     pressed%direction = merge(1, -1, state%mode == mode_slip_plus)
+    pressed%memory = slip_memory_t(real(pressed%direction, wp), state%x, state%z)
     y = [side*(state%x - pressed%surface), side*state%v, 0.0_wp]
     pressed%pushing = machine%contact%tension .or. margin_at(machine%contact, y) >= 0
     call sizes_of(pressed, y, scale, duration)
@@ -112,17 +115,21 @@ contains
       state%x = pressed%surface
     end select
     if (pressed%direction*state%v < 0) state%v = 0
+    if (machine%effects%dahl_stiffness > 0) state%z = dahl_force(machine%effects, pressed%memory, state%x)
   end subroutine fly_contact
 
   !> p', p'' and the power put into the barrier.
   pure function pressed_slope(self, time, y) result(slope)
     class(pressed_t), intent(in) :: self
     real(wp), intent(in) :: time, y(:)
-    real(wp) :: slope(size(y)), foot, force, push
+    real(wp) :: slope(size(y)), foot, stretch, force, push
     associate (machine => self%machine)
       call foot_motion(machine%drive, machine%drive_frequency*(self%start + time), foot)
-      force = restoring_force(machine%restoring, machine%restoring%free_length + foot - (self%surface + self%side*y(1))) &
+      stretch = machine%restoring%free_length + foot - (self%surface + self%side*y(1))
+      force = restoring_force(machine%restoring, stretch) &
               + sliding_friction(machine%friction, self%side*y(2), real(self%direction, wp))
+      if (machine%effects%present) &
+        force = force + extra_force(machine, self%memory, self%surface + self%side*y(1), self%side*y(2), stretch)
       push = 0
       if (self%pushing) push = contact_force(machine%contact, y(1), y(2))
       slope = [y(2), (self%side*force - push)/machine%mass, push*y(2)]
@@ -191,9 +198,9 @@ contains
       tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, gauss_points
+    do k = 1, merge(gauss_points, 0, log%book%kept)
       t = march%fraction*gauss_place(k)
-      call book_instant(pressed%machine, pressed%start + march%from + t*march%length, &
+      call book_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
                         pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
                         pressed%side*value_at(march%path(:, 2), t), march%fraction*march%length*gauss_weight(k), log%book)
     end do

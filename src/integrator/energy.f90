@@ -3,9 +3,12 @@
 
 !> Where the energy of one body goes. With the stretch s = l0 + x_A - x of a linear spring, E = m v^2/2 + c s^2/2 and
 !>   E' = -(dry friction)|v| - b v^2 + c s x_A' - (force of a soft barrier) p'.
+!> Effects add k3 s^4/4 - F x to E, k3 s^3 x_A' to the work of the drive, and their own losses; what Dahl's friction
+!> holds elastically counts as lost until it gives it back.
 !> The powers are integrated by Gauss's rule over short pieces of a flight.
 module energy
   use drive_law, only: foot_motion
+  use effect_law, only: effect_energy, effect_losses, slip_memory_t
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: stribeck_excess
   use kinds, only: wp
@@ -39,21 +42,30 @@ contains
     call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
     energy = 0.5_wp*machine%mass*state%v**2 &
              + 0.5_wp*machine%restoring%stiffness*(machine%restoring%free_length + foot - state%x)**2
+    if (machine%effects%present) &
+      energy = energy + effect_energy(machine%effects, state%x, machine%restoring%free_length + foot - state%x)
   end function energy_of_body
 
   !> Adds `weight` [s] times the powers at `time` [s after the section], `x`, `v` of a slip.
-  pure subroutine book_instant(machine, time, x, v, weight, book)
+  pure subroutine book_instant(machine, slip, time, x, v, weight, book)
     type(oscillator_t), intent(in) :: machine
+    type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: time, x, v, weight
     type(book_t), intent(inout) :: book
-    real(wp) :: foot, rate
+    real(wp) :: foot, rate, stretch, losses(2)
+    if (.not. book%kept) return
     call foot_motion(machine%drive, machine%drive_frequency*time, foot, rate)
     associate (law => machine%friction)
       book%friction = book%friction + weight*(law%kinetic + stribeck_excess(law, abs(v)))*abs(v)
       book%damping = book%damping + weight*law%damping*v**2
     end associate
-    book%work = book%work + weight*restoring_force(machine%restoring, machine%restoring%free_length + foot - x) &
-                *rate*machine%drive_frequency
+    stretch = machine%restoring%free_length + foot - x
+    book%work = book%work + weight*restoring_force(machine%restoring, stretch)*rate*machine%drive_frequency
+    if (.not. machine%effects%present) return
+    losses = effect_losses(machine%effects, machine%friction, slip, x, v)
+    book%friction = book%friction + weight*losses(1)
+    book%damping = book%damping + weight*losses(2)
+    book%work = book%work + weight*machine%effects%cubic*stretch**3*rate*machine%drive_frequency
   end subroutine book_instant
 
   !> An exact flight from `start` to `time_end` [s after the section], slipping in `direction`.
@@ -66,8 +78,11 @@ contains
     type(book_t), intent(inout) :: book
     type(segment_t) :: segment
     type(kinematics_t) :: now
+    type(slip_memory_t) :: slip
     real(wp) :: piece, elapsed
     integer :: pieces, i, k
+    if (.not. book%kept) return
+    slip = slip_memory_t(direction=direction, x=start%x)
     call begin_segment(flow, start%time, start%x, start%v, direction, segment)
     pieces = ceiling((time_end - start%time)*max(flow%natural, flow%harmonics*flow%drive_frequency)/longest_piece)
     piece = (time_end - start%time)/max(1, pieces)
@@ -75,7 +90,7 @@ contains
       do k = 1, gauss_points
         elapsed = (i - 1 + gauss_place(k))*piece
         call evaluate(flow, segment, elapsed, now)
-        call book_instant(machine, start%time + elapsed, now%x, now%v, gauss_weight(k)*piece, book)
+        call book_instant(machine, slip, start%time + elapsed, now%x, now%v, gauss_weight(k)*piece, book)
       end do
     end do
   end subroutine book_exact
@@ -86,6 +101,7 @@ contains
     type(state_t), intent(in) :: before, now
     type(book_t), intent(inout) :: book
     type(state_t) :: rest
+    if (.not. book%kept) return
     rest = before
     rest%v = 0
     book%work = book%work - energy_of_body(machine, rest)

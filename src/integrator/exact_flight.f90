@@ -7,8 +7,9 @@
 module exact_flight
   use certified_step, only: departure_step, positive_step, single_root_limit, taylor_root
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
+  use exact_samples, only: evaluate_row
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_plus, record_sample, sample_due, sample_time, state_t, &
+  use motion_state, only: log_t, make_room, mode_slip_plus, record_sample, sample_due, sample_time, samples_before, state_t, &
     tally_t
   implicit none
   private
@@ -21,6 +22,8 @@ module exact_flight
     flight_barrier = 2, flight_layer_left = 3, flight_failed = 4
 
   integer, parameter :: most_polish = 60
+  !> Samples from which on a row is cheaper than one by one.
+  integer, parameter :: shortest_row = 4
 
 contains
 
@@ -192,6 +195,7 @@ contains
     type(kinematics_t) :: now
     type(state_t) :: sample
     if (log%sample_interval <= 0) return
+    if (allocated(log%instants)) call sample_row(flow, segment, state, elapsed, log)
     do
       sample = state
       sample%time = sample_time(log)
@@ -204,5 +208,32 @@ contains
       call record_sample(log, sample)
     end do
   end subroutine sample_segment
+
+  !> Writes down those samples that are equidistant to rounding, from the next one on.
+  pure subroutine sample_row(flow, segment, state, elapsed, log)
+    type(flow_t), intent(in) :: flow
+    type(segment_t), intent(in) :: segment
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: elapsed
+    type(log_t), intent(inout) :: log
+    real(wp) :: from, interval, rounding
+    integer :: first, last, i
+    first = log%next_sample + 1
+    last = samples_before(log, state%time + elapsed)
+    if (last - first + 1 < shortest_row) return
+    from = log%instants(first) - log%origin - state%time
+    interval = (log%instants(last) - log%instants(first))/(last - first)
+    rounding = 4*epsilon(1.0_wp)*log%instants(last)
+    if (from < 0) return
+    do i = first, last
+      if (abs(log%instants(first) + (i - first)*interval - log%instants(i)) > rounding) return
+    end do
+    call make_room(log, last)
+    call evaluate_row(flow, segment, from, interval, log%sample_data(2, first:last), log%sample_data(3, first:last))
+    log%sample_data(1, first:last) = log%instants(first:last)
+    log%sample_mode(first:last) = state%mode
+    log%samples = last
+    log%next_sample = last
+  end subroutine sample_row
 
 end module exact_flight

@@ -10,13 +10,14 @@
 !> rest, (exp(i n Omega s) - exp(lambda s))/(i n Omega - lambda), is written with exp(x) - 1 and stays
 !> accurate through undamped exact resonance.
 module exact_flow
+  use effect_law, only: constant_force
   use elementary, only: exponential, exponential_minus_one, sine_cosine
   use kinds, only: wp
   use oscillator, only: oscillator_t
   implicit none
   private
 
-  public :: prepare_flow, begin_segment, evaluate
+  public :: prepare_flow, begin_segment, evaluate, secular_factor
 
   !> Largest damping ratio for which dividing by the damped frequency is harmless.
   real(wp), parameter :: largest_damping_ratio = 0.9_wp
@@ -26,7 +27,7 @@ module exact_flow
     !> False if the machine has no closed form here.
     logical :: available = .false.
     real(wp) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0
-    !> Equilibria while slipping down, at frictionless rest, and up [m].
+    !> Equilibria while slipping down, at rest without the mean sliding friction, and up [m].
     real(wp) :: equilibrium(-1:1) = 0
     integer :: harmonics = 0
     !> Periodic response z = sum p cos n phi + q sin n phi and forcing f = sum f_cos cos + f_sin sin.
@@ -63,13 +64,14 @@ contains
     integer :: n
     flow%natural = machine%natural_frequency
     flow%decay = machine%friction%damping/(2*machine%mass)
-    flow%available = machine%restoring%is_linear .and. flow%natural > 0 &
+    flow%available = machine%restoring%is_linear .and. .not. machine%effects%nonlinear .and. flow%natural > 0 &
       .and. flow%decay <= largest_damping_ratio*flow%natural
     if (.not. flow%available) return
     flow%damped = sqrt((flow%natural - flow%decay)*(flow%natural + flow%decay))
     flow%drive_frequency = machine%drive_frequency
     flow%equilibrium = machine%restoring%free_length + machine%drive%mean &
       - [-1, 0, 1]*(machine%friction%kinetic/machine%restoring%stiffness)
+    if (machine%effects%present) flow%equilibrium = flow%equilibrium + constant_force(machine%effects)/machine%restoring%stiffness
     flow%harmonics = size(machine%drive%cosine)
     allocate (flow%p_re(flow%harmonics), flow%p_im(flow%harmonics), flow%q_re(flow%harmonics), &
               flow%q_im(flow%harmonics))

@@ -53,7 +53,7 @@ contains
     associate (law => machine%friction)
       delta = nint(law%stribeck_exponent)
       transit%available = precise_enough .and. flow%available .and. law%layer_speed > 0 &
-        .and. .not. abs(law%stribeck_exponent - delta) > 0 .and. (delta == 1 .or. delta == 2)
+        .and. .not. abs(law%stribeck_exponent - delta) > 0 .and. (delta == 1 .or. delta == 2) .and. law%second_excess <= 0
       if (.not. transit%available) return
       transit%entry = law%layer_speed
       transit%exit = exit

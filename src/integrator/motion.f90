@@ -8,6 +8,7 @@ module motion
   use constants, only: two_pi
   use contact_flight, only: contact_side, fly_contact
   use contact_law, only: velocity_after_impact
+  use effect_law, only: dahl_level
   use energy, only: book_exact, book_rest
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
@@ -70,7 +71,7 @@ contains
     if (moving%exact) call prepare_transit(machine, moving%flow, layer_exit*moving%layer, moving%transit)
     if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0)) then
       call fail(error, exit_bad_case, 'integrator.flight = "exact": this machine has modes without a '// &
-                'closed form (Stribeck layer, nonlinear or missing spring, damping ratio above 0.9); '// &
+                'closed form (Stribeck layer, nonlinear or missing spring, effect, damping ratio above 0.9); '// &
                 'use "auto"')
     end if
   end subroutine prepare_motion
@@ -83,6 +84,9 @@ contains
     state = state_t(x=x, v=v, mode=mode_slip_plus)
     state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
+    ! Dahl's friction is taken to have slipped this way for long.
+    if (moving%machine%effects%dahl_stiffness > 0 .and. abs(v) > 0) &
+      state%z = dahl_level(moving%machine%effects, sign(1.0_wp, v))
     if (v == 0) state%mode = mode_from_rest(moving%machine, state)
   end function start_state
 
@@ -130,7 +134,7 @@ contains
     call append_word(tally, word_period)
     if (present(log)) then
       log%origin = log%origin + moving%machine%period
-      log%next_sample = 0
+      if (.not. allocated(log%instants)) log%next_sample = 0
     end if
   end subroutine advance_period
 

@@ -8,7 +8,8 @@ module motion_state
   implicit none
   private
 
-  public :: sample_time, sample_due, closing_error, reset_tally, note_position, append_word, open_log, record_event, record_sample
+  public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, note_position, append_word, open_log, &
+    record_event, record_sample
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -37,6 +38,8 @@ module motion_state
   type, public :: state_t
     real(wp) :: x = 0, v = 0, time = 0
     integer :: mode = 0
+    !> Force of Dahl's friction against the body [N], where that is.
+    real(wp) :: z = 0
   end type state_t
 
   type, public :: options_t
@@ -70,16 +73,20 @@ module motion_state
     real(wp) :: friction = 0, damping = 0, contact = 0, work = 0
     !> Energy of the machine then and now.
     real(wp) :: at_start = 0, at_end = 0
+    !> Whether anybody will read it.
+    logical :: kept = .true.
   end type book_t
 
-  !> Every event and equidistant samples, in absolute time. Storage grows as needed.
+  !> Every event and samples, equidistant or at chosen instants, in absolute time. Storage grows as needed.
   type, public :: log_t
     !> Absolute time of the start of the current drive period [s].
     real(wp) :: origin = 0
     !> Distance of samples within a period [s]; 0 = no samples.
     real(wp) :: sample_interval = 0
+    !> Instants of the samples [s], ascending, in place of the equidistant ones.
+    real(wp), allocatable :: instants(:)
     integer :: events = 0, samples = 0
-    !> Index of the next sample within the current period.
+    !> Index of the next sample, from 0: within the current period, or of the chosen instants.
     integer :: next_sample = 0
     integer, allocatable :: event_kind(:), sample_mode(:)
     !> Rows: time, x, v before, v after.
@@ -100,7 +107,13 @@ contains
   !> Time of the next sample [s after the section].
   pure real(wp) function sample_time(log)
     type(log_t), intent(in) :: log
-    sample_time = log%next_sample*log%sample_interval
+    if (.not. allocated(log%instants)) then
+      sample_time = log%next_sample*log%sample_interval
+    else if (log%next_sample < size(log%instants)) then
+      sample_time = log%instants(log%next_sample + 1) - log%origin
+    else
+      sample_time = huge(1.0_wp)
+    end if
   end function sample_time
 
   !> Whether the next sample comes before `until` [s after the section] by more than rounding: the end of a period is the
@@ -110,6 +123,19 @@ contains
     real(wp), intent(in) :: until
     sample_due = sample_time(log) < until*(1 - 8*epsilon(until))
   end function sample_due
+
+  !> Number of the chosen instants that come before `until` [s after the section], in the sense of `sample_due`.
+  pure integer function samples_before(log, until) result(last)
+    type(log_t), intent(in) :: log
+    real(wp), intent(in) :: until
+    real(wp) :: limit
+    limit = until*(1 - 8*epsilon(until))
+    last = log%next_sample
+    do while (last < size(log%instants))
+      if (.not. log%instants(last + 1) - log%origin < limit) exit
+      last = last + 1
+    end do
+  end function samples_before
 
   !> What is missing in a book [J].
   pure elemental real(wp) function closing_error(book)
@@ -196,16 +222,7 @@ contains
     type(state_t), intent(in) :: state
     real(wp), intent(in), optional :: driver(2)
     type(book_t), intent(in), optional :: book
-    integer, allocatable :: modes_grown(:)
-    real(wp), allocatable :: data_grown(:, :)
-    if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
-    if (log%samples == size(log%sample_mode)) then
-      allocate (modes_grown(2*log%samples), data_grown(3, 2*log%samples))
-      modes_grown(:log%samples) = log%sample_mode
-      data_grown(:, :log%samples) = log%sample_data
-      call move_alloc(modes_grown, log%sample_mode)
-      call move_alloc(data_grown, log%sample_data)
-    end if
+    call make_room(log, log%samples + 1)
     log%samples = log%samples + 1
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
@@ -214,6 +231,21 @@ contains
     if (present(book)) call put_column(log%sample_book, log%samples, &
                                        [book%friction, book%damping, book%contact, book%work, book%at_end])
   end subroutine record_sample
+
+  !> Room for `count` samples.
+  pure subroutine make_room(log, count)
+    type(log_t), intent(inout) :: log
+    integer, intent(in) :: count
+    integer, allocatable :: modes_grown(:)
+    real(wp), allocatable :: data_grown(:, :)
+    if (.not. allocated(log%sample_mode)) allocate (log%sample_mode(4096), log%sample_data(3, 4096))
+    if (count <= size(log%sample_mode)) return
+    allocate (modes_grown(2*count), data_grown(3, 2*count))
+    modes_grown(:log%samples) = log%sample_mode(:log%samples)
+    data_grown(:, :log%samples) = log%sample_data(:, :log%samples)
+    call move_alloc(modes_grown, log%sample_mode)
+    call move_alloc(data_grown, log%sample_data)
+  end subroutine make_room
 
   !> Puts values into column `column`, the one after the last.
   pure subroutine put_column(columns, column, values)

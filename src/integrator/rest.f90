@@ -6,6 +6,8 @@
 module rest
   use certified_step, only: departure_step, positive_step
   use contact_law, only: contact_constant, contact_force, restitution_at
+  use effect_law, only: break_away_level, friction_factor
+  use drive_law, only: foot_motion
   use friction_law, only: friction_t, power
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
@@ -31,10 +33,9 @@ contains
     type(state_t), intent(in) :: state
     real(wp) :: force, rate, curvature
     logical :: at_upper, at_lower, up, down
-    call holding_force(machine, state%x, machine%drive_frequency*state%time, &
-                       force, rate, curvature)
-    up = breaks_away(machine, state%x, force, rate)
-    down = breaks_away(machine, state%x, -force, -rate)
+    call net_force(machine, state, force, rate, curvature)
+    up = breaks_away(machine, state%x, 1, force, rate)
+    down = breaks_away(machine, state%x, -1, -force, -rate)
     at_upper = state%x >= machine%contact%upper
     at_lower = state%x <= machine%contact%lower
     if (up .and. .not. at_upper) then
@@ -50,12 +51,31 @@ contains
     end if
   end function mode_from_rest
 
-  !> Whether a force and its rate overcome the break-away force in their own direction.
-  pure logical function breaks_away(machine, x, force, rate)
+  !> The force that dry friction must hold, its rate and the bound on its second derivative, as in `holding_force`.
+  pure subroutine net_force(machine, state, force, rate, curvature)
+    type(oscillator_t), intent(in) :: machine
+    type(state_t), intent(in) :: state
+    real(wp), intent(out) :: force, rate, curvature
+    call holding_force(machine, state%x, machine%drive_frequency*state%time, force, rate, curvature)
+    if (machine%effects%dahl_stiffness > 0) force = force - friction_factor(machine%effects, state%x)*state%z
+  end subroutine net_force
+
+  !> Largest force in `direction` +1 or -1 that friction holds at `x` [m], in N.
+  pure real(wp) function strongest_hold(machine, x, direction) result(level)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: x
+    integer, intent(in) :: direction
+    level = machine%friction%break_away
+    if (machine%effects%present) level = break_away_level(machine%effects, machine%friction, x, direction)
+  end function strongest_hold
+
+  !> Whether a force and its rate, counted in `direction`, overcome the break-away force.
+  pure logical function breaks_away(machine, x, direction, force, rate)
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, force, rate
+    integer, intent(in) :: direction
     real(wp) :: excess, rounding
-    excess = force - machine%friction%break_away
+    excess = force - strongest_hold(machine, x, direction)
     rounding = 32*epsilon(1.0_wp)*(machine%force_scale + abs(force))
     if (machine%contact%soft) rounding = rounding + soft_rounding(machine, x)
     if (abs(excess) <= rounding) then
@@ -89,19 +109,18 @@ contains
     down_open = state%x > machine%contact%lower
     smallest = 4*epsilon(1.0_wp)*machine%period
     do
-      call holding_force(machine, state%x, machine%drive_frequency*state%time, &
-                         force, rate, curvature)
-      if (up_open .and. breaks_away(machine, state%x, force, rate)) then
+      call net_force(machine, state, force, rate, curvature)
+      if (up_open .and. breaks_away(machine, state%x, 1, force, rate)) then
         state%mode = mode_slip_plus
         return
-      else if (down_open .and. breaks_away(machine, state%x, -force, -rate)) then
+      else if (down_open .and. breaks_away(machine, state%x, -1, -force, -rate)) then
         state%mode = mode_slip_minus
         return
       end if
       step_up = huge(1.0_wp)
       step_down = huge(1.0_wp)
-      if (up_open) step_up = holding_step(machine%friction%break_away - force, -rate, curvature)
-      if (down_open) step_down = holding_step(machine%friction%break_away + force, rate, curvature)
+      if (up_open) step_up = holding_step(strongest_hold(machine, state%x, 1) - force, -rate, curvature)
+      if (down_open) step_down = holding_step(strongest_hold(machine, state%x, -1) + force, rate, curvature)
       step = min(step_up, step_down)
       if (step >= time_end - state%time) then
         state%time = time_end
@@ -133,11 +152,14 @@ contains
     real(wp), intent(in) :: speed
     real(wp) :: force, rate, curvature, out, back, shrink, friction, change, bounce
     left = -1
-    call holding_force(machine, state%x, machine%drive_frequency*state%time, &
-                       force, rate, curvature)
-    associate (law => machine%friction)
-      if (direction*force <= law%break_away) return
-      friction = law%kinetic + law%excess
+    call net_force(machine, state, force, rate, curvature)
+    associate (law => machine%friction, effects => machine%effects)
+      if (direction*force <= strongest_hold(machine, state%x, direction)) return
+      friction = law%kinetic + law%excess + law%second_excess
+      if (effects%present) then
+        friction = friction_factor(effects, state%x)*friction
+        if (.not. effects%dahl_stiffness > 0) force = force - friction_factor(effects, state%x)*effects%asymmetric_coulomb
+      end if
       out = (direction*force + friction)/machine%mass
       back = (direction*force - friction)/machine%mass
       if (back <= 0) return
@@ -148,6 +170,7 @@ contains
       change = (abs(rate)*left + curvature*left**2/2 + law%damping*speed &
                 + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &
                + layer_change(law, speed)/machine%mass
+      if (effects%nonlinear) change = change + effect_change(machine, state, speed, speed**2/(2*out))/machine%mass
       if (change > chatter_uniformity*back) left = -1
     end associate
   end function chatter_time
@@ -177,6 +200,21 @@ contains
     if (machine%natural_frequency > 0) speed = sqrt(2*chatter_uniformity)*strongest/machine%natural_frequency
   end function chatter_speed
 
+  !> How much the forces of effects change over a bounce of a given speed [m/s] and height [m], in N.
+  pure real(wp) function effect_change(machine, state, speed, height) result(change)
+    type(oscillator_t), intent(in) :: machine
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: speed, height
+    real(wp) :: foot, stretch
+    associate (effects => machine%effects, law => machine%friction)
+      call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
+      stretch = machine%restoring%free_length + foot - state%x
+      change = (effects%quadratic_drag*speed + abs(effects%asymmetric_viscous))*speed + height* &
+               (3*abs(effects%cubic)*stretch**2 + 2*effects%dahl_stiffness + abs(effects%friction_slope)* &
+                (law%kinetic + law%excess + law%second_excess + abs(effects%asymmetric_coulomb) + abs(state%z)))
+    end associate
+  end function effect_change
+
   !> How much the sliding friction changes between rest and `speed` [N].
   pure real(wp) function layer_change(law, speed)
     type(friction_t), intent(in) :: law
@@ -184,6 +222,8 @@ contains
     layer_change = 0
     if (law%excess > 0) layer_change = &
       law%excess*min(1.0_wp, power(speed/law%stribeck_velocity, min(law%stribeck_exponent, 1.0_wp)))
+    if (law%second_excess > 0) layer_change = layer_change + &
+      law%second_excess*min(1.0_wp, power(speed/law%second_velocity, min(law%second_exponent, 1.0_wp)))
   end function layer_change
 
 end module rest

@@ -14,8 +14,8 @@ module contact_law
   implicit none
   private
 
-  public :: contact_of, barrier_positions, velocity_after_impact, restitution_at, contact_force, contact_margin, &
-    force_on_body
+  public :: contact_of, add_to_contact, compliant_contact, barrier_positions, velocity_after_impact, restitution_at, &
+    contact_force, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
     contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5
@@ -70,6 +70,39 @@ contains
     law%upper = value_of(choice, 'upper')
     law%lower = value_of(choice, 'lower')
   end function contact_of
+
+  !> Adds the effect of a choice of the family `effect`, if it is one of a contact. Which laws it fits is checked elsewhere.
+  pure subroutine add_to_contact(law, choice)
+    type(contact_t), intent(inout) :: law
+    type(law_choice_t), intent(in) :: choice
+    real(wp) :: position
+    select case (choice%name)
+    case ('restitution_slope')
+      if (.not. value_of(choice, 'slope') > 0) return
+      law%kind = contact_linear
+      law%coefficients(1) = value_of(choice, 'slope')
+    case ('second_barrier')
+      position = value_of(choice, 'position')
+      if (law%upper < huge(1.0_wp)) then
+        law%lower = position
+      else if (law%lower > -huge(1.0_wp)) then
+        law%upper = position
+      else if (law%soft_upper < huge(1.0_wp)) then
+        law%soft_lower = position
+      else
+        law%soft_upper = position
+      end if
+    end select
+  end subroutine add_to_contact
+
+  !> The rigid barriers of a law made soft, at the same places, by the effect `choice`.
+  pure type(contact_t) function compliant_contact(rigid, choice) result(law)
+    type(contact_t), intent(in) :: rigid
+    type(law_choice_t), intent(in) :: choice
+    law = contact_t(kind=contact_hunt_crossley, soft=.true., soft_upper=rigid%upper, soft_lower=rigid%lower, &
+                    stiffness=value_of(choice, 'stiffness'), exponent=value_of(choice, 'exponent'), &
+                    damping=value_of(choice, 'damping'))
+  end function compliant_contact
 
   !> The part of a soft law that is not its position.
   pure function soft_of(choice, mass) result(law)
@@ -126,7 +159,7 @@ contains
     k = law%restitution
     select case (law%kind)
     case (contact_linear)
-      k = max(0.0_wp, 1 - law%coefficients(1)*speed)
+      k = max(0.0_wp, law%restitution - law%coefficients(1)*speed)
     case (contact_power)
       if (speed > law%coefficients(1)) k = k*exponential(-law%coefficients(2)*logarithm(speed/law%coefficients(1)))
     case (contact_viscoelastic)

@@ -13,7 +13,7 @@ module drive_law
   implicit none
   private
 
-  public :: drive_of, foot_motion, lever_foot, lever_assembles
+  public :: drive_of, add_ripple, foot_motion, lever_foot, lever_assembles
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
   integer, parameter :: max_harmonics = 1024
@@ -135,38 +135,71 @@ contains
     e = lever%lever*d/sqrt(d(1)**2 + d(2)**2)
   end function lever_end
 
-  !> Discrete Fourier transform of the foot position with as many samples as the series needs: they
-  !> are doubled until the upper half of the spectrum is rounding.
+  !> Puts phi + sine sin(n phi) + cosine cos(n phi) in the place of the crank angle phi, as the effect `choice` says.
+  pure subroutine add_ripple(law, choice)
+    type(drive_t), intent(inout) :: law
+    type(law_choice_t), intent(in) :: choice
+    type(drive_t) :: even
+    real(wp), allocatable :: samples(:)
+    real(wp) :: ripple(2), phi, s, c
+    integer :: count, i, n
+    ripple = [value_of(choice, 'sine'), value_of(choice, 'cosine')]
+    if (all(abs(ripple) <= 0) .or. size(law%cosine) == 0) return
+    n = nint(value_of(choice, 'harmonic'))
+    even = law
+    law%converged = .false.
+    count = 64
+    do while (count <= 4*max_harmonics .and. .not. law%converged)
+      allocate (samples(0:count - 1))
+      do i = 0, count - 1
+        phi = i*two_pi/count
+        call sine_cosine(n*phi, s, c)
+        call foot_motion(even, phi + ripple(1)*s + ripple(2)*c, samples(i))
+      end do
+      call expand(samples, law)
+      deallocate (samples)
+      count = 2*count
+    end do
+  end subroutine add_ripple
+
+  !> The series of a mechanism, with as many samples as it needs.
   pure subroutine expand_lever(lever, law)
     type(lever_t), intent(in) :: lever
     type(drive_t), intent(inout) :: law
-    real(wp), allocatable :: samples(:), cosine(:), sine(:)
-    real(wp) :: size_of_motion, tail
-    integer :: count, i, kept
+    integer :: count, i
     law%converged = .false.
     allocate (law%cosine(0), law%sine(0))
     count = 64
-    do while (count <= 4*max_harmonics)
+    do while (count <= 4*max_harmonics .and. .not. law%converged)
       if (.not. all([(lever_assembles(lever, i*two_pi/count), i=0, count - 1)])) return
-      samples = [(lever_foot(lever, i*two_pi/count), i=0, count - 1)]
-      call transform(samples, cosine, sine)
-      size_of_motion = maxval(abs(samples))
-      tail = maxval(abs(cosine(count/4:))) + maxval(abs(sine(count/4:)))
-      if (tail <= 8*epsilon(1.0_wp)*size_of_motion) then
-        law%mean = sum(samples)/count
-        kept = count/4
-        do while (kept > 1)
-          if (abs(cosine(kept)) + abs(sine(kept)) > epsilon(1.0_wp)*size_of_motion) exit
-          kept = kept - 1
-        end do
-        law%cosine = cosine(:kept)
-        law%sine = sine(:kept)
-        law%converged = .true.
-        return
-      end if
+      call expand([(lever_foot(lever, i*two_pi/count), i=0, count - 1)], law)
       count = 2*count
     end do
   end subroutine expand_lever
+
+  !> Discrete Fourier transform of equidistant samples of the foot position over a turn, if the upper half of the spectrum is
+  !> rounding; else nothing.
+  pure subroutine expand(samples, law)
+    real(wp), intent(in) :: samples(:)
+    type(drive_t), intent(inout) :: law
+    real(wp), allocatable :: cosine(:), sine(:)
+    real(wp) :: size_of_motion, tail
+    integer :: count, kept
+    count = size(samples)
+    call transform(samples, cosine, sine)
+    size_of_motion = maxval(abs(samples))
+    tail = maxval(abs(cosine(count/4:))) + maxval(abs(sine(count/4:)))
+    if (.not. tail <= 8*epsilon(1.0_wp)*size_of_motion) return
+    law%mean = sum(samples)/count
+    kept = count/4
+    do while (kept > 1)
+      if (abs(cosine(kept)) + abs(sine(kept)) > epsilon(1.0_wp)*size_of_motion) exit
+      kept = kept - 1
+    end do
+    law%cosine = cosine(:kept)
+    law%sine = sine(:kept)
+    law%converged = .true.
+  end subroutine expand
 
   !> Real Fourier coefficients of harmonics 1 .. n/2 - 1 of n equidistant samples.
   pure subroutine transform(samples, cosine, sine)

@@ -11,7 +11,7 @@ module friction_law
   implicit none
   private
 
-  public :: friction_of, sliding_friction, stribeck_excess, power
+  public :: friction_of, add_to_friction, sliding_friction, stribeck_excess, power
 
   !> Exponent at which the Stribeck excess is below the rounding of the sliding friction.
   real(wp), parameter :: negligible_exponent = -log(0.01_wp*epsilon(1.0_wp))
@@ -30,6 +30,8 @@ module friction_law
     real(wp) :: stribeck_exponent = 1
     !> Speed above which the Stribeck excess is nil to rounding [m/s]; 0 without excess.
     real(wp) :: layer_speed = 0
+    !> The same of a second excess, where an effect adds one to a law that has one.
+    real(wp) :: second_excess = 0, second_velocity = 1, second_exponent = 1
   end type friction_t
 
 contains
@@ -54,10 +56,43 @@ contains
       law%excess = law%break_away - law%kinetic
       law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
-      if (law%excess > 0) law%layer_speed = law%stribeck_velocity &
-        *exponential(logarithm(negligible_exponent)/law%stribeck_exponent)
+      if (law%excess > 0) law%layer_speed = edge_of_layer(law%stribeck_velocity, law%stribeck_exponent)
     end select
   end function friction_of
+
+  !> Adds the effect of a choice of the family `effect`, if it is one of those that are friction like the law's own.
+  pure subroutine add_to_friction(law, choice)
+    type(friction_t), intent(inout) :: law
+    type(law_choice_t), intent(in) :: choice
+    select case (choice%name)
+    case ('viscous')
+      law%damping = law%damping + value_of(choice, 'damping')
+    case ('coulomb')
+      law%kinetic = law%kinetic + value_of(choice, 'force')
+      law%break_away = law%break_away + value_of(choice, 'force')
+    case ('static_excess')
+      law%break_away = law%break_away + value_of(choice, 'force')
+    case ('stribeck')
+      if (.not. value_of(choice, 'excess') > 0) return
+      law%break_away = law%break_away + value_of(choice, 'excess')
+      law%layer_speed = max(law%layer_speed, edge_of_layer(value_of(choice, 'velocity'), value_of(choice, 'exponent')))
+      if (law%excess > 0) then
+        law%second_excess = value_of(choice, 'excess')
+        law%second_velocity = value_of(choice, 'velocity')
+        law%second_exponent = value_of(choice, 'exponent')
+      else
+        law%excess = value_of(choice, 'excess')
+        law%stribeck_velocity = value_of(choice, 'velocity')
+        law%stribeck_exponent = value_of(choice, 'exponent')
+      end if
+    end select
+  end subroutine add_to_friction
+
+  !> Speed [m/s] above which exp(-(v/velocity)^exponent) is nil to rounding.
+  pure real(wp) function edge_of_layer(velocity, exponent) result(speed)
+    real(wp), intent(in) :: velocity, exponent
+    speed = velocity*exponential(logarithm(negligible_exponent)/exponent)
+  end function edge_of_layer
 
   !> Force on the body [N] while sliding at velocity `v` [m/s] in `direction` +1 or -1. Continued smoothly
   !> beyond v = 0, where a flight in that direction ends: a trial step may look there.
@@ -76,6 +111,10 @@ contains
     if (law%excess > 0) then
       u = max(speed/law%stribeck_velocity, -1.0_wp)
       stribeck_excess = law%excess*exponential(-power(u, law%stribeck_exponent))
+      if (law%second_excess > 0) then
+        u = max(speed/law%second_velocity, -1.0_wp)
+        stribeck_excess = stribeck_excess + law%second_excess*exponential(-power(u, law%second_exponent))
+      end if
     end if
   end function stribeck_excess
 

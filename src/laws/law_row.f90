@@ -8,7 +8,7 @@ module law_row
   private
 
   !> Lengths of the names of families and laws.
-  integer, parameter, public :: family_length = 9, law_length = 24
+  integer, parameter, public :: family_length = 9, law_length = 32
 
   real(wp), parameter, public :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
 
@@ -24,7 +24,7 @@ module law_row
     character(len=family_length) :: family
     character(len=law_length) :: law
     character(len=20) :: name
-    character(len=6) :: unit
+    character(len=10) :: unit
     real(wp) :: lower, upper
     logical :: lower_open
     !> An optional parameter takes its default.

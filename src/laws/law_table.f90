@@ -6,6 +6,7 @@
 !> pure procedure, rows here and a test.
 module law_table
   use contact_rows, only: contact_laws, contact_parameters
+  use effect_rows, only: effect_laws, effect_parameters
   use kinds, only: wp
   use law_row, only: family_length, law_length, law_row_t, none_above, none_below, parameter_row_t
   use pair_rows, only: pair_laws, pair_parameters
@@ -14,11 +15,14 @@ module law_table
   private
 
   public :: law_row_t, parameter_row_t
-  public :: find_law, law_names, parameters_of, law_choice, value_of, list_of, set_value, change_parameter
+  public :: find_law, law_names, parameters_of, table_of, law_choice, value_of, list_of, set_value, change_parameter
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
     'body', 'restoring', 'friction', 'contact', 'drive']
+
+  !> What may be added to a machine of one body: any number of laws.
+  character(len=*), parameter, public :: effect_family = 'effect'
 
   !> Largest |angle| [rad]: beyond it the rounding of the angle shows in its sine.
   real(wp), parameter, public :: largest_angle = 1e4_wp
@@ -122,11 +126,12 @@ module law_table
     parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
                     'offset added to the crank angle')]
 
-  type(law_row_t), parameter, public :: laws(size(other_laws) + size(contact_laws) + size(pair_laws)) = &
-    [other_laws, contact_laws, pair_laws]
+  type(law_row_t), parameter, public :: laws( &
+    size(other_laws) + size(contact_laws) + size(pair_laws) + size(effect_laws)) = &
+    [other_laws, contact_laws, pair_laws, effect_laws]
   type(parameter_row_t), parameter, public :: parameters( &
-    size(other_parameters) + size(contact_parameters) + size(pair_parameters)) = &
-    [other_parameters, contact_parameters, pair_parameters]
+    size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(effect_parameters)) = &
+    [other_parameters, contact_parameters, pair_parameters, effect_parameters]
 
 contains
 
@@ -165,6 +170,15 @@ contains
       end if
     end do
   end function parameters_of
+
+  !> Name of the table of a law in a case file, which the paths of its parameters begin with: the family, of an effect
+  !> 'effect.NAME'.
+  pure function table_of(family, law) result(table)
+    character(len=*), intent(in) :: family, law
+    character(len=:), allocatable :: table
+    table = trim(family)
+    if (family == effect_family) table = table//'.'//trim(law)
+  end function table_of
 
   !> A law with every parameter at its default (zero where it has none, empty lists): set the
   !> others before use. Stops nothing: an unknown law has no parameters.
@@ -209,7 +223,7 @@ contains
     choice%parameters(position_of(choice, parameter))%values = values
   end subroutine set_value
 
-  !> Changes the scalar parameter `path` = 'family.parameter' among `choices`; `found` is false if none has it. A static
+  !> Changes the scalar parameter `path` = 'family.parameter' or 'effect.NAME.parameter' among `choices`; `found` is false if none has it. A static
   !> coefficient that equals the kinetic one moves with it.
   pure subroutine change_parameter(choices, path, value, found)
     type(law_choice_t), intent(inout) :: choices(:)
@@ -219,11 +233,12 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: name
     real(wp) :: before
-    integer :: i, k
+    integer :: i, k, mark
     found = .false.
-    name = trim(path(index(path, '.') + 1:))
+    mark = index(path, '.', back=.true.)
+    name = trim(path(mark + 1:))
     do i = 1, size(choices)
-      if (choices(i)%family /= path(:index(path, '.') - 1)) cycle
+      if (table_of(choices(i)%family, choices(i)%name) /= path(:mark - 1)) cycle
       rows = parameters_of(choices(i)%family, choices(i)%name)
       k = findloc(rows%name == name .and. .not. rows%list, .true., dim=1)
       if (k == 0) cycle

@@ -1,22 +1,25 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A machine composed of laws: m x'' = restoring(l0 + x_A(phi) - x) + friction(x'), barriers at
+!> A machine composed of laws: m x'' = restoring(l0 + x_A(phi) - x) + friction(x') + effects, barriers at
 !> fixed positions, crank angle phi = Omega t + phi_0.
 module oscillator
   use constants, only: two_pi
-  use contact_law, only: contact_of, contact_t, force_on_body
-  use drive_law, only: drive_of, drive_t, foot_motion
+  use contact_law, only: add_to_contact, compliant_contact, contact_of, contact_t, force_on_body
+  use drive_law, only: add_ripple, drive_of, drive_t, foot_motion
+  use effect_check, only: refuse_effects
+  use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, replace_friction, sensor_t, &
+    slip_memory_t
   use errors, only: error_t, fail
-  use friction_law, only: friction_of, friction_t
+  use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
-  use law_table, only: law_choice_t, value_of
+  use law_table, only: effect_family, law_choice_t, value_of
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
   implicit none
   private
 
-  public :: build_oscillator, refuse_pair, holding_force
+  public :: build_oscillator, refuse_pair, holding_force, extra_force
 
   type, public :: oscillator_t
     !> Mass [kg].
@@ -25,6 +28,9 @@ module oscillator
     type(friction_t) :: friction
     type(contact_t) :: contact
     type(drive_t) :: drive
+    type(effects_t) :: effects
+    !> What a record of the motion shows.
+    type(sensor_t) :: sensor
     !> sqrt(stiffness/mass) [rad/s]; 0 without a spring.
     real(wp) :: natural_frequency = 0
     !> Angular frequency of the section: the drive's, or the natural one without a drive [rad/s].
@@ -40,17 +46,18 @@ module oscillator
 
 contains
 
-  !> The machine of one law per family: body, restoring, friction, contact, drive, in any order.
+  !> The machine of one law per family: body, restoring, friction, contact, drive, and any number of effects, in any order.
   !> Parameters are taken as they are (the case reader checks bounds); what only the whole shows is
-  !> refused: a drive without a natural frequency, a mechanism whose series does not converge.
+  !> refused: a drive without a natural frequency, a series that does not converge, an effect that the laws have no place for.
   pure subroutine build_oscillator(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(oscillator_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: normal_force
-    integer :: i, n
+    integer :: i
     normal_force = 0
     call refuse_pair(choices, error)
+    if (.not. allocated(error)) call refuse_effects(choices, error)
     if (allocated(error)) return
     do i = 1, size(choices)
       if (choices(i)%family /= 'body') cycle
@@ -75,6 +82,41 @@ contains
                 'point (its Fourier series does not converge); move the guide or lengthen the rod')
       return
     end if
+    call add_effects(choices, machine, error)
+    if (.not. allocated(error)) call set_section(machine, error)
+    if (allocated(error)) return
+    call set_bounds(machine)
+  end subroutine build_oscillator
+
+  !> Puts the effects among the choices on top of the laws.
+  pure subroutine add_effects(choices, machine, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(oscillator_t), intent(inout) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    do i = 1, size(choices)
+      if (choices(i)%family /= effect_family) cycle
+      call add_to_friction(machine%friction, choices(i))
+      call add_to_contact(machine%contact, choices(i))
+      call add_to_effects(machine%effects, choices(i))
+      call add_to_sensor(machine%sensor, choices(i))
+      if (choices(i)%name == 'drive_ripple') call add_ripple(machine%drive, choices(i))
+    end do
+    do i = 1, size(choices)
+      ! After the second barrier, which is to be soft too.
+      if (choices(i)%family == effect_family .and. choices(i)%name == 'compliant_contact') &
+        machine%contact = compliant_contact(machine%contact, choices(i))
+    end do
+    call replace_friction(machine%effects, machine%friction)
+    call finish_effects(machine%effects)
+    if (.not. machine%drive%converged) call fail(error, exit_bad_case, 'effect.drive_ripple: too large: the Fourier series of '// &
+                                                 'the drive does not converge')
+  end subroutine add_effects
+
+  !> Frequencies and the period of the section.
+  pure subroutine set_section(machine, error)
+    type(oscillator_t), intent(inout) :: machine
+    type(error_t), allocatable, intent(out) :: error
     machine%natural_frequency = sqrt(machine%restoring%stiffness/machine%mass)
     machine%drive_frequency = machine%natural_frequency
     if (machine%drive%ratio > 0) machine%drive_frequency = machine%drive%ratio*machine%natural_frequency
@@ -83,11 +125,16 @@ contains
     else if (machine%drive%ratio > 0) then
       call fail(error, exit_bad_case, 'drive.ratio needs a restoring law with a stiffness: it is relative '// &
                 'to the natural frequency sqrt(c/m)')
-      return
     else
       machine%period = 1
       machine%drive_frequency = two_pi
     end if
+  end subroutine set_section
+
+  !> Bounds on the motion of the foot and the scale of the forces.
+  pure subroutine set_bounds(machine)
+    type(oscillator_t), intent(inout) :: machine
+    integer :: n
     do n = 1, size(machine%drive%cosine)
       associate (size_n => sqrt(machine%drive%cosine(n)**2 + machine%drive%sine(n)**2))
         machine%foot_speed_bound = machine%foot_speed_bound + size_n*n*machine%drive_frequency
@@ -95,10 +142,13 @@ contains
                                           + size_n*(n*machine%drive_frequency)**2
       end associate
     end do
-    machine%force_scale = machine%restoring%stiffness*(abs(machine%restoring%free_length) &
-      + abs(machine%drive%mean) + sum(abs(machine%drive%cosine)) + sum(abs(machine%drive%sine))) &
-      + machine%friction%break_away
-  end subroutine build_oscillator
+    associate (length => abs(machine%restoring%free_length) + abs(machine%drive%mean) + sum(abs(machine%drive%cosine)) &
+               + sum(abs(machine%drive%sine)), effects => machine%effects)
+      machine%force_scale = machine%restoring%stiffness*length + machine%friction%break_away
+      if (effects%present) machine%force_scale = machine%force_scale + abs(effects%offset) + abs(effects%asymmetric_coulomb) &
+                                                 + effects%dahl_sliding + abs(effects%cubic)*length**3
+    end associate
+  end subroutine set_bounds
 
   !> One body has no place for the laws of two. The message begins with the key.
   pure subroutine refuse_pair(choices, error)
@@ -119,18 +169,34 @@ contains
 
   !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
   !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
-  !> derivative [N/s^2] over all angles.
+  !> derivative [N/s^2] over all angles. Dahl's friction is not in it.
   pure subroutine holding_force(machine, x, phi, force, rate, curvature_bound)
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, phi
     real(wp), intent(out) :: force, rate, curvature_bound
-    real(wp) :: foot, foot_rate, stretch
+    real(wp) :: foot, foot_rate, stretch, longest
     call foot_motion(machine%drive, phi, foot, foot_rate)
     stretch = machine%restoring%free_length + foot - x
     force = restoring_force(machine%restoring, stretch)
     rate = restoring_stiffness(machine%restoring, stretch)*foot_rate*machine%drive_frequency
     if (machine%contact%soft) force = force + force_on_body(machine%contact, x, 0.0_wp)
     curvature_bound = machine%restoring%stiffness*machine%foot_acceleration_bound
+    if (.not. machine%effects%present) return
+    associate (cubic => machine%effects%cubic, speed => machine%foot_speed_bound)
+      force = force + machine%effects%offset + cubic*stretch**3
+      rate = rate + 3*cubic*stretch**2*foot_rate*machine%drive_frequency
+      longest = abs(machine%restoring%free_length + machine%drive%mean - x) + sum(abs(machine%drive%cosine)) &
+                + sum(abs(machine%drive%sine))
+      curvature_bound = curvature_bound + abs(cubic)*longest*(3*longest*machine%foot_acceleration_bound + 6*speed**2)
+    end associate
   end subroutine holding_force
+
+  !> Force [N] on a slipping body at `x` [m], `v` [m/s] beyond those of the laws, the spring being stretched by `stretch` [m].
+  pure real(wp) function extra_force(machine, slip, x, v, stretch) result(force)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_memory_t), intent(in) :: slip
+    real(wp), intent(in) :: x, v, stretch
+    force = effect_force(machine%effects, machine%friction, slip, x, v, stretch)
+  end function extra_force
 
 end module oscillator

@@ -10,7 +10,7 @@ module pair
   use contact_law, only: barrier_positions, contact_of, contact_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: law_choice_t, value_of
+  use law_table, only: effect_family, law_choice_t, table_of, value_of
   use status, only: exit_bad_case
   implicit none
   private
@@ -91,6 +91,10 @@ contains
       case ('drive')
         call take_drive(choices(i), machine, error)
         if (allocated(error)) return
+      case (effect_family)
+        call fail(error, exit_bad_case, table_of(effect_family, choices(i)%name)//': found with two bodies, allowed with '// &
+                  'body.law = "point_mass"')
+        return
       end select
     end do
     positions = barrier_positions(machine%contact)

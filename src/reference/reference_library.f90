@@ -9,7 +9,7 @@ module reference_library
   use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: wp
-  use law_table, only: families, law_choice, law_choice_t, laws
+  use law_table, only: law_choice, law_choice_t, laws
   use motion, only: motion_t
   use motion_state, only: options_t
   use trajectory, only: outcome_t, run_trajectory, span_t
@@ -20,13 +20,14 @@ module reference_library
 
 contains
 
-  !> Runs `points` trajectories. Laws: row in the law table per family, lengths and values of their parameters one
+  !> Runs `points` trajectories. Laws and effects: row in the law table of each, lengths and values of their parameters one
   !> after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at capture;
   !> `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
   !> Returns 0, or 1 if the machine cannot be built.
-  integer(c_int) function separatrix_reference_run(law_rows, lengths, values, flight, event_budget, numbers, &
+  integer(c_int) function separatrix_reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
       attractor_count, packed, points, starts, results) bind(c)
-    integer(c_int), intent(in) :: law_rows(size(families)), lengths(*)
+    integer(c_int), value :: law_count
+    integer(c_int), intent(in) :: law_rows(law_count), lengths(*)
     real(c_double), intent(in) :: values(*)
     integer(c_int), value :: flight
     integer(c_int64_t), value :: event_budget
@@ -34,7 +35,7 @@ contains
     integer(c_int), value :: attractor_count, points
     real(c_double), intent(in) :: packed(packed_size, attractor_count), starts(3, points)
     real(c_double), intent(out) :: results(6, points)
-    type(law_choice_t) :: choices(size(families))
+    type(law_choice_t) :: choices(law_count)
     type(motion_t) :: moving
     type(attractor_t), allocatable :: catalogue(:)
     type(error_t), allocatable :: error
@@ -45,7 +46,7 @@ contains
     separatrix_reference_run = 1
     position = 0
     parameter = 0
-    do i = 1, size(families)
+    do i = 1, law_count
       choices(i) = law_choice(trim(laws(law_rows(i))%family), trim(laws(law_rows(i))%name))
       do k = 1, size(choices(i)%parameters)
         parameter = parameter + 1

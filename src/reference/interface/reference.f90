@@ -20,9 +20,10 @@ module reference
   real(wp), parameter :: reference_tolerance = 1e-20_wp
 
   interface
-    function separatrix_reference_run(law_rows, lengths, values, flight, event_budget, numbers, &
+    function separatrix_reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
         attractor_count, packed, points, starts, results) bind(c) result(status)
       import :: c_double, c_int, c_int64_t
+      integer(c_int), value :: law_count
       integer(c_int), intent(in) :: law_rows(*), lengths(*)
       real(c_double), intent(in) :: values(*)
       integer(c_int), value :: flight
@@ -37,8 +38,8 @@ module reference
 
 contains
 
-  !> Runs `starts` (rows x0 [m], v0 [m/s], crank angle [rad]) on the machine of `laws` (one per family, in the order of
-  !> `families`). Rows of `results`: reason, attractor, regime, x [m], v [m/s], impacts.
+  !> Runs `starts` (rows x0 [m], v0 [m/s], crank angle [rad]) on the machine of `laws` (one per
+  !> family and any effects). Rows of `results`: reason, attractor, regime, x [m], v [m/s], impacts.
   subroutine run_reference(laws, options, span, catalogue, starts, results, error)
     type(law_choice_t), intent(in) :: laws(:)
     type(options_t), intent(in) :: options
@@ -62,7 +63,7 @@ contains
     do i = 1, size(catalogue)
       packed(:, i) = pack_attractor(catalogue(i))
     end do
-    status = separatrix_reference_run(rows, lengths, values, options%flight, &
+    status = separatrix_reference_run(size(rows), rows, lengths, values, options%flight, &
       int(options%event_budget, int64), [reference_tolerance, options%domain, span%duration, span%window, &
       span%extension, merge(1.0_wp, 0.0_wp, span%stop_when_captured)], size(catalogue), packed, &
       size(starts, 2), starts, out)

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The base machine fitted honestly: noise measured on the way, phases found, several starts if one is not enough."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.machine import Free, base_parameters, drive_nuisances
+from separatrix.discovery.noise import noise_of
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.refit import Fitted
+
+_PHASES = 12
+_DISAGREEMENT = 1.3
+
+
+def fit_base(data: Data, model, mass: float) -> Fitted:
+    """Fit all parameters that the records can say something about; sets noise and memory of the records."""
+    force = any(one.record.force is not None for one in data.prepared)
+    free = base_parameters(model, force) + drive_nuisances(model, [one.phase_known for one in data.prepared])
+    find_phases(data, model, free)
+    values = np.array([one.value for one in free])
+    for _ in range(2):
+        problem, fit = fit_stages(data, model, free, values, stages=[0])
+        measure_noise(data, problem, fit, mass)
+        values = fit.values
+    problem, fit = fit_stages(data, model, free, values, stages=[0, *range(1, data.last + 1)])
+    best = Fitted((), model, problem, fit, ())
+    if not fit.converged or fit.reduced_chi2 > 2:
+        # from the case as it stands, at the full length at once, and on from where the first try ended
+        for begin, stages in ((np.array([one.value for one in free]), [data.last]), (fit.values, [1, data.last])):
+            problem, fit = fit_stages(data, model, free, begin, stages=stages, most=40)
+            if fit.good.sum() >= best.fit.good.sum() and fit.total < best.fit.total:
+                best = Fitted((), model, problem, fit, ())
+    return best
+
+
+def measure_noise(data: Data, problem: Problem, fit, mass: float) -> None:
+    """Set what the records do not state, and doubt what they state if the samples scatter more."""
+    for number, prepared in enumerate(data.prepared):
+        factor, memory = noise_of(problem, fit, number, 0, mass)
+        prepared.memory = memory
+        measured = prepared.sigma * factor
+        if not prepared.sigma_stated:
+            prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
+        elif measured > _DISAGREEMENT * prepared.sigma:
+            prepared.note(f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m")
+        if prepared.record.v is not None and not prepared.velocity_sigma_stated:
+            prepared.velocity_sigma *= noise_of(problem, fit, number, 1, mass)[0]
+
+
+def find_phases(data: Data, model, free: list[Free]) -> None:
+    """Search the crank angle of the records that do not state it, on short segments with all else as in the case."""
+    missing = [i for i, one in enumerate(data.prepared) if one.frequency is not None and not one.phase_stated]
+    if not missing:
+        return
+    values = np.array([one.value for one in free])
+    trials = []
+    original = [one.phase for one in data.prepared]
+    for turn in np.arange(_PHASES) * 2 * np.pi / _PHASES:
+        for i in missing:
+            data.prepared[i].phase = float(turn)
+        problem, fit = fit_stages(data, model, free, values, stages=[0], most=4)
+        record = problem.segments.record
+        trials.append([float(np.sum(np.minimum(fit.chi2, 1e12)[record == i])) for i in missing])
+    best = np.argmin(np.array(trials), axis=0)
+    for one, phase in zip(data.prepared, original, strict=True):
+        one.phase = phase
+    for place, i in enumerate(missing):
+        data.prepared[i].phase = float(best[place] * 2 * np.pi / _PHASES)
+
+
+def copy_noise(source: Data, target: Data) -> None:
+    """Give records that are not fitted the memory of the noise of those that are."""
+    memory = float(np.mean([one.memory for one in source.prepared]))
+    for one in target.prepared:
+        one.memory = memory
+
+
+def with_fitted_values(base: Fitted) -> list[Free]:
+    """What is free in the base, with the fitted values."""
+    return [replace(one, value=float(value)) for one, value in zip(base.problem.free, base.fit.values, strict=True)]

@@ -1,0 +1,191 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the most flexible machine could still explain: forces that depend smoothly on speed, place, phase and time.
+
+A family of forces (and of kicks at impacts) is tried at once on what a fit left over, linearised. Under a right model the
+gain of a family is a chi^2 of its rank. The family of pieces gives each segment forces of its own and so
+sees what no function of the state can say.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.stats import chi2
+
+from separatrix.discovery.fit import Fit, blocks_of, eliminate
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.response import force_columns, kick_columns, sample_times
+from separatrix.discovery.screen import project
+
+_PIECES = 5
+_USABLE = 1e-6
+
+
+@dataclass
+class Family:
+    """Gain of chi^2 by a family of forces, its rank and its p value."""
+
+    name: str
+    gain: float
+    rank: int
+    p: float
+
+
+@dataclass
+class Ceiling:
+    """All families; `gain` is the largest excess of a gain over its rank, `p` is corrected for their number."""
+
+    families: list[Family]
+
+    @property
+    def p(self) -> float:
+        """Probability that a right model leaves as much to any of the families."""
+        return float(min(1.0, len(self.families) * min(one.p for one in self.families)))
+
+    @property
+    def closable(self) -> float:
+        """Chi^2 that a flexible machine would explain beyond chance."""
+        return max(0.0, *(one.gain - one.rank for one in self.families))
+
+    @property
+    def best(self) -> Family:
+        """The family that explains most."""
+        return min(self.families, key=lambda one: one.p)
+
+
+def ceiling(problem: Problem, fit: Fit, mass: float, inflation: float = 1.0) -> Ceiling:
+    """Try every family on the residuals of a fit."""
+    families = []
+    for name, columns in _families(problem, fit, mass).items():
+        gain, rank = _gain(fit, columns)
+        families.append(Family(name, gain, rank, float(chi2.sf(gain / inflation, rank)) if rank else 1.0))
+    gain, rank = _piecewise_gain(problem, fit, mass)
+    families.append(Family("pieces", gain, rank, float(chi2.sf(gain / inflation, rank)) if rank else 1.0))
+    return Ceiling(families)
+
+
+def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
+    evaluation = fit.evaluation
+    weights = evaluation.used * fit.good[:, None]
+    p = evaluation.by_parameter.shape[2]
+    whole = np.concatenate([evaluation.by_parameter, columns], axis=2)
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0].total()
+    left, score = project(matrix, gradient, p, ~fit.at_bound)
+    # relative to what the columns were before anything was projected out
+    size = np.sqrt(np.maximum(np.diag(matrix)[p:], 1e-300))
+    values, vectors = np.linalg.eigh(left / np.outer(size, size))
+    usable = values > _USABLE
+    parts = vectors[:, usable].T @ (score / size)
+    return float(np.sum(parts**2 / values[usable])), int(usable.sum())
+
+
+def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int]:
+    """Forces of each segment by itself, constant over fifths of it; the common parameters stay where they are."""
+    inside = problem.segments.inside
+    lengths = inside.sum(axis=1)
+    piece = np.minimum(np.arange(inside.shape[1])[None, :] * _PIECES // lengths[:, None], _PIECES - 1)
+    forces = (piece[:, :, None] == np.arange(_PIECES)) * inside[:, :, None].astype(float)
+    columns = force_columns(problem, fit, forces, mass)
+    weights = fit.evaluation.used * fit.good[:, None]
+    reduced = eliminate(blocks_of(fit.evaluation.by_start, columns, fit.evaluation.residual, weights))[0]
+    size = np.sqrt(np.maximum(np.einsum("kii->ki", reduced.matrix), 1e-300))
+    scaled = reduced.matrix / (size[:, :, None] * size[:, None, :])
+    values, vectors = np.linalg.eigh(scaled)
+    usable = (values > 1e-4) & fit.good[:, None]
+    parts = (vectors.transpose(0, 2, 1) @ (reduced.gradient / size)[:, :, None])[:, :, 0]
+    gain = float(np.sum(np.where(usable, parts**2 / np.where(usable, values, 1), 0)))
+    return gain, max(0, int(usable.sum()) - int((~fit.at_bound).sum()))
+
+
+def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
+    state = motion(problem, fit)
+    x, v, phase, time = state["x"], state["v"], state["phase"], state["time"]
+    sign = np.sign(v)
+    one = np.ones_like(x)
+    forces = {
+        "speed": _splines(v, 7),
+        "place": _splines(x, 7),
+        "speed and place": _products(_splines(v, 4), _splines(x, 4)),
+        "time": np.stack([time * f for f in (one, x, v, sign)] + [time**2 * f for f in (one, x, sign)], axis=2),
+    }
+    if phase is not None:
+        waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
+        forces["phase"] = np.stack(waves + [f(4 * phase) for f in (np.sin, np.cos)], axis=2)
+        forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
+    made = {name: force_columns(problem, fit, values, mass) for name, values in forces.items()}
+    kicks = impact_kicks(problem, fit, state)
+    if kicks is not None:
+        made["impacts"] = kick_columns(problem, fit, kicks)
+    return made
+
+
+def motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
+    """Position, velocity, crank angle and time (in [-1, 1] over each record) at the samples, scaled to about 1."""
+    inside = problem.segments.inside
+    x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
+    good = inside & fit.good[:, None]
+    middle, size = np.mean(x[good]), np.std(x[good])
+    speed = np.sqrt(np.mean(v[good] ** 2))
+    time, phase = np.zeros(inside.shape), None
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        t = prepared.record.t
+        stamps = t[problem.segments.index[rows]]
+        time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
+        if prepared.frequency is not None:
+            phase = np.zeros(inside.shape) if phase is None else phase
+            phase[rows] = prepared.phase + prepared.frequency * (stamps - prepared.origin)
+    return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
+
+
+def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
+    """Changes of the speed after an impact: constant, with the speed before, its square, and with time."""
+    before, at = _impacts(problem, fit)
+    if at.sum() < 4:
+        return None
+    speed = before / state["speed"]
+    scale = 0.1 * state["speed"]
+    return scale * np.stack([at * speed**n for n in range(4)] + [at * state["time"], at * state["time"] ** 2], axis=2)
+
+
+def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Signed speed before the impact, and its direction after it, at the first sample after each impact."""
+    inside = problem.segments.inside
+    before, at = np.zeros(inside.shape), np.zeros(inside.shape)
+    times = None
+    for number, impacts in enumerate(fit.evaluation.impacts):
+        rows = np.flatnonzero(problem.segments.record == number)
+        if impacts is None or not rows.size:
+            continue
+        stamps = problem.prepared[number].record.t[problem.segments.index[rows]]
+        times = stamps - stamps[:, :1]
+        for segment, time, speed, _, side in impacts:
+            i = int(segment)
+            j = int(np.searchsorted(times[i][inside[rows[i]]], time))
+            if j < inside[rows[i]].sum():
+                before[rows[i], j] = abs(speed)
+                at[rows[i], j] = -side
+    return before, at
+
+
+def _splines(values: np.ndarray, count: int) -> np.ndarray:
+    """Cubic B-splines over the middle 98 % of the values, knots at their quantiles."""
+    flat = values[np.isfinite(values) & (values != 0)]
+    inner = np.quantile(flat, np.linspace(0.01, 0.99, count - 2))
+    inner += np.arange(inner.size) * 1e-9
+    knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+    clipped = np.clip(values, knots[0], knots[-1])
+    return BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
+
+
+def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
+
+
+def after_impacts(problem: Problem, fit: Fit) -> np.ndarray:
+    """Time since the last impact of the segment at each sample [s], not a number before the first."""
+    _, at = _impacts(problem, fit)
+    times = sample_times(problem)
+    last = np.maximum.accumulate(np.where(at != 0, times, -np.inf), axis=1)
+    return np.where(np.isfinite(last), times - last, np.nan)

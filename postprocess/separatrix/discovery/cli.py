@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command `separatrix-discover`."""
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from separatrix.discovery.catalogue import BY_NAME
+from separatrix.discovery.extend import write_all
+from separatrix.discovery.options import Options
+from separatrix.discovery.workflow import investigate
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.version import __version__
+
+
+class _Parser(argparse.ArgumentParser):
+    """Usage errors leave with 64, as those of `separatrix` do."""
+
+    def error(self, message: str) -> None:
+        raise SeparatrixError(f"{message}; see separatrix-discover --help", USAGE)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    try:
+        chosen = _parser().parse_args(arguments)
+        _run(chosen)
+    except SeparatrixError as error:
+        print(f"separatrix-discover: {error}", file=sys.stderr)
+        return error.code
+    return 0
+
+
+def _run(chosen: argparse.Namespace) -> None:
+    options = Options(
+        seed=chosen.seed,
+        quick=chosen.quick,
+        segment_periods=chosen.segment_periods,
+        segment_seconds=chosen.segment_seconds,
+        candidates=chosen.effects,
+        progress=(lambda stage, done: None) if chosen.quiet else Progress(),
+    )
+    verdict, findings = investigate(chosen.base, chosen.records, chosen.hold_out, options, chosen.rest)
+    written = write_all(chosen.out, verdict, findings)
+    for line in summary(verdict):
+        print(line)
+    for path in written:
+        print(f"wrote {path}")
+
+
+class Progress:
+    """A line per stage on stderr, with the time passed and what is left at this rate."""
+
+    def __init__(self) -> None:
+        """Start the clock."""
+        self.began = time.monotonic()
+
+    def __call__(self, stage: str, done: float) -> None:
+        """Report that `stage` begins, `done` of the whole being over."""
+        passed = time.monotonic() - self.began
+        left = f", about {passed * (1 - done) / done:.0f} s left" if done > 0.1 and passed > 1 else ""
+        print(f"[{100 * done:3.0f} %] {stage} ({passed:.1f} s{left})", file=sys.stderr, flush=True)
+
+
+def summary(verdict: dict) -> list[str]:
+    """The verdict in a few lines."""
+    names = " and ".join(verdict["effects"])
+    others = ", ".join(verdict["alternatives"])
+    lines = {
+        "named": [f"missing: {names}"],
+        "ambiguous": [f"missing: {names}" + (f", or {others}" if others else ", not beyond doubt")],
+        "none": ["no missing effect"],
+        "not-in-catalogue": ["something is missing that the catalogue does not name"],
+    }[verdict["outcome"]]
+    for path, found in verdict["parameters"].items():
+        if path.startswith("effect."):
+            unit = "" if found["unit"] == "1" else f" {found['unit']}"
+            lines.append(f"  {path} = {found['value']:.4g} +- {found['standard_error']:.2g}{unit}")
+    for use, gap in verdict["gap"].items():
+        lines.append(f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)")
+    lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
+    lines += [f"  {reason}" for reason in verdict["reasons"]]
+    if verdict["separating_experiment"]:
+        lines.append(f"  to separate them: {verdict['separating_experiment']}")
+    return lines + [f"  warning: {warning}" for warning in verdict["warnings"]]
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    unknown = [name for name in names if name not in BY_NAME]
+    if unknown or not names:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list out of {', '.join(BY_NAME)}")
+    return names
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < 1e9:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
+
+
+def _seed(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 on")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="separatrix-discover",
+        description="Find where measured records and a case disagree, name the missing effect, add it, and prove it.",
+        epilog="Exit codes: 0 done (whatever the verdict), 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
+    )
+    parser.add_argument("base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be")
+    parser.add_argument("records", metavar="RECORD", nargs="+", type=Path, help="record to fit (CSV or HDF5)")
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results")
+    parser.add_argument(
+        "--hold-out", metavar="FILE", type=Path, action="append", default=[], help="record that is never fitted; repeatable"
+    )
+    parser.add_argument("--rest", metavar="FILE", type=Path, help="record at rest, for the noise")
+    parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")
+    parser.add_argument("--seed", type=_seed, default=1, help="of all random choices [1]")
+    parser.add_argument("--effects", metavar="LIST", type=_names, help="only these effects of the catalogue")
+    parser.add_argument(
+        "--segment-periods", metavar="N", type=_positive, default=1.0, help="longest segment in drive periods [1]"
+    )
+    parser.add_argument("--segment-seconds", metavar="S", type=_positive, help="longest segment in seconds")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
+    parser.add_argument("--version", action="version", version=f"separatrix-discover {__version__}")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records ready to be fitted: smoothed, and cut into short, middle and long segments."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.catalogue import Scales
+from separatrix.discovery.fit import Fit, minimise
+from separatrix.discovery.machine import Free
+from separatrix.discovery.preflight import Prepared
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.segments import Segments, cut
+from separatrix.discovery.smoother import Smoothed, smooth
+
+# lengths of the stages over that of the longest segments
+STAGES = (0.2, 0.5, 1.0)
+_FEWEST = 10
+
+
+@dataclass
+class Data:
+    """Prepared and smoothed records and their segments by stage."""
+
+    prepared: list[Prepared]
+    smoothed: list[Smoothed]
+    lengths: list[int]
+    stages: list[Segments]
+
+    @property
+    def last(self) -> int:
+        """Number of the stage with the longest segments."""
+        return len(self.stages) - 1
+
+    def smoothed_starts(self, stage: int) -> np.ndarray:
+        """Starts (segments, 2) of a stage from the smoother."""
+        segments = self.stages[stage]
+        return np.array(
+            [self.smoothed[r].state[a, :2] for r, a in zip(segments.record, segments.first, strict=True)]
+        ).reshape(-1, 2)
+
+    def carried_starts(self, stage: int, known: int, fit: Fit) -> np.ndarray:
+        """Starts of a stage from the motion fitted at stage `known`, and from the smoother where it failed."""
+        starts = self.smoothed_starts(stage)
+        old, new = self.stages[known], self.stages[stage]
+        for r, record in enumerate(self.prepared):
+            x = np.full(record.record.t.size, np.nan)
+            v = x.copy()
+            for i in np.flatnonzero((old.record == r) & ~fit.evaluation.failed):
+                inside = old.inside[i]
+                x[old.index[i, inside]] = fit.evaluation.x[i, inside]
+                v[old.index[i, inside]] = fit.evaluation.v[i, inside]
+            rows = np.flatnonzero(new.record == r)
+            carried = np.column_stack([x[new.first[rows]], v[new.first[rows]]])
+            known_rows = np.all(np.isfinite(carried), axis=1)
+            starts[rows[known_rows]] = carried[known_rows]
+        return starts
+
+
+def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> Data:
+    """Smooth and cut records; the longest segments have `periods` drive periods, or `seconds`."""
+    smoothed, lengths = [], []
+    for one in prepared:
+        record = one.record
+        smoothed.append(smooth(record.t, record.x, one.sigma, one.period_samples))
+        if seconds is not None:
+            length = seconds / record.interval
+        elif one.period_samples is not None:
+            length = periods * one.period_samples
+        else:
+            length = periods * 4 * _correlation_samples(record.x)
+        lengths.append(int(np.clip(length, _FEWEST, record.t.size / 3)))
+    stages = [
+        cut([one.record for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
+        for share in STAGES
+    ]
+    return Data(prepared, smoothed, lengths, stages)
+
+
+def _correlation_samples(x: np.ndarray) -> int:
+    """Samples until the autocorrelation of a record first crosses zero: a quarter of a period of a swing."""
+    centred = x - x.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * x.size)) ** 2
+    correlation = np.fft.irfft(spectrum)[: x.size]
+    below = np.flatnonzero(correlation < 0)
+    return int(below[0]) if below.size else x.size // 8
+
+
+def fit_stages(
+    data: Data,
+    model,
+    free: list[Free],
+    values: np.ndarray,
+    *,
+    stages: list[int],
+    robust: bool = True,
+    most: int = 20,
+    hopeless: float | None = None,
+    begin: tuple[int, Fit] | None = None,
+    fixed: np.ndarray | None = None,
+) -> tuple[Problem, Fit]:
+    """Fit at each stage in turn, from short segments to long ones: Huber's loss, then squares at the last."""
+    known = begin
+    problem, fit = None, None
+    for stage in stages:
+        problem = Problem(model, data.prepared, data.stages[stage], free)
+        starts = data.smoothed_starts(stage) if known is None else data.carried_starts(stage, *known)
+        if robust:
+            fit = minimise(problem, values, starts, robust=True, most=most, hopeless=hopeless, fixed=fixed)
+            values, starts = fit.values, fit.starts
+        if not robust or stage == stages[-1]:
+            fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
+            values = fit.values
+        known = (stage, fit)
+    return problem, fit
+
+
+def scales_of(data: Data, model) -> Scales:
+    """Typical sizes in the records."""
+    parameters = model.parameters
+    mass = parameters["body.mass"].value if "body.mass" in parameters else 1.0
+    x = np.concatenate([one.record.x for one in data.prepared])
+    v = np.concatenate([one.v for one in data.smoothed])
+    acceleration = np.concatenate([one.state[:, 2] for one in data.smoothed])
+    length, speed = float(np.std(x)), float(np.sqrt(np.mean(v**2)))
+    force = mass * float(np.median(np.abs(acceleration)) / 0.6745)
+    speeds = np.concatenate([np.abs(one.v[one.impacts]) for one in data.smoothed])
+    friction = 0.05 * force
+    if "friction.kinetic_coefficient" in parameters:
+        gravity = parameters["body.gravity"].value
+        friction = max(friction, parameters["friction.kinetic_coefficient"].value * mass * gravity)
+    return Scales(
+        mass,
+        length,
+        speed,
+        force,
+        float(np.median(speeds)) if speeds.size else speed,
+        friction,
+        float(np.min(x)),
+        float(np.max(x)),
+        float(np.median([one.record.interval for one in data.prepared])),
+    )

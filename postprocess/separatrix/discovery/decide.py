@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Forward selection: which effects, if any, may be named; what cannot be told apart; what the catalogue lacks."""
+
+from dataclasses import dataclass, field
+
+from separatrix.discovery.catalogue import BY_NAME
+from separatrix.discovery.ceiling import Ceiling, ceiling
+from separatrix.discovery.heldout import Prediction
+from separatrix.discovery.judge import Judged, adequate, admissible, detection, held_out_bounds, judged, stable
+from separatrix.discovery.refit import Fitted, refit
+from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
+
+_PAIRS = 6
+_INCLUSION = 0.9
+_HARM = -3.0
+
+
+@dataclass
+class Decision:
+    """The outcome and all that led to it."""
+
+    outcome: str
+    accepted: list[Judged]
+    alternatives: list[list[str]]
+    # the fits that could not be told from the accepted one
+    rivals: list[Judged]
+    rounds: list[Round]
+    base_ceiling: Ceiling
+    foretold: Prediction | None
+    reasons: list[str] = field(default_factory=list)
+    equivalent: bool = False
+    shares: list[float] = field(default_factory=list)
+
+
+def decide(bench: Bench, base: Fitted) -> Decision:
+    """Add effects until what is left is noise or nothing in the catalogue helps."""
+    foretold = bench.foretell(base)
+    bench.options.progress("looking for a gap", 0.15)
+    gap = ceiling(base.problem, base.fit, bench.scales.mass)
+    first = run_round(bench, base, foretold, 0.2, 0.75)
+    decision = Decision("none", [], [], [], [first], gap, foretold)
+    if not first.judged:
+        return _without_name(bench, decision)
+    best, rivals = _leaders(bench, first)
+    _pass_gates(bench, best, base, rivals, len(first.judged))
+    if not best.gates["detect"]:
+        return _without_name(bench, decision)
+    share = _ceiling_of(bench, best, base)
+    decision.shares.append(share)
+    if best.gates["adequate"]:
+        return _conclude(decision, best, rivals)
+    return _with_more(bench, decision, base, best, rivals)
+
+
+def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
+    """The best candidate that converged, and those that it does not beat clearly."""
+    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one)[0]]
+    pool = converged or found.judged
+    best = pool[0]
+    scale = max(1.0, best.fitted.fit.reduced_chi2)
+    rivals = [one for one in pool[1:] if best.evidence - one.evidence < bench.options.separation * scale]
+    return best, rivals
+
+
+def _pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
+    options = bench.options
+    best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
+    best.gates["converged"] = best.fitted.fit.converged
+    best.gates["detect"] = best.p < options.detection_level
+    if best.prediction is not None:
+        bounds = held_out_bounds(best, options).values()
+        helps = any(low > 0 for low, _ in bounds)
+        best.gates["hold-out"] = bool(helps and all(high > _HARM for _, high in bounds))
+    best.gates["separate"] = not rivals
+    best.gates["admissible"] = admissible(best)[0]
+    best.gates["stable"] = stable(best, base, options) >= _INCLUSION
+
+
+def _ceiling_of(bench: Bench, one: Judged, base: Fitted) -> float:
+    one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
+    one.gates["adequate"], share = adequate(one, base, bench.options)
+    return share
+
+
+def _conclude(decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
+    """A name, if every gate is passed; else what it could be."""
+    decision.accepted = [best]
+    failed = [gate for gate, passed in best.gates.items() if not passed]
+    decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
+    decision.rivals = rivals
+    decision.alternatives = [list(one.fitted.names) for one in rivals]
+    if failed == []:
+        decision.outcome = "named"
+    elif failed == ["separate"] or rivals:
+        decision.outcome = "ambiguous"
+        decision.equivalent = all(_equivalent(decision, best, one) for one in rivals)
+    elif best.gates["admissible"] and best.gates["converged"]:
+        decision.outcome = "ambiguous"
+    else:
+        decision.outcome = "not-in-catalogue"
+        decision.accepted, decision.alternatives = [], []
+    return decision
+
+
+def _equivalent(decision: Decision, one: Judged, other: Judged) -> bool:
+    return other.name in BY_NAME[one.name].equivalent
+
+
+def _without_name(bench: Bench, decision: Decision) -> Decision:
+    """Nothing in the catalogue helps: either there is no gap, or the catalogue lacks what makes it."""
+    if decision.base_ceiling.p < 0.3 * bench.options.detection_level:
+        decision.outcome = "not-in-catalogue"
+        decision.reasons.append(
+            f"forces that depend on {decision.base_ceiling.best.name} would explain more than chance, no effect does"
+        )
+    return decision
+
+
+def _with_more(bench: Bench, decision: Decision, base: Fitted, best: Judged, rivals: list[Judged]) -> Decision:
+    """One effect is not enough: try a second on top of the best, and the pairs that the screen finds."""
+    if bench.options.most_effects < 2:
+        return _give_up(decision)
+    second = run_round(bench, best.fitted, best.prediction, 0.75, 0.9)
+    decision.rounds.append(second)
+    pairs = [_over_base(bench, base, decision.foretold, one) for one in second.judged]
+    tried = {frozenset(one.fitted.names) for one in pairs}
+    for _, one, other in pair_gains(decision.rounds[0])[:_PAIRS]:
+        if frozenset((one, other)) not in tried:
+            made = _fit_pair(bench, decision.rounds[0], one, other)
+            if made is not None:
+                pairs.append(_over_base(bench, base, decision.foretold, made))
+                tried.add(frozenset((one, other)))
+    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one)[0]]
+    if not pairs:
+        return _give_up(decision)
+    pairs.sort(key=lambda one: -one.evidence)
+    pair = pairs[0]
+    scale = max(1.0, pair.fitted.fit.reduced_chi2)
+    close = [one for one in pairs[1:] if pair.evidence - one.evidence < bench.options.separation * scale]
+    _pass_gates(bench, pair, base, close, len(second.judged))
+    # both must be needed: each over the other alone
+    singles = {one.name: one for one in decision.rounds[0].judged}
+    for name in pair.fitted.names:
+        others = [other for other in pair.fitted.names if other != name]
+        without = singles.get(others[0]) if len(others) == 1 else None
+        if without is not None and pair.evidence - without.evidence < 2 * bench.options.separation:
+            pair.gates["drop"] = False
+    share = _ceiling_of(bench, pair, base)
+    decision.shares.append(share)
+    if pair.gates["adequate"] and pair.gates.get("drop", True):
+        return _conclude(decision, pair, close)
+    return _give_up(decision)
+
+
+def _over_base(bench: Bench, base: Fitted, foretold: Prediction | None, one: Judged | Fitted) -> Judged:
+    """Evidence of a pair over the base, all parameters of both effects counted."""
+    fitted = one.fitted if isinstance(one, Judged) else one
+    prediction = one.prediction if isinstance(one, Judged) else bench.foretell(fitted)
+    added = tuple(i for i, free in enumerate(fitted.problem.free) if _is_added(free.path, base))
+    whole = Fitted(fitted.names, fitted.model, fitted.problem, fitted.fit, added, fitted.tries)
+    return judged(base, foretold, whole, prediction)
+
+
+def _is_added(path: str, base: Fitted) -> bool:
+    return path.startswith("effect.") and path not in base.model.parameters
+
+
+def _fit_pair(bench: Bench, found: Round, one: str, other: str) -> Fitted | None:
+    """The second effect on top of a fit of the first."""
+    singles = {single.name: single for single in found.judged}
+    if one not in singles:
+        one, other = other, one
+    if one not in singles:
+        return None
+    from separatrix.discovery.catalogue import candidate
+    from separatrix.discovery.machine import with_values
+    from separatrix.discovery.screen import screen, signature
+
+    fitted = singles[one].fitted
+    free = with_values(fitted.problem.free, fitted.fit.values)
+    made = candidate(fitted.model, free, fitted.names, other, bench.scales)
+    if isinstance(made, str):
+        return None
+    shown = signature(fitted.problem, fitted.fit, made)
+    screened = None if shown is None else screen(fitted.fit, [shown])
+    return refit(bench.training, fitted, made, screened, quick=True)
+
+
+def _give_up(decision: Decision) -> Decision:
+    decision.outcome = "not-in-catalogue"
+    decision.reasons.append("the best effects of the catalogue leave a gap that a flexible force would close")
+    return decision

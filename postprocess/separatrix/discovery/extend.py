@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is written: the verdict, the case with the effect added, the numbers behind the figures."""
+
+import json
+import os
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from separatrix.discovery.ceiling import sample_times
+from separatrix.discovery.refit import Fitted
+from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
+from separatrix.discovery.verdict import Findings
+from separatrix.errors import CANNOT_CREATE, SeparatrixError
+
+
+def write_all(folder: Path, verdict: dict, findings: Findings) -> list[Path]:
+    """Write verdict.json, extended.toml (where effects were named) and details.h5; all or nothing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as name:
+            work = Path(name)
+            made = [work / "verdict.json", work / "details.h5"]
+            made[0].write_text(json.dumps(plain(verdict), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            write_details(made[1], findings)
+            if findings.decision.accepted:
+                made.append(work / "extended.toml")
+                made[-1].write_text(extended_case(verdict, findings), encoding="utf-8")
+            for path in made:
+                os.replace(path, folder / path.name)
+    except OSError as error:
+        raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
+    return [folder / path.name for path in made]
+
+
+def plain(value: object) -> object:
+    """Numbers that JSON knows; what is not finite becomes null."""
+    if isinstance(value, dict):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def extended_case(verdict: dict, findings: Findings) -> str:
+    """The base case with the effect and all fitted values: an ordinary case file."""
+    fitted = findings.decision.accepted[0].fitted
+    records = ", ".join(f"{one['name']} ({one['use']})" for one in verdict["records"])
+    lines = [
+        f"# Written by separatrix-discover {verdict['version']}: {', '.join(fitted.names)} added.",
+        f"# Outcome: {verdict['outcome']}; records: {records}.",
+    ]
+    if verdict["alternatives"]:
+        lines.append(f"# Not told apart from: {', '.join(verdict['alternatives'])}.")
+    for path in fitted.model.parameters:
+        found = verdict["parameters"].get(path)
+        if found:
+            unit = "" if found["unit"] == "1" else f" {found['unit']}"
+            lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
+    return "\n".join([*lines, fitted.model.to_text(machine_values(fitted))])
+
+
+def machine_values(fitted: Fitted) -> dict[str, float]:
+    """Values of the machine as fitted, with the drive at the ratio of the case."""
+    values = {
+        one.path: one.physical(value)
+        for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
+        if not one.is_nuisance
+    }
+    for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
+        if one.path == "nuisance:drive_scale":
+            values |= {path: float(value) * size for path, size in fitted.problem.amplitudes.items()}
+    return values
+
+
+def write_details(path: Path, findings: Findings) -> None:
+    """Numbers behind the figures: see docs/discovery-guide.md for the layout."""
+    decision, bench = findings.decision, findings.bench
+    final = decision.accepted[0] if decision.accepted else None
+    with h5py.File(path, "w") as file:
+        for one in findings.maps:
+            group = file.create_group(f"where/{one.name}")
+            group.attrs["unit"] = one.unit
+            group["edges"] = one.edges
+            if one.other_edges is not None:
+                group["velocity_edges"] = one.other_edges
+            for name in ("force", "error", "flagged"):
+                group[name] = getattr(one, name)
+        screened = decision.rounds[0].screened
+        file["confusability/names"] = np.array(screened.names, dtype=h5py.string_dtype())
+        file["confusability/matrix"] = screened.cosines
+        _write_fits(file, "training", findings.base, final.fitted if final else None)
+        if decision.foretold is not None:
+            before = decision.foretold
+            after = final.prediction if final else None
+            _write_fits(file, "held_out", before, after)
+        for data in (bench.training, bench.held_out):
+            for prepared, smoothed in zip(data.prepared, data.smoothed, strict=True) if data else ():
+                group = file.create_group(f"records/{prepared.record.name}")
+                group.attrs["sigma"] = prepared.sigma
+                group.attrs["held_out"] = data is bench.held_out
+                group["t"], group["x"] = prepared.record.t, prepared.record.x
+                group["smoothed"] = smoothed.state
+                group["smoothed_error"] = np.sqrt(np.einsum("kii->ki", smoothed.covariance))
+                group["impacts"] = impact_table(smoothed)
+                group["impacts"].attrs["columns"] = "t x v_before v_after v_before_error v_after_error"
+                group["reversals"] = reversals(smoothed)
+                group["stick"] = np.array(stick_intervals(smoothed)).reshape(-1, 2)
+
+
+def _write_fits(file: h5py.File, use: str, before: object, after: object | None) -> None:
+    """Residuals and motion of each record as fitted, by the base and by the extended machine."""
+    for name, fitted in (("before", before), ("after", after)):
+        if fitted is None:
+            continue
+        problem, fit = fitted.problem, fitted.fit
+        times = sample_times(problem)
+        for number, prepared in enumerate(problem.prepared):
+            rows = np.flatnonzero(problem.segments.record == number)
+            inside = problem.segments.inside[rows]
+            first = prepared.record.t[problem.segments.first[rows]]
+            group = file.create_group(f"{use}/{prepared.record.name}/{name}")
+            group["t"] = (times[rows] + first[:, None])[inside]
+            group["segment"] = np.broadcast_to(np.arange(rows.size)[:, None], inside.shape)[inside]
+            group["x"], group["v"] = fit.evaluation.x[rows][inside], fit.evaluation.v[rows][inside]
+            length = inside.shape[1]
+            group["residual"] = fit.evaluation.residual[rows, :length][inside]
+            group["good"] = fit.good[rows]
+            impacts = fit.evaluation.impacts[number]
+            group["impacts"] = np.zeros((0, 5)) if impacts is None else impacts
+            group["impacts"].attrs["columns"] = "segment time speed_before speed_after side"

@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Least squares over many short segments: each start is eliminated block by block, the common parameters remain.
+
+The normal equations of a Levenberg-Marquardt step have the form of an arrow: one 2 x 2 block per segment, coupled
+only through the parameters. Their Schur complement has the size of the parameters (tests/python/test_discovery_fit.py
+compares it with the dense step).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.problem import Evaluation, Problem
+
+_HUBER = 1.5
+_TOLERANCE = 0.02
+_TINY = 1e-12
+_STRONGEST = 1e8
+
+
+@dataclass
+class Blocks:
+    """Normal equations by segment; columns are the start (2), then the parameters."""
+
+    matrix: np.ndarray
+    gradient: np.ndarray
+
+
+@dataclass
+class Reduced:
+    """What is left of the segments after their starts are eliminated: per segment, to be summed or resampled."""
+
+    matrix: np.ndarray
+    gradient: np.ndarray
+
+    def total(self, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Sum over the segments, each counted `weights` times."""
+        if weights is None:
+            return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
+        return np.tensordot(weights, self.matrix, 1), np.tensordot(weights, self.gradient, 1)
+
+
+@dataclass
+class Fit:
+    """The end of a minimisation; `decrement` is the chi^2 that a further Gauss-Newton step promises."""
+
+    values: np.ndarray
+    starts: np.ndarray
+    evaluation: Evaluation
+    reduced: Reduced
+    chi2: np.ndarray
+    counts: np.ndarray
+    decrement: float
+    iterations: int
+    at_bound: np.ndarray
+
+    @property
+    def converged(self) -> bool:
+        """Certificate: no step is left that would matter."""
+        return bool(self.decrement < max(0.1, 1e-4 * self.total) and np.isfinite(self.decrement))
+
+    @property
+    def good(self) -> np.ndarray:
+        """Segments that were flown and whose impacts are steady."""
+        return self.evaluation.steady & ~self.evaluation.failed & (self.counts > 0)
+
+    @property
+    def total(self) -> float:
+        """Sum of squares over the good segments."""
+        return float(self.chi2[self.good].sum())
+
+    @property
+    def freedom(self) -> int:
+        """Residuals less unknowns, over the good segments."""
+        good = self.good
+        return int(self.counts[good].sum() - 2 * good.sum() - (~self.at_bound).sum())
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Sum of squares per degree of freedom."""
+        return self.total / max(1, self.freedom)
+
+
+def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:
+    """Normal equations of each segment."""
+    whole = np.concatenate([by_start, columns], axis=2)
+    weighted = (whole * weights[:, :, None]).transpose(0, 2, 1)
+    return Blocks(weighted @ whole, (weighted @ residual[:, :, None])[:, :, 0])
+
+
+def eliminate(blocks: Blocks, damping: float = 0.0) -> tuple[Reduced, np.ndarray, np.ndarray]:
+    """Schur complement by segment; also the inverse start blocks and the couplings, to find the starts again."""
+    start = blocks.matrix[:, :2, :2].copy()
+    diagonal = np.einsum("kii->ki", start)
+    diagonal *= 1 + damping
+    diagonal += _TINY * (diagonal.max(axis=1, keepdims=True, initial=0) + 1e-300)
+    determinant = start[:, 0, 0] * start[:, 1, 1] - start[:, 0, 1] * start[:, 1, 0]
+    safe = np.where(determinant > 0, determinant, 1)
+    inverse = np.empty_like(start)
+    inverse[:, 0, 0], inverse[:, 1, 1] = start[:, 1, 1] / safe, start[:, 0, 0] / safe
+    inverse[:, 0, 1] = inverse[:, 1, 0] = -start[:, 0, 1] / safe
+    inverse[determinant <= 0] = 0
+    coupling = blocks.matrix[:, :2, 2:]
+    carried = coupling.transpose(0, 2, 1) @ inverse
+    matrix = blocks.matrix[:, 2:, 2:] - carried @ coupling
+    gradient = blocks.gradient[:, 2:] - (carried @ blocks.gradient[:, :2, None])[:, :, 0]
+    return Reduced(matrix, gradient), inverse, coupling
+
+
+def solve_scaled(matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float = 0.0) -> np.ndarray:
+    """Solve for the open unknowns in units of their own diagonal; directions without information stay."""
+    step = np.zeros(gradient.size)
+    diagonal = np.diag(matrix)
+    open_ = open_ & (diagonal > 0)
+    if not open_.any():
+        return step
+    scale = 1 / np.sqrt(diagonal[open_])
+    scaled = matrix[np.ix_(open_, open_)] * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    kept = values > 1e-11
+    inverse = np.where(kept, 1 / np.where(kept, values + damping, 1), 0)
+    step[open_] = scale * (vectors @ (inverse * (vectors.T @ (scale * gradient[open_]))))
+    return step
+
+
+def gauss_newton_step(blocks: Blocks, open_: np.ndarray, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray, float]:
+    """Steps of the starts and the parameters, and the decrease of chi^2 that the linear model promises."""
+    reduced, inverse, coupling = eliminate(blocks, damping)
+    matrix, gradient = reduced.total()
+    step = solve_scaled(matrix, gradient, open_, damping)
+    back = blocks.gradient[:, :2] - (coupling @ step[None, :, None])[:, :, 0]
+    starts = (inverse @ back[:, :, None])[:, :, 0]
+    whole = np.concatenate([starts, np.broadcast_to(step, (starts.shape[0], step.size))], axis=1)
+    bent = (blocks.matrix @ whole[:, :, None])[:, :, 0]
+    promised = float(np.sum(whole * (2 * blocks.gradient - bent)))
+    return starts, step, promised
+
+
+def minimise(
+    problem: Problem,
+    values: np.ndarray,
+    starts: np.ndarray,
+    *,
+    robust: bool = False,
+    most: int = 25,
+    tolerance: float = _TOLERANCE,
+    fixed: np.ndarray | None = None,
+    hopeless: float | None = None,
+) -> Fit:
+    """Minimise the sum of squares (or Huber's, `robust`); stop early above `hopeless` times the wanted chi^2."""
+    lower = np.array([one.lower for one in problem.free])
+    upper = np.array([one.upper for one in problem.free])
+    movable = np.ones(values.size, bool) if fixed is None else ~fixed
+    values = np.clip(values, lower, upper)
+    damping = 1e-4
+    current = problem.evaluate(values, starts)
+    decrement, iterations = np.inf, 0
+    open_ = movable
+    while iterations < most:
+        iterations += 1
+        weights, scale = _weights(current, robust)
+        blocks = blocks_of(current.by_start, current.by_parameter, current.residual, weights)
+        open_ = _open(blocks, values, lower, upper, movable)
+        _, _, decrement = gauss_newton_step(blocks, open_)
+        if decrement < max(tolerance, 1e-5 * _cost(current, weights > 0, scale, robust)):
+            break
+        good = ~current.failed & current.steady
+        before = _costs(current, scale, robust)
+        accepted = False
+        while damping < _STRONGEST:
+            start_step, step, promised = gauss_newton_step(blocks, open_, damping)
+            tried = np.clip(values + step, lower, upper)
+            trial = problem.evaluate(tried, starts + start_step, derivatives=False)
+            both = good & ~trial.failed
+            gain = float((before - _costs(trial, scale, robust))[both].sum())
+            lost = int((good & trial.failed).sum())
+            if gain > 0 and lost <= 0.02 * good.sum():
+                accepted = True
+                break
+            damping = max(10 * damping, 1e-6)
+        if not accepted:
+            break
+        values, starts = tried, starts + start_step
+        damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
+        current = problem.evaluate(values, starts)
+        if gain < tolerance:
+            decrement = min(decrement, gain)
+            break
+        if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():
+            mean = before[both].sum() / max(1, current.used[both].sum())
+            if mean > hopeless:
+                break
+    return _finished(problem, values, starts, current, decrement, iterations, ~_open_at(values, lower, upper))
+
+
+def _finished(problem, values, starts, current, decrement, iterations, at_bound) -> Fit:
+    weights = _weights(current, robust=False)[0]
+    blocks = blocks_of(current.by_start, current.by_parameter, current.residual, weights)
+    reduced, _, _ = eliminate(blocks)
+    chi2 = np.sum(current.used * current.residual**2, axis=1)
+    counts = current.used.sum(axis=1)
+    return Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound)
+
+
+def _open_at(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    return (values > lower) & (values < upper)
+
+
+def _open(blocks: Blocks, values: np.ndarray, lower: np.ndarray, upper: np.ndarray, movable: np.ndarray) -> np.ndarray:
+    """Unknowns that may move: not those at a bound that the step would leave."""
+    open_ = movable.copy()
+    for _ in range(values.size):
+        _, step, _ = gauss_newton_step(blocks, open_)
+        out = open_ & (((values <= lower) & (step < 0)) | ((values >= upper) & (step > 0)))
+        if not out.any():
+            return open_
+        open_ = open_ & ~out
+    return open_
+
+
+def _weights(current: Evaluation, robust: bool) -> tuple[np.ndarray, float]:
+    """Weights of the residuals, and the residual beyond which Huber's loss is linear."""
+    used = current.used * (current.steady & ~current.failed)[:, None]
+    size = np.abs(current.residual)
+    inside = used > 0
+    scale = _HUBER * max(1.0, 1.4826 * float(np.median(size[inside])) if inside.any() else 1.0)
+    if robust:
+        used = used * np.minimum(1, scale / np.maximum(size, 1e-300))
+    return used, scale
+
+
+def _costs(current: Evaluation, scale: float, robust: bool) -> np.ndarray:
+    """Loss of each segment."""
+    size = np.abs(current.residual)
+    loss = np.where(size <= scale, size**2, 2 * scale * size - scale**2) if robust else size**2
+    return np.sum(current.used * loss, axis=1)
+
+
+def _cost(current: Evaluation, inside: np.ndarray, scale: float, robust: bool) -> float:
+    return float(_costs(current, scale, robust)[inside.any(axis=1)].sum())

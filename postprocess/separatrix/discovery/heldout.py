@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How well a fitted machine foretells records that the fit never saw.
+
+Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its clock. The
+score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted parameters.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.fit import Fit
+from separatrix.discovery.machine import Free, record_nuisances
+from separatrix.discovery.problem import Problem
+
+
+@dataclass
+class Prediction:
+    """Scores by segment of held-out records (up to a constant), and the fit of their starts."""
+
+    score: np.ndarray
+    good: np.ndarray
+    record: np.ndarray
+    problem: Problem
+    fit: Fit
+    shared: int
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Sum of squares per degree of freedom; the parameters of the machine were not fitted."""
+        good = self.good
+        freedom = self.fit.counts[good].sum() - 2 * good.sum() - (len(self.problem.free) - self.shared)
+        return float(self.fit.chi2[good].sum() / max(1, freedom))
+
+
+def predict(data: Data, model, free: list[Free], values: np.ndarray, covariance: np.ndarray) -> Prediction:
+    """Score held-out records by the machine with `values`, known up to `covariance`, of its free parameters."""
+    shared = [i for i, one in enumerate(free) if one.record is None]
+    own = record_nuisances([one.phase_known for one in data.prepared]) if data.prepared[0].frequency else []
+    whole = [free[i] for i in shared] + own
+    start = np.concatenate([values[shared], np.zeros(len(own))])
+    fixed = np.arange(len(whole)) < len(shared)
+    problem, fit = _fit_own(data, model, whole, start, fixed)
+    used = covariance[np.ix_(shared, shared)]
+    return Prediction(
+        _scores(fit, used, len(shared)), fit.good, problem.segments.record, problem, fit, len(shared)
+    )
+
+
+def _fit_own(data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray) -> tuple[Problem, Fit]:
+    return fit_stages(data, model, free, values, stages=list(range(len(data.stages))), most=12, fixed=fixed)
+
+
+def _scores(fit: Fit, covariance: np.ndarray, shared: int) -> np.ndarray:
+    """Log density of each segment, its start free and the parameters of the machine known up to their covariance."""
+    values, vectors = np.linalg.eigh(covariance) if shared else (np.zeros(0), np.zeros((0, 0)))
+    root = vectors * np.sqrt(np.maximum(values, 0))
+    matrix = root.T @ fit.reduced.matrix[:, :shared, :shared] @ root
+    gradient = (root.T @ fit.reduced.gradient[:, :shared, None])[:, :, 0]
+    spread = matrix + np.eye(shared)
+    explained = np.einsum("ki,ki->k", gradient, np.linalg.solve(spread, gradient[:, :, None])[:, :, 0])
+    _, logarithm = np.linalg.slogdet(spread)
+    return -0.5 * (fit.chi2 - explained) - 0.5 * logarithm

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Evidence of the candidates and the five gates that a name has to pass."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import chi2
+
+from separatrix.discovery.ceiling import Ceiling
+from separatrix.discovery.heldout import Prediction
+from separatrix.discovery.options import Options
+from separatrix.discovery.refit import Fitted, gain_over
+
+_INCLUSION = 0.9
+_BLOCKS = 2
+
+
+@dataclass
+class Judged:
+    """A candidate with its evidence: log-likelihood gained in training, log score gained on held-out records."""
+
+    fitted: Fitted
+    prediction: Prediction | None
+    training: float
+    held_out: float
+    held_out_parts: np.ndarray
+    parameters: int
+    p: float = 1.0
+    gates: dict[str, bool] = field(default_factory=dict)
+    ceiling: Ceiling | None = None
+
+    @property
+    def name(self) -> str:
+        """The effect that was added last."""
+        return self.fitted.names[-1]
+
+    @property
+    def evidence(self) -> float:
+        """Log-likelihood gained, less one per parameter (Akaike), plus the score on what was not fitted."""
+        return self.training - self.parameters + self.held_out
+
+
+def judged(base: Fitted, foretold: Prediction | None, fitted: Fitted, prediction: Prediction | None) -> Judged:
+    """Evidence of a candidate over the base."""
+    training, _ = gain_over(fitted, base)
+    parts = np.zeros(0)
+    if prediction is not None:
+        both = prediction.good & foretold.good
+        parts = np.where(both, prediction.score - foretold.score, 0.0)
+    live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
+    return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
+
+
+def detection(one: Judged, tested: int, inflation: float) -> float:
+    """Family-wise p value of what a candidate gained, for as many candidates as were tested."""
+    single = chi2.sf(max(0.0, 2 * (one.training + one.held_out)) / inflation, one.parameters)
+    return float(-np.expm1(tested * np.log1p(-min(single, 1 - 1e-16))))
+
+
+def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
+    """Lower and upper 5 % bound of the score gained in each held-out record, by resampling blocks of segments."""
+    bounds = {}
+    random = np.random.default_rng([options.seed, 11])
+    for number in np.unique(one.prediction.record):
+        parts = one.held_out_parts[one.prediction.record == number]
+        sums = _block_sums(parts, random, options.bootstraps)
+        bounds[int(number)] = (float(np.quantile(sums, 0.05)), float(np.quantile(sums, 0.95)))
+    return bounds
+
+
+def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> np.ndarray:
+    """Totals of resampled series of the same length, drawn in blocks of neighbours (circular)."""
+    n = parts.size
+    blocks = -(-n // _BLOCKS)
+    first = random.integers(0, n, (count, blocks))
+    index = (first[:, :, None] + np.arange(_BLOCKS)) % n
+    return parts[index].sum(axis=(1, 2))
+
+
+def stable(one: Judged, base: Fitted, options: Options) -> float:
+    """Share of block bootstraps of the segments in which the effect still pays for its parameters, linearised."""
+    fit = one.fitted.fit
+    added = np.array(one.fitted.added)
+    added = added[~fit.at_bound[added]]
+    if not added.size:
+        return 0.0
+    random = np.random.default_rng([options.seed, 12])
+    _, parts = gain_over(one.fitted, base)
+    sums = _block_sums(parts, random, options.bootstraps)
+    return float(np.mean(sums > one.parameters))
+
+
+def admissible(one: Judged) -> tuple[bool, str]:
+    """Signs and bounds: the effect is not at a bound, differs from nothing, and what it is added to stays sensible."""
+    fit, free = one.fitted.fit, one.fitted.problem.free
+    errors = np.sqrt(np.diag(one.fitted.covariance))
+    clear = []
+    for i in one.fitted.added:
+        if fit.at_bound[i]:
+            continue
+        # the logarithm of a number says by its error whether the number is known at all
+        size = 1.0 if free[i].positive else abs(fit.values[i])
+        clear.append(size > 1.96 * errors[i] > 0)
+    if not clear:
+        return False, "its parameters are at their bounds: the wrong sign"
+    if not any(clear):
+        return False, "its 95 % intervals contain zero"
+    for i, value in enumerate(fit.values):
+        if free[i].path == "nuisance:drive_scale" and not 0.5 < value < 2:
+            return False, f"it would need a drive {value:.3g} times the stated one"
+    return True, ""
+
+
+def adequate(one: Judged, base: Fitted, options: Options) -> tuple[bool, float]:
+    """Whether what is left is noise, and the share of the closable gap that is closed."""
+    gained = max(0.0, 2 * one.training)
+    share = gained / max(gained + one.ceiling.closable, 1e-300)
+    clean = one.ceiling.p > options.detection_level
+    small = one.fitted.fit.reduced_chi2 <= options.adequate_chi2
+    return bool(small and (clean or (share >= options.adequate_share and one.ceiling.p > 1e-4))), share

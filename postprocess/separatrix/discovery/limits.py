@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What could not have been seen, and the experiment that would tell rivals apart."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from separatrix.discovery.catalogue import BY_NAME, Candidate
+from separatrix.discovery.refit import Fitted
+from separatrix.discovery.rounds import Bench, Round
+from separatrix.discovery.screen import screen, signature
+
+_LADDER = 4.0 ** np.arange(-3, 4)
+_RATIOS = np.linspace(0.6, 1.5, 19)
+_PERIODS = 3
+_ADVICE = {
+    frozenset(("offset_force", "asymmetric_friction")): "stop the drive and let the body stick: the middle between the "
+    "places where it breaks away in either direction is off by force/stiffness for a constant force, not for friction "
+    "that differs with the direction",
+    frozenset(("offset_force", "sensor_bias")): "measure the place of the barrier: the sensor's error shifts it, a "
+    "force does not",
+    frozenset(("asymmetric_friction", "sensor_bias")): "measure the place of the barrier: the sensor's error shifts it, "
+    "friction does not",
+    frozenset(("sensor_gain", "sensor_bias")): "calibrate the sensor at two known positions",
+    frozenset(("sensor_gain", "offset_force")): "calibrate the sensor at two known positions",
+    frozenset(("sensor_gain", "asymmetric_friction")): "calibrate the sensor at two known positions",
+    frozenset(("sensor_delay", "drive_ripple")): "record the crank angle phi with the position",
+}
+
+
+def detectable(bench: Bench, found: Round) -> dict[str, dict]:
+    """Smallest size of each effect that these records would have shown at `visible` standard errors."""
+    sizes = {}
+    for name, made in found.candidates.items():
+        if name not in found.screened.names:
+            continue
+        path = made.free[made.added[0]].path
+        unit = made.model.parameters[path].unit
+        if made.absent is not None and found.screened.live[name][0]:
+            size = bench.options.visible * float(found.screened.error[name][0]) * made.free[made.added[0]].size
+        elif made.absent is None and not bench.options.quick:
+            size = _by_ladder(bench, found, made)
+        else:
+            continue
+        sizes[name] = {"size": size, "path": path, "unit": unit}
+    return sizes
+
+
+def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
+    """The size at which d' is what counts as visible, between the rungs of a ladder around the usual size."""
+    place = made.added[0]
+    usual = made.free[place].physical(made.free[place].value)
+    if made.names[-1] == "second_barrier":
+        depths = np.abs(bench.scales.highest - bench.scales.lowest) * 0.002 * _LADDER
+        inward = 1 if usual < 0.5 * (bench.scales.highest + bench.scales.lowest) else -1
+        edge = bench.scales.lowest if inward > 0 else bench.scales.highest
+        rungs = edge + inward * depths
+    else:
+        rungs = usual * _LADDER
+    visible = []
+    for rung in rungs:
+        free = list(made.free)
+        free[place] = replace(free[place], value=float(np.log(rung) if free[place].positive else rung))
+        shown = signature(found.base.problem, found.base.fit, replace(made, free=free))
+        if shown is None:
+            visible.append(0.0)
+            continue
+        error = screen(found.base.fit, [shown]).error[made.names[-1]]
+        visible.append(float(1 / error[0]) if error.size else 0.0)
+    logarithm = np.log(np.maximum(visible, 1e-12))
+    wanted = np.log(bench.options.visible)
+    crossings = np.flatnonzero((logarithm[:-1] - wanted) * (logarithm[1:] - wanted) <= 0)
+    if not crossings.size:
+        return None
+    i = int(crossings[0])
+    share = (wanted - logarithm[i]) / (logarithm[i + 1] - logarithm[i])
+    return float(rungs[i] + share * (rungs[i + 1] - rungs[i]))
+
+
+def separating_experiment(bench: Bench, one: Fitted, others: list[Fitted]) -> str:
+    """What to measure next so that rivals part: known advice, else the drive ratio at which they differ most."""
+    for other in others:
+        advice = _ADVICE.get(frozenset((one.names[-1], other.names[-1])))
+        if advice:
+            return advice
+    if not others or bench.training.prepared[0].frequency is None:
+        return ""
+    other = others[0]
+    apart = [_distance(bench, one, other, float(ratio)) for ratio in _RATIOS]
+    if not np.isfinite(apart).any():
+        return ""
+    best = int(np.nanargmax(apart))
+    return (
+        f"a record at drive ratio {_RATIOS[best]:.2f}, where {_label(one)} and {_label(other)} differ by "
+        f"{apart[best]:.3g} m after {_PERIODS} drive periods"
+    )
+
+
+def _label(fitted: Fitted) -> str:
+    return " with ".join(fitted.names)
+
+
+def _distance(bench: Bench, one: Fitted, other: Fitted, ratio: float) -> float:
+    """Root mean square of the difference of two machines over some periods from the starts of the records."""
+    starts = one.fit.starts[:: max(1, one.fit.starts.shape[0] // 12)]
+    seen = []
+    for fitted in (one, other):
+        values = fitted.problem.machine_values(0, fitted.fit.values) | {"drive.ratio": ratio}
+        period = 2 * np.pi / fitted.model.drive_frequency(values)
+        times = np.tile(np.linspace(0, _PERIODS * period, 60), len(starts))
+        state = np.column_stack([starts, np.zeros(len(starts))])
+        first = np.arange(len(starts) + 1) * 60
+        flown = fitted.model.segments(list(values), np.array(list(values.values())), state, first, times, derivatives=False)
+        seen.append(flown.x)
+    difference = seen[0] - seen[1]
+    return float(np.sqrt(np.nanmean(difference**2))) if np.isfinite(difference).any() else np.nan
+
+
+def equivalents(names: list[str]) -> list[str]:
+    """Why effects of the catalogue are the same motion, in words."""
+    return [
+        f"{one} and {other}: {BY_NAME[one].equivalent[other]}"
+        for i, one in enumerate(names)
+        for other in names[i + 1 :]
+        if other in BY_NAME.get(one).equivalent
+    ]

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is free in a fit: parameters of the machine, drive scale, zero of the crank, clock of each record."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+# Not fitted: a scale of all forces, or what an offset force cannot be told from.
+_FIXED = (
+    "body.gravity",
+    "restoring.free_length",
+    "drive.mean",
+    "drive.angle",
+    "drive.ratio",
+    "drive.interval",
+)
+_FIXED_ENDS = ("exponent", "harmonic", "tension")
+_AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
+_TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
+_NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
+_UNBOUNDED = 1e100
+
+
+@dataclass(frozen=True)
+class Free:
+    """One free number of a fit; `path` of the machine, or a nuisance (`nuisance:...`) of all records or of one.
+
+    A `positive` one is fitted by its logarithm, which `value`, `lower` and `upper` are of.
+    """
+
+    path: str
+    value: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    size: float = 1.0
+    record: int | None = None
+    positive: bool = False
+
+    def physical(self, value: float) -> float:
+        """The number itself, from what is fitted."""
+        return float(np.exp(value)) if self.positive else float(value)
+
+    def slope(self, value: float) -> float:
+        """Derivative of the number by what is fitted."""
+        return float(np.exp(value)) if self.positive else 1.0
+
+    @property
+    def is_nuisance(self) -> bool:
+        """Whether this is no parameter of the case file."""
+        return self.path.startswith("nuisance:")
+
+
+def base_parameters(model, measured_force: bool) -> list[Free]:
+    """The parameters of the base machine that a record can say something about."""
+    free = []
+    for path, parameter in model.parameters.items():
+        if not _is_fitted(path, measured_force) or _is_tied(path, model):
+            continue
+        value = float(parameter.value)
+        if abs(value) >= _UNBOUNDED:
+            continue
+        lower, upper = bounds_of(parameter)
+        if path.endswith(_NEVER_ZERO):
+            lower = max(lower, 1e-3 * value)
+        free.append(Free(path, value, lower, upper, _size(path, value, model)))
+    return free
+
+
+def _is_fitted(path: str, measured_force: bool) -> bool:
+    if path == "body.mass":
+        return measured_force
+    if path.startswith(_AMPLITUDES) or path in _FIXED or path.endswith(_FIXED_ENDS):
+        return False
+    return path.split(".")[0] in ("restoring", "friction", "contact", "drive", "effect")
+
+
+def _is_tied(path: str, model) -> bool:
+    other = _TIED.get(path)
+    parameters = model.parameters
+    return other in parameters and parameters[path].value == parameters[other].value
+
+
+def bounds_of(parameter) -> tuple[float, float]:
+    """Bounds of a parameter, infinite where there are none."""
+    lower = -np.inf if parameter.lower is None or parameter.lower < -_UNBOUNDED else float(parameter.lower)
+    upper = np.inf if parameter.upper is None or parameter.upper > _UNBOUNDED else float(parameter.upper)
+    return lower, upper
+
+
+def _size(path: str, value: float, model) -> float:
+    return abs(value) if value else 1.0
+
+
+def drive_amplitudes(model) -> dict[str, float]:
+    """The coefficients of the drive that one scale multiplies."""
+    return {
+        path: float(parameter.value)
+        for path, parameter in model.parameters.items()
+        if path.startswith(_AMPLITUDES) and parameter.value != 0
+    }
+
+
+def drive_nuisances(model, phase_known: list[bool]) -> list[Free]:
+    """Scale of the drive, zero of the crank and clock of each record; the zero is known where phi was measured."""
+    if "drive.ratio" not in model.parameters or not model.parameters["drive.ratio"].value:
+        return []
+    free = []
+    if drive_amplitudes(model):
+        free.append(Free("nuisance:drive_scale", 1.0, 0.2, 5.0, 0.01))
+    return free + record_nuisances(phase_known)
+
+
+def record_nuisances(phase_known: list[bool]) -> list[Free]:
+    """What is free for each record by itself."""
+    free = [Free("nuisance:phase", 0.0, size=0.01, record=i) for i, known in enumerate(phase_known) if not known]
+    return free + [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(len(phase_known))]
+
+
+def with_values(free: list[Free], values: np.ndarray) -> list[Free]:
+    """The same parameters with other values."""
+    return [replace(one, value=float(value)) for one, value in zip(free, values, strict=True)]

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known about a record before anything is fitted: noise, resolution, drive, delay between channels."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from separatrix.discovery.records import Record, resolution_of
+from separatrix.errors import SeparatrixError
+
+# variance of fourth differences of white noise of variance 1
+_FOURTH = 70.0
+_FEWEST_PER_PERIOD = 12
+_FEWEST_PERIODS = 2.0
+# sizes of a record against those of the machine beyond which a unit must be wrong
+_MOST_RATIO = 50.0
+
+
+@dataclass
+class Prepared:
+    """A record with its noise and its drive; `frequency` [rad/s] is None where the machine has no crank."""
+
+    record: Record
+    sigma: float
+    velocity_sigma: float
+    resolution: float
+    # correlation of neighbouring noise
+    memory: float = 0.0
+    sigma_stated: bool = False
+    velocity_sigma_stated: bool = False
+    frequency: float | None = None
+    phase: float = 0.0
+    # known: measured as a channel; stated: in the header, refined by the fit
+    phase_known: bool = False
+    phase_stated: bool = True
+    drive_scale: float = 1.0
+    origin: float = 0.0
+    notes: list[str] = field(default_factory=list)
+
+    def note(self, text: str) -> None:
+        """Keep a remark once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    @property
+    def period_samples(self) -> float | None:
+        """Samples per drive period."""
+        if self.frequency is None:
+            return None
+        return 2 * np.pi / self.frequency / self.record.interval
+
+
+def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
+    """Measure what the header does not say, and refuse what cannot be a record of this machine."""
+    notes = list(record.warnings)
+    resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
+    sigma = _noise(record, rest, resolution, notes)
+    if np.std(record.x) < 5 * sigma:
+        raise SeparatrixError(
+            f"{record.name}: x moves by {np.std(record.x):.3g} m (standard deviation) at a noise of {sigma:.3g} m: "
+            "nothing but noise"
+        )
+    prepared = Prepared(record, sigma, _velocity_noise(record), resolution, notes=notes, origin=record.header.get("phase_origin_s", float(record.t[0])))
+    prepared.drive_scale = record.header.get("drive_scale", 1.0)
+    prepared.sigma_stated = rest is not None or "sensor_noise_sigma_m" in record.header
+    prepared.velocity_sigma_stated = "sensor_noise_sigma_m_s" in record.header
+    _find_drive(prepared, model)
+    _check_size(prepared, model)
+    if record.v is not None:
+        _note_delay(prepared)
+    return prepared
+
+
+def white_noise(x: np.ndarray) -> float:
+    """Standard deviation of the white noise of a smooth, well sampled signal, from its fourth differences."""
+    fourth = np.diff(x, 4)
+    return float(1.4826 * np.median(np.abs(fourth - np.median(fourth))) / np.sqrt(_FOURTH))
+
+
+def _noise(record: Record, rest: Record | None, resolution: float, notes: list[str]) -> float:
+    floor = resolution / np.sqrt(12)
+    stated = record.header.get("sensor_noise_sigma_m")
+    if rest is not None:
+        drift = np.polyval(np.polyfit(rest.t, rest.x, 1), rest.t)
+        sigma = float(np.std(rest.x - drift))
+    elif stated is not None:
+        sigma = float(np.hypot(stated, floor))
+    else:
+        sigma = white_noise(record.x)
+        notes.append(f"noise {sigma:.3g} m, from fourth differences of x")
+    sigma = max(sigma, floor)
+    if sigma <= 0:
+        sigma = 1e-6 * float(np.std(record.x))
+        notes.append(f"no noise found: {sigma:.3g} m is taken")
+    return sigma
+
+
+def _velocity_noise(record: Record) -> float:
+    if record.v is None:
+        return np.inf
+    stated = record.header.get("sensor_noise_sigma_m_s")
+    if stated:
+        return stated
+    return max(white_noise(record.v), resolution_of(record.v) / np.sqrt(12), 1e-6 * float(np.std(record.v)))
+
+
+def _find_drive(prepared: Prepared, model) -> None:
+    record = prepared.record
+    ratio = model.parameters.get("drive.ratio")
+    if ratio is None or not ratio.value:
+        if "drive.interval" in model.parameters and record.force is None:
+            raise SeparatrixError(f"{record.name}: the machine has a measured force, the record has no column 'force'")
+        return
+    if record.phi is not None:
+        slope, start = np.polyfit(record.t - record.t[0], np.unwrap(record.phi), 1)
+        prepared.frequency, prepared.phase, prepared.phase_known = float(slope), float(start), True
+    else:
+        header = record.header
+        if "drive_frequency_rad_s" in header:
+            prepared.frequency = header["drive_frequency_rad_s"]
+        else:
+            if "drive_ratio" not in header:
+                prepared.notes.append(f"no drive_ratio: that of the case, {ratio.value:g}, is taken")
+            values = {"drive.ratio": header.get("drive_ratio", ratio.value)}
+            prepared.frequency = model.drive_frequency(values)
+        prepared.phase = header.get("phase", 0.0)
+        prepared.phase_stated = "phase" in header
+        if not prepared.phase_stated:
+            prepared.notes.append("no phase: it is searched for")
+    samples = prepared.period_samples
+    if samples < _FEWEST_PER_PERIOD:
+        raise SeparatrixError(
+            f"{record.name}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
+        )
+    periods = record.duration / record.interval / samples
+    if periods < _FEWEST_PERIODS:
+        raise SeparatrixError(f"{record.name}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed")
+
+
+def _check_size(prepared: Prepared, model) -> None:
+    """A record far larger or smaller than the machine has the wrong unit or another machine."""
+    sizes = [
+        abs(p.value) for path, p in model.parameters.items() if path.startswith(("drive.cosine", "drive.sine", "drive.amplitude"))
+    ]
+    sizes += [abs(p.value) for path, p in model.parameters.items() if path in ("contact.upper", "contact.lower")]
+    sizes = [size for size in sizes if 0 < size < 1e100]
+    if prepared.frequency is None or not sizes:
+        return
+    spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
+    if not 1 / _MOST_RATIO < spread / expected < _MOST_RATIO:
+        raise SeparatrixError(
+            f"{prepared.record.name}: x ranges over {spread:.3g} m, the machine has lengths of {expected:.3g} m: "
+            "wrong units, or a record of another machine"
+        )
+    for path, sign in (("contact.upper", 1), ("contact.lower", -1)):
+        barrier = model.parameters.get(path)
+        if barrier is None or abs(barrier.value) > 1e100 or _is_soft(model):
+            continue
+        beyond = sign * (prepared.record.x - barrier.value)
+        if np.median(beyond) > 0:
+            row = int(np.argmax(beyond))
+            raise SeparatrixError(
+                f"{prepared.record.name}: x lies beyond {path} = {barrier.value:g} m most of the time "
+                f"(row {row + 1}: {prepared.record.x[row]:g} m): a record of another machine"
+            )
+
+
+def _is_soft(model) -> bool:
+    return "contact.stiffness" in model.parameters
+
+
+def _note_delay(prepared: Prepared) -> None:
+    """Delay of x behind v, from the best overlap of v with the slope of x."""
+    record = prepared.record
+    dt = record.interval
+    slope = np.gradient(record.x, record.t)
+    shifts = np.arange(-4, 5)
+    inner = slice(8, -8)
+    overlap = [float(np.corrcoef(np.roll(record.v, shift)[inner], slope[inner])[0, 1]) for shift in shifts]
+    best = int(np.argmax(overlap))
+    if overlap[best] < 0.5:
+        raise SeparatrixError(f"{record.name}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})")
+    if shifts[best]:
+        prepared.notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")

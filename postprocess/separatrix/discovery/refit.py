@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A candidate fitted with everything else free, from several starts; and two fits compared fairly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.catalogue import Candidate
+from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.fit import Fit, minimise
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.screen import Screened
+
+# a fit this good needs no other start
+_FINE = 1.03
+_HOPELESS = 4.0
+
+
+@dataclass
+class Fitted:
+    """A machine with all its free parameters at their best values."""
+
+    names: tuple[str, ...]
+    model: object
+    problem: Problem
+    fit: Fit
+    added: tuple[int, ...]
+    tries: int = 1
+
+    @property
+    def paths(self) -> list[str]:
+        """Paths of the parameters of the effect that was added last."""
+        return [self.problem.free[i].path for i in self.added]
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of all free parameters, starts projected out, enlarged where the fit is worse than the noise."""
+        matrix = self.fit.reduced.matrix[self.fit.good].sum(axis=0)
+        open_ = np.flatnonzero(~self.fit.at_bound & (np.diag(matrix) > 0))
+        covariance = np.zeros_like(matrix)
+        if open_.size:
+            inner = matrix[np.ix_(open_, open_)]
+            scale = 1 / np.sqrt(np.diag(inner))
+            scaled = np.linalg.pinv(inner * np.outer(scale, scale), rcond=1e-10, hermitian=True)
+            covariance[np.ix_(open_, open_)] = scaled * np.outer(scale, scale)
+        return covariance * max(1.0, self.fit.reduced_chi2)
+
+
+def refit(data: Data, base: Fitted, candidate: Candidate, screened: Screened | None, quick: bool = False) -> Fitted:
+    """The best of several starts: the linearised estimate first, then usual sizes from short segments on."""
+    best = None
+    tries = 0
+    values = _base_values(base, candidate)
+    for kind, start in _starts(candidate, screened):
+        tries += 1
+        tried = values.copy()
+        tried[list(candidate.added)] = start
+        if kind == "linear":
+            problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+            fit = minimise(problem, tried, base.fit.starts, most=25)
+        else:
+            stages = list(range(data.last + 1)) if kind == "far" else [1, data.last]
+            if kind == "far":
+                nominal = np.array([one.value for one in candidate.free])
+                tried = np.where(np.isin(np.arange(tried.size), candidate.added), tried, nominal)
+            problem, fit = fit_stages(
+                data, candidate.model, candidate.free, tried, stages=stages, most=15, hopeless=_HOPELESS
+            )
+        found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, tries)
+        if best is None or gain_over(found, best)[0] > 0:
+            best = found
+        if (kind == "linear" or quick) and best.fit.converged and best.fit.reduced_chi2 < _FINE:
+            break
+    best.tries = tries
+    return best
+
+
+def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
+    known = {(one.path, one.record): value for one, value in zip(base.problem.free, base.fit.values, strict=True)}
+    return np.array([known.get((one.path, one.record), one.value) for one in candidate.free])
+
+
+def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, np.ndarray]]:
+    name = candidate.names[-1]
+    lower = np.array([candidate.free[i].lower for i in candidate.added])
+    upper = np.array([candidate.free[i].upper for i in candidate.added])
+    starts = []
+    if candidate.absent is not None and screened is not None and name in screened.step:
+        sizes = np.array([candidate.free[i].size for i in candidate.added])
+        step = np.zeros(sizes.size)
+        live = screened.live[name]
+        step[live] = screened.step[name] * sizes[live]
+        guess = np.clip(candidate.absent + step, lower, upper)
+        # away from zero, where its other parameters could not move
+        small = guess == candidate.absent
+        starts.append(("linear", np.where(small & (candidate.absent == 0), 0.01 * sizes, guess)))
+    else:
+        starts += [("near", start) for start in candidate.starts]
+    starts += [("far", start) for start in candidate.starts]
+    return [(kind, np.clip(start, lower, upper)) for kind, start in starts]
+
+
+def common(one: Fitted, other: Fitted) -> np.ndarray:
+    """Segments that both fits can be judged by."""
+    return one.fit.good & other.fit.good
+
+
+def gain_over(one: Fitted, other: Fitted) -> tuple[float, np.ndarray]:
+    """Log-likelihood of `one` over that of `other`, and its parts by segment."""
+    both = common(one, other)
+    parts = np.where(both, 0.5 * (other.fit.chi2 - one.fit.chi2), 0.0)
+    return float(parts.sum()), parts

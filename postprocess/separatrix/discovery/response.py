@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a small force, acting along the fitted motion, does to the samples: from the transition matrices.
+
+With T(t) the derivative of x and v by the start, impacts included, a force f(s) moves the state at t by the integral of
+T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any number of forces can be tried.
+"""
+
+import numpy as np
+
+from separatrix.discovery.fit import Fit
+from separatrix.discovery.problem import Problem
+
+_LOST = 1e-9
+
+
+def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
+    """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples."""
+    segments = problem.segments
+    inside = segments.inside
+    transition = fit.evaluation.transition
+    times = sample_times(problem)
+    determinant = transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
+    # a body that sticks forgets: from there on a force does nothing
+    alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & inside, axis=1)
+    safe = np.where(alive, determinant, 1.0)
+    # second column of the inverse: a kick in v, carried back to the start
+    back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)
+    back[~alive] = 0
+    carried = back[:, :, :, None] * forces[:, :, None, :] / mass
+    steps = np.diff(times, axis=1)[:, :, None, None]
+    areas = 0.5 * steps * (carried[:, 1:] + carried[:, :-1])
+    moved = np.concatenate([np.zeros_like(carried[:, :1]), np.cumsum(areas, axis=1)], axis=1)
+    moved = np.einsum("klij,kljq->kliq", transition, moved)
+    moved[~alive] = 0
+    return _as_columns(problem, fit, moved)
+
+
+def kick_columns(problem: Problem, fit: Fit, kicks: np.ndarray) -> np.ndarray:
+    """Columns of sudden changes of velocity (segments, length, q) [m/s] at the samples."""
+    transition = fit.evaluation.transition
+    determinant = transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
+    alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & problem.segments.inside, axis=1)
+    safe = np.where(alive, determinant, 1.0)
+    back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)
+    back[~alive] = 0
+    moved = np.cumsum(back[:, :, :, None] * kicks[:, :, None, :], axis=1)
+    moved = np.einsum("klij,kljq->kliq", transition, moved)
+    moved[~alive] = 0
+    return _as_columns(problem, fit, moved)
+
+
+def _as_columns(problem: Problem, fit: Fit, moved: np.ndarray) -> np.ndarray:
+    """Changes of x and v in units of the noise, as the residuals are laid out."""
+    count, length = problem.segments.inside.shape
+    width = fit.evaluation.residual.shape[1]
+    columns = np.zeros((count, width, moved.shape[3]))
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        columns[rows, :length] = moved[rows, :, 0] / prepared.sigma
+        if width > length and prepared.record.v is not None:
+            columns[rows, length:] = moved[rows, :, 1] / prepared.velocity_sigma
+    return problem.whitened(columns)
+
+
+def sample_times(problem: Problem) -> np.ndarray:
+    """Times of the samples since the start of their segment [s], (segments, length)."""
+    times = np.zeros(problem.segments.inside.shape)
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        t = prepared.record.t[problem.segments.index[rows]]
+        times[rows] = t - t[:, :1]
+    return times

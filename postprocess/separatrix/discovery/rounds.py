@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One round of the search: every candidate screened, refitted, and foretelling the held-out records."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from separatrix.discovery.catalogue import BY_NAME, CATALOGUE, Candidate, Scales, candidate
+from separatrix.discovery.data import Data
+from separatrix.discovery.heldout import Prediction, predict
+from separatrix.discovery.judge import Judged, judged
+from separatrix.discovery.machine import with_values
+from separatrix.discovery.options import Options
+from separatrix.discovery.refit import Fitted, refit
+from separatrix.discovery.screen import Screened, Signature, screen, signature
+
+_CERTAIN_REFITS = 5
+_RELATED = 0.7
+# half the chi^2 that a candidate must take to be worth a refit, where the base is good already
+_WORTH = 2.0
+
+
+@dataclass
+class Bench:
+    """All that a search needs to know beside the machine."""
+
+    training: Data
+    held_out: Data | None
+    scales: Scales
+    options: Options
+    # why some candidates make no sense for this machine
+    absent: dict[str, str] = field(default_factory=dict)
+
+    def foretell(self, fitted: Fitted) -> Prediction | None:
+        """Score the held-out records."""
+        if self.held_out is None:
+            return None
+        fit = fitted.fit
+        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, fitted.covariance)
+
+
+@dataclass
+class Round:
+    """Candidates of a round, best first, and the screen that chose them."""
+
+    base: Fitted
+    foretold: Prediction | None
+    candidates: dict[str, Candidate]
+    signatures: list[Signature]
+    screened: Screened
+    judged: list[Judged]
+
+
+def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: float, last: float) -> Round:
+    """Screen all candidates on top of `base` and refit those that matter."""
+    options = bench.options
+    free = with_values(base.problem.free, base.fit.values)
+    candidates: dict[str, Candidate] = {}
+    for effect in CATALOGUE:
+        if effect.name in base.names or (options.candidates and effect.name not in options.candidates):
+            continue
+        if any(path.startswith(f"effect.{effect.name}.") for path in base.model.parameters):
+            continue
+        made = candidate(base.model, free, base.names, effect.name, bench.scales)
+        if isinstance(made, str):
+            bench.absent.setdefault(effect.name, made)
+        else:
+            candidates[effect.name] = made
+    options.progress(f"screening {len(candidates)} effects", first)
+    signatures = [signature(base.problem, base.fit, one) for one in candidates.values()]
+    signatures = [one for one in signatures if one is not None]
+    for name in set(candidates) - {one.name for one in signatures}:
+        bench.absent.setdefault(name, "it changes nothing in these records")
+    screened = screen(base.fit, signatures)
+    chosen = choose(base, screened, options)
+    found = []
+    for number, name in enumerate(chosen):
+        options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
+        fitted = refit(bench.training, base, candidates[name], screened, options.quick)
+        found.append(judged(base, foretold, fitted, bench.foretell(fitted)))
+    found.sort(key=lambda one: -one.evidence)
+    return Round(base, foretold, candidates, signatures, screened, found)
+
+
+def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
+    """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
+    order = sorted(screened.names, key=lambda name: -screened.gain[name])
+    if base.fit.reduced_chi2 > 1.3 and not options.quick:
+        return order
+    best = order[:_CERTAIN_REFITS]
+    kept = [
+        name
+        for name in order
+        if name in best
+        or any(screened.cosine(name, other) > _RELATED for other in best[:3])
+        or not BY_NAME[name].linear
+        or screened.gain[name] > _WORTH
+    ]
+    return kept[:_CERTAIN_REFITS] if options.quick else kept
+
+
+def pair_gains(screen_round: Round) -> list[tuple[float, str, str]]:
+    """Linearised gain of every pair of effects, best first."""
+    from separatrix.discovery.fit import blocks_of, eliminate, solve_scaled
+    from separatrix.discovery.screen import project
+
+    fit = screen_round.base.fit
+    evaluation = fit.evaluation
+    signatures = screen_round.signatures
+    columns = np.concatenate([evaluation.by_parameter, *[one.columns for one in signatures]], axis=2)
+    weights = evaluation.used * fit.good[:, None]
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[0].total()
+    left, score = project(matrix, gradient, evaluation.by_parameter.shape[2], ~fit.at_bound)
+    edges = np.cumsum([0, *[one.columns.shape[2] for one in signatures]])
+    found = []
+    for i in range(len(signatures)):
+        for j in range(i):
+            part = np.r_[edges[i] : edges[i + 1], edges[j] : edges[j + 1]]
+            step = solve_scaled(left[np.ix_(part, part)], score[part], np.ones(part.size, bool))
+            found.append((0.5 * float(score[part] @ step), signatures[i].name, signatures[j].name))
+    return sorted(found, reverse=True)

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each candidate could explain, from linearised signatures: no refit, seconds.
+
+The signature of an effect is what it does to the samples. What the starts of the segments and the parameters of
+the base machine can imitate is projected out; the rest decides whether the effect can be seen (d'), whether
+it can be told from another (cosines) and how much of the residual it takes (score).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.catalogue import Candidate
+from separatrix.discovery.fit import Fit, blocks_of, eliminate, solve_scaled
+from separatrix.discovery.problem import Problem
+
+
+@dataclass
+class Signature:
+    """Columns (segments, width, q) of the effect of size `size`, and the values of its parameters there."""
+
+    name: str
+    columns: np.ndarray
+    sizes: np.ndarray
+    origin: np.ndarray
+    steady: np.ndarray
+    live: np.ndarray
+
+
+@dataclass
+class Screened:
+    """Per signature: gain of log-likelihood, step of its amplitudes, their standard errors; and all cosines."""
+
+    names: list[str]
+    gain: dict[str, float]
+    step: dict[str, np.ndarray]
+    error: dict[str, np.ndarray]
+    # which parameters of an effect have a signature of their own
+    live: dict[str, np.ndarray]
+    cosines: np.ndarray
+
+    def cosine(self, one: str, other: str) -> float:
+        """Largest cosine between what is left of two signatures."""
+        return float(self.cosines[self.names.index(one), self.names.index(other)])
+
+
+def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None:
+    """What the added effect does at the fitted base; None where the simulator cannot say."""
+    values = np.array([one.value for one in candidate.free])
+    by_path = {(one.path, one.record): value for one, value in zip(base.free, fit.values, strict=True)}
+    for i, one in enumerate(candidate.free):
+        values[i] = by_path.get((one.path, one.record), values[i])
+    added = list(candidate.added)
+    problem = Problem(candidate.model, base.prepared, base.segments, candidate.free)
+    sizes = np.array([candidate.free[i].size for i in added])
+    good = fit.good
+    if candidate.absent is None:
+        # no size at which the effect is absent: the difference that its usual size makes
+        shown = problem.evaluate(values, fit.starts, derivatives=False)
+        columns = (fit.evaluation.residual - shown.residual)[:, :, None]
+        steady = good & ~shown.failed
+        origin, sizes, live = values[added], np.ones(1), np.zeros(len(added), bool)
+    else:
+        values[added] = candidate.absent
+        shown = problem.evaluate(values, fit.starts)
+        columns = shown.by_parameter[:, :, added] * sizes
+        live = np.any(columns != 0, axis=(0, 1))
+        columns, sizes = columns[:, :, live], np.where(live, sizes, 0)
+        steady = good & ~shown.failed & shown.steady
+        origin = candidate.absent
+    if steady.sum() < 2 or not np.any(columns):
+        return None
+    columns = np.where(steady[:, None, None], columns, 0)
+    return Signature(candidate.names[-1], columns, sizes, origin, steady, live)
+
+
+def screen(fit: Fit, signatures: list[Signature]) -> Screened:
+    """Project all signatures off starts and base parameters and compare them."""
+    evaluation = fit.evaluation
+    weights = evaluation.used * fit.good[:, None]
+    base = evaluation.by_parameter
+    p = base.shape[2]
+    columns = np.concatenate([base, *[one.columns for one in signatures]], axis=2)
+    blocks = blocks_of(evaluation.by_start, columns, evaluation.residual, weights)
+    matrix, gradient = eliminate(blocks)[0].total()
+    open_ = ~fit.at_bound
+    left, score = project(matrix, gradient, p, open_)
+    names = [one.name for one in signatures]
+    edges = np.cumsum([0, *[one.columns.shape[2] for one in signatures]])
+    gain, step, error = {}, {}, {}
+    roots = []
+    for i, one in enumerate(signatures):
+        part = slice(edges[i], edges[i + 1])
+        inner, slope = left[part, part], score[part]
+        all_open = np.ones(slope.size, bool)
+        amplitude = solve_scaled(inner, slope, all_open)
+        gain[one.name] = 0.5 * float(slope @ amplitude)
+        step[one.name] = amplitude
+        error[one.name] = 1 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        roots.append(_whitening(inner))
+    cosines = np.eye(len(signatures))
+    for i in range(len(signatures)):
+        for j in range(i):
+            cross = left[edges[i] : edges[i + 1], edges[j] : edges[j + 1]]
+            shared = roots[i] @ cross @ roots[j].T
+            size = np.linalg.norm(shared, 2) if shared.size else 0.0
+            cosines[i, j] = cosines[j, i] = min(1.0, float(size))
+    return Screened(names, gain, step, error, {one.name: one.live for one in signatures}, cosines)
+
+
+def project(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Schur complement of the first p unknowns (those that are open)."""
+    kept = np.flatnonzero(open_ & (np.diag(matrix)[:p] > 0))
+    inner = matrix[np.ix_(kept, kept)]
+    scale = 1 / np.sqrt(np.diag(inner))
+    values, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
+    usable = values > 1e-11
+    root = (vectors[:, usable] / np.sqrt(values[usable])).T * scale
+    cross = root @ matrix[np.ix_(kept, np.arange(p, gradient.size))]
+    return matrix[p:, p:] - cross.T @ cross, gradient[p:] - cross.T @ (root @ gradient[kept])
+
+
+def _whitening(inner: np.ndarray) -> np.ndarray:
+    """A root of the inverse, without directions that nothing is left of."""
+    diagonal = np.diag(inner)
+    live = diagonal > 0
+    if not live.any():
+        return np.zeros((0, diagonal.size))
+    scale = np.where(live, 1 / np.sqrt(np.where(live, diagonal, 1)), 0)
+    values, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
+    usable = values > 1e-8
+    return (vectors[:, usable] / np.sqrt(values[usable])).T * scale

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verdict as a dictionary: what is written to verdict.json."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from separatrix.discovery.decide import Decision
+from separatrix.discovery.judge import Judged
+from separatrix.discovery.limits import detectable, equivalents, separating_experiment
+from separatrix.discovery.refit import Fitted
+from separatrix.discovery.rounds import Bench, Round
+from separatrix.discovery.where import Map, sentences, where_maps
+from separatrix.version import __version__
+
+
+@dataclass
+class Findings:
+    """Everything that was found, for the verdict, the files and the figures."""
+
+    bench: Bench
+    base: Fitted
+    decision: Decision
+    held_out_chosen: str
+    maps: list[Map] = field(default_factory=list)
+
+
+def verdict_of(findings: Findings) -> dict:
+    """Return the content of verdict.json."""
+    decision, bench = findings.decision, findings.bench
+    first = decision.rounds[0]
+    best = decision.accepted[0] if decision.accepted else None
+    final = best.fitted if best else findings.base
+    findings.maps = where_maps(findings.base, bench.scales.mass, bench.options)
+    rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
+    return {
+        "outcome": decision.outcome,
+        "effects": list(final.names),
+        "alternatives": ["+".join(names) for names in decision.alternatives],
+        "equivalent": decision.equivalent,
+        "equivalences": equivalents([*final.names, *[names[-1] for names in decision.alternatives]]),
+        "parameters": _parameters(final),
+        "where": sentences(findings.maps),
+        "gap": _gap(findings),
+        "gates": best.gates if best else {},
+        "p_value": best.p if best else None,
+        "reasons": decision.reasons,
+        "detectable": detectable(bench, first),
+        "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
+        "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
+        "d_prime": d_prime(first),
+        "candidates": [_candidate(one) for one in first.judged],
+        "ceiling": {one.name: {"gain": one.gain, "rank": one.rank, "p": one.p} for one in decision.base_ceiling.families},
+        "not_tested": bench.absent,
+        "warnings": _warnings(findings),
+        "records": _records(findings),
+        "held_out_chosen": findings.held_out_chosen,
+        "seed": bench.options.seed,
+        "version": __version__,
+    }
+
+
+def d_prime(found: Round) -> dict[str, float]:
+    """Linearised size of each effect over its standard error, the base refitted: its direction of largest gain."""
+    return {name: float(np.sqrt(max(0.0, 2 * found.screened.gain[name]))) for name in found.screened.names}
+
+
+def _candidate(one: Judged) -> dict:
+    fit = one.fitted.fit
+    return {
+        "effect": one.name,
+        "training": one.training,
+        "held_out": one.held_out,
+        "evidence": one.evidence,
+        "reduced_chi2": fit.reduced_chi2,
+        "converged": fit.converged,
+        "starts": one.fitted.tries,
+        "values": {
+            one.fitted.problem.free[i].path: one.fitted.problem.free[i].physical(fit.values[i])
+            for i in one.fitted.added
+        },
+    }
+
+
+def _warnings(findings: Findings) -> list[str]:
+    bench = findings.bench
+    notes = [
+        f"{one.record.name}: {note}"
+        for data in (bench.training, bench.held_out)
+        for one in (data.prepared if data else ())
+        for note in one.notes
+    ]
+    fit = findings.base.fit
+    if not fit.converged:
+        notes.append("the base machine did not converge")
+    lost = int((~fit.good).sum())
+    if lost:
+        notes.append(f"{lost} of {lost + int(fit.good.sum())} segments are not used: their impacts are not steady")
+    contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
+    if contact and not any(one.impacts.size for one in bench.training.smoothed):
+        hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
+        notes.append(f"no impacts are seen in the records; the fitted machine has {hits}")
+    return notes
+
+
+def _records(findings: Findings) -> list[dict]:
+    found = []
+    for use, data in (("training", findings.bench.training), ("held out", findings.bench.held_out)):
+        for one in data.prepared if data else ():
+            found.append(
+                {
+                    "name": one.record.name,
+                    "use": use,
+                    "samples": one.record.t.size,
+                    "sigma": one.sigma,
+                    "memory": one.memory,
+                    "resolution": one.resolution,
+                    "drive_frequency": one.frequency,
+                    "phase_known": one.phase_known,
+                }
+            )
+    return found
+
+
+def _parameters(fitted: Fitted) -> dict:
+    errors = np.sqrt(np.diag(fitted.covariance))
+    found = {}
+    for one, value, error in zip(fitted.problem.free, fitted.fit.values, errors, strict=True):
+        if one.is_nuisance and one.record is not None:
+            continue
+        parameter = fitted.model.parameters.get(one.path)
+        found[one.path] = {
+            "value": one.physical(value),
+            "standard_error": one.slope(value) * float(error),
+            "interval_95": [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)],
+            "unit": parameter.unit if parameter else "1",
+        }
+    return found
+
+
+def _gap(findings: Findings) -> dict:
+    decision = findings.decision
+    best = decision.accepted[0] if decision.accepted else None
+    gap = {"training": {"before": findings.base.fit.reduced_chi2, "noise_floor": 1.0}}
+    gap["training"]["after"] = best.fitted.fit.reduced_chi2 if best else gap["training"]["before"]
+    if decision.foretold is not None:
+        before = decision.foretold.reduced_chi2
+        gap["held_out"] = {"before": before, "noise_floor": 1.0}
+        gap["held_out"]["after"] = best.prediction.reduced_chi2 if best else before
+    return gap

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where records and model disagree: the force that is missing in each bin of time, phase, place, speed and event.
+
+In each bin one constant force is fitted to what the base machine left over, starts and parameters of the base projected
+out. Its error comes from resampling blocks of segments; flags are corrected for the number of bins (Benjamini and
+Hochberg).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from separatrix.discovery.ceiling import after_impacts, motion
+from separatrix.discovery.fit import blocks_of, eliminate
+from separatrix.discovery.options import Options
+from separatrix.discovery.refit import Fitted
+from separatrix.discovery.response import force_columns
+
+_LEVEL = 0.01
+_BLOCK = 2
+
+
+@dataclass
+class Map:
+    """One map: the edges of its bins and in each the missing force [N], its error and whether it is flagged."""
+
+    name: str
+    unit: str
+    edges: np.ndarray
+    other_edges: np.ndarray | None
+    force: np.ndarray
+    error: np.ndarray
+    flagged: np.ndarray
+
+
+def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
+    """Missing forces in the bins of all maps."""
+    problem, fit = fitted.problem, fitted.fit
+    state = motion(problem, fit)
+    evaluation = fit.evaluation
+    x, v = evaluation.x, evaluation.v
+    inside = problem.segments.inside & fit.good[:, None]
+    maps = [
+        _bins("time", "s", _seconds(problem), inside, 12),
+        _bins("position", "m", x, inside, 10),
+        _bins("velocity", "m/s", v, inside, 10),
+        _bins("low speed", "m/s", np.where(np.abs(v) < 0.2 * state["speed"], v, np.nan), inside, 6),
+    ]
+    if state["phase"] is not None:
+        maps.append(_bins("drive phase", "rad", np.mod(state["phase"], 2 * np.pi), inside, 12))
+    since = after_impacts(problem, fit)
+    if np.isfinite(since).any():
+        maps.append(_bins("time since the last impact", "s", since, inside, 6))
+    maps.append(_plane(x, v, inside, 5))
+    maps = [one for one in maps if one is not None]
+    tables = [member for _, _, _, _, member in maps]
+    columns = force_columns(problem, fit, np.concatenate(tables, axis=2), mass)
+    force, error = _forces(fitted, columns, options)
+    flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
+    found, first = [], 0
+    for name, unit, edges, other, member in maps:
+        part = slice(first, first + member.shape[2])
+        first = part.stop
+        found.append(Map(name, unit, edges, other, force[part], error[part], flags[part]))
+    return found
+
+
+def _seconds(problem) -> np.ndarray:
+    seconds = np.zeros(problem.segments.inside.shape)
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        seconds[rows] = prepared.record.t[problem.segments.index[rows]] - prepared.record.t[0]
+    return seconds
+
+
+def _bins(name: str, unit: str, values: np.ndarray, inside: np.ndarray, count: int) -> tuple | None:
+    """Bins of equal numbers of samples."""
+    usable = inside & np.isfinite(values)
+    if usable.sum() < 10 * count:
+        return None
+    edges = np.unique(np.quantile(values[usable], np.linspace(0, 1, count + 1)))
+    if edges.size < 3:
+        return None
+    place = np.clip(np.searchsorted(edges, np.where(usable, values, edges[0]), side="right") - 1, 0, edges.size - 2)
+    member = ((place[:, :, None] == np.arange(edges.size - 1)) & usable[:, :, None]).astype(float)
+    return name, unit, edges, None, member
+
+
+def _plane(x: np.ndarray, v: np.ndarray, inside: np.ndarray, count: int) -> tuple | None:
+    one, other = _bins("", "", x, inside, count), _bins("", "", v, inside, count)
+    if one is None or other is None:
+        return None
+    member = (one[4][:, :, :, None] * other[4][:, :, None, :]).reshape(*x.shape, -1)
+    return "position and velocity", "m, m/s", one[2], other[2], member
+
+
+def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
+    """One force per column, each by itself, and its error by block bootstrap."""
+    fit = fitted.fit
+    evaluation = fit.evaluation
+    weights = evaluation.used * fit.good[:, None]
+    base = evaluation.by_parameter[:, :, ~fit.at_bound]
+    p = base.shape[2]
+    whole = np.concatenate([base, columns], axis=2)
+    reduced = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0]
+    diagonal = np.einsum("kii->ki", reduced.matrix)[:, p:]
+    total, gradient = reduced.total()
+    # parameters of the base projected out, segment by segment, by the same combination of their columns
+    scale = 1 / np.sqrt(np.maximum(np.diag(total)[:p], 1e-300))
+    inner = np.linalg.pinv(total[:p, :p] * np.outer(scale, scale), rcond=1e-11, hermitian=True) * np.outer(scale, scale)
+    mixture = inner @ total[:p, p:]
+    cross = reduced.matrix[:, p:, :p]
+    size = (
+        diagonal
+        - 2 * np.einsum("kqp,pq->kq", cross, mixture)
+        + np.einsum("pq,kpr,rq->kq", mixture, reduced.matrix[:, :p, :p], mixture, optimize=True)
+    )
+    score = reduced.gradient[:, p:] - reduced.gradient[:, :p] @ mixture
+    whole_size = np.maximum(size.sum(axis=0), 1e-300)
+    force = score.sum(axis=0) / whole_size
+    random = np.random.default_rng([options.seed, 21])
+    n = score.shape[0]
+    blocks = -(-n // _BLOCK)
+    first = random.integers(0, n, (options.bootstraps, blocks))
+    index = ((first[:, :, None] + np.arange(_BLOCK)) % n).reshape(options.bootstraps, -1)
+    influence = score - size * force
+    spread = np.std(influence[index].sum(axis=1), axis=0) / whole_size
+    formal = 1 / np.sqrt(whole_size)
+    live = np.diag(total)[p:] > 0
+    return np.where(live, force, 0.0), np.where(live, np.maximum(spread, formal), np.inf)
+
+
+def benjamini_hochberg(p: np.ndarray, level: float) -> np.ndarray:
+    """Flags whose expected share of false ones is at most `level`."""
+    order = np.argsort(p)
+    passed = p[order] <= level * np.arange(1, p.size + 1) / p.size
+    flags = np.zeros(p.size, bool)
+    if passed.any():
+        flags[order[: np.flatnonzero(passed)[-1] + 1]] = True
+    return flags
+
+
+def sentences(maps: list[Map]) -> list[dict]:
+    """Flagged regions in words and numbers, the clearest of each map first."""
+    found = []
+    for one in maps:
+        for place in np.flatnonzero(one.flagged)[np.argsort(-np.abs(one.force / one.error)[one.flagged])][:3]:
+            region = _region(one, int(place))
+            found.append(
+                {
+                    "map": one.name,
+                    "region": region,
+                    "force": float(one.force[place]),
+                    "error": float(one.error[place]),
+                    "text": f"a force of {one.force[place]:.3g} +- {one.error[place]:.2g} N is missing {region['text']}",
+                }
+            )
+    return found
+
+
+def _region(one: Map, place: int) -> dict:
+    if one.other_edges is None:
+        low, high = float(one.edges[place]), float(one.edges[place + 1])
+        return {"from": low, "to": high, "unit": one.unit, "text": f"at {one.name} {low:.3g} to {high:.3g} {one.unit}"}
+    columns = one.other_edges.size - 1
+    i, j = divmod(place, columns)
+    x, v = one.edges[i : i + 2], one.other_edges[j : j + 2]
+    return {
+        "from": [float(x[0]), float(v[0])],
+        "to": [float(x[1]), float(v[1])],
+        "unit": one.unit,
+        "text": f"at position {x[0]:.3g} to {x[1]:.3g} m and velocity {v[0]:.3g} to {v[1]:.3g} m/s",
+    }

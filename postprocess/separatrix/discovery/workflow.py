@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From records and a base case to a verdict."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from separatrix.discovery.base import copy_noise, fit_base
+from separatrix.discovery.data import gather, scales_of
+from separatrix.discovery.decide import Decision, decide
+from separatrix.discovery.options import Options
+from separatrix.discovery.preflight import prepare
+from separatrix.discovery.records import Record, read_record, unique_names
+from separatrix.discovery.refit import Fitted
+from separatrix.discovery.rounds import Bench
+from separatrix.discovery.verdict import Findings, verdict_of
+from separatrix.errors import SeparatrixError
+
+
+def discover(
+    base: object,
+    records: Sequence[Path | Record],
+    hold_out: Sequence[Path | Record] = (),
+    options: Options | None = None,
+    rest: Path | Record | None = None,
+) -> dict:
+    """Return the verdict (the content of verdict.json) on records of a machine that `base` models."""
+    return investigate(base, records, hold_out, options, rest)[0]
+
+
+def investigate(
+    base: object,
+    records: Sequence[Path | Record],
+    hold_out: Sequence[Path | Record] = (),
+    options: Options | None = None,
+    rest: Path | Record | None = None,
+) -> tuple[dict, "Findings"]:
+    """As `discover`; also everything that the figures of the report need."""
+    began = time.monotonic()
+    options = options or Options()
+    model = _model(base)
+    training, held_out, chosen = _split([_record(one) for one in records], [_record(one) for one in hold_out])
+    unique_names([*training, *held_out])
+    still = None if rest is None else _record(rest)
+    options.progress("reading and smoothing the records", 0.0)
+    prepared = [[prepare(one, model, still) for one in group] for group in (training, held_out)]
+    data = gather(prepared[0], options.segment_periods, options.segment_seconds)
+    foretold = gather(prepared[1], options.segment_periods, options.segment_seconds) if held_out else None
+    scales = scales_of(data, model)
+    options.progress("fitting the base machine", 0.05)
+    fitted = fit_base(data, model, scales.mass)
+    if not fitted.fit.good.any():
+        raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
+    if foretold is not None:
+        _prepare_held_out(foretold, data, model, fitted, scales.mass)
+    bench = Bench(data, foretold, scales, options)
+    decision = decide(bench, fitted)
+    findings = Findings(bench, fitted, decision, chosen)
+    verdict = verdict_of(findings)
+    verdict["runtime_s"] = round(time.monotonic() - began, 3)
+    return verdict, findings
+
+
+def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
+    """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
+    from separatrix.discovery.base import find_phases, measure_noise
+    from separatrix.discovery.data import fit_stages
+    from separatrix.discovery.machine import record_nuisances, with_values
+
+    free = with_values(fitted.problem.free, fitted.fit.values)
+    shared = [one for one in free if one.record is None]
+    own = record_nuisances([one.phase_known for one in held_out.prepared]) if held_out.prepared[0].frequency else []
+    whole = shared + own
+    find_phases(held_out, model, whole)
+    problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0])
+    measure_noise(held_out, problem, fit, mass)
+    copy_noise(training, held_out)
+
+
+def _model(base: object):
+    if isinstance(base, str | Path):
+        from separatrix.library import Model
+
+        return Model.read(base)
+    return base
+
+
+def _record(one: Path | Record) -> Record:
+    return one if isinstance(one, Record) else read_record(Path(one))
+
+
+def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record], list[Record], str]:
+    """Training and held-out records; without a choice of the user the last record, or the end of the only one."""
+    if hold_out:
+        return records, hold_out, "as asked for"
+    if len(records) > 1:
+        return records[:-1], records[-1:], f"the last record, {records[-1].name}"
+    whole = records[0]
+    at = int(0.7 * whole.t.size)
+    return [_cut(whole, 0, at, "")], [_cut(whole, at, whole.t.size, "_end")], "the last 30 % of the only record"
+
+
+def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
+    part = slice(first, last)
+    pieces = [(max(a, first) - first, min(b, last) - first) for a, b in record.pieces if min(b, last) > max(a, first)]
+    channels = {name: None if getattr(record, name) is None else getattr(record, name)[part] for name in ("v", "a", "force", "phi")}
+    header = dict(record.header)
+    if first and "phase" in header:
+        # the header tells the crank angle at the first row of the whole record
+        header["phase_origin_s"] = float(record.t[0])
+    return Record(record.name + suffix, record.t[part], record.x[part], header=header, pieces=pieces, warnings=list(record.warnings), **channels)

@@ -1,0 +1,279 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulator as a function: other values for a case's numbers, many short segments, their derivatives.
+
+This is the binding of libseparatrix (include/separatrix.h, docs/library.md).
+"""
+
+import ctypes
+import functools
+import os
+import shutil
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from separatrix.errors import SeparatrixError
+
+__all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
+
+_NONE = 1e308  # bounds beyond this mean that there is none
+_TEXT = 4096
+
+
+class CaseError(SeparatrixError):
+    """A case, a value or a call that the library refuses; `code` is that of the program."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a case: its value, SI unit and bounds (infinite where there is none)."""
+
+    value: float
+    unit: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A law of the family `effect`, its parameters by name; `value` is the default, NaN where one must be given."""
+
+    name: str
+    meaning: str
+    parameters: dict[str, Parameter]
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Every impact of every segment, in order: arrays of equal length."""
+
+    segment: np.ndarray
+    time: np.ndarray
+    speed_before: np.ndarray
+    speed_after: np.ndarray
+    side: np.ndarray
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Samples of all segments, one after the other.
+
+    `x` is what the sensor shows, `v` the velocity. Columns of the Jacobians: the active parameters, then x, v
+    and crank angle of the start; None without derivatives. Per segment: the number of impacts, whether it is
+    steady (its neighbours meet the same barriers in the same order and none is grazed; otherwise the
+    derivatives mean little) and the reason why it could not be flown, 0 if it was.
+    """
+
+    x: np.ndarray
+    v: np.ndarray
+    jacobian: np.ndarray | None
+    velocity_jacobian: np.ndarray | None
+    impacts: np.ndarray
+    impact: Impacts
+    steady: np.ndarray
+    reason: np.ndarray
+
+
+class Model:
+    """A case that has been read; its numbers have paths: "restoring.stiffness", "drive.cosine[1]"."""
+
+    def __init__(self, handle: ctypes.c_void_p) -> None:
+        """Take over a handle of the library; use `read` or `from_text`."""
+        self._handle = handle
+        self._free = weakref.finalize(self, _library().separatrix_model_free, handle)
+        paths = [self._parameter(i) for i in range(_library().separatrix_parameter_count(handle))]
+        self.parameters: dict[str, Parameter] = dict(paths)
+        self._index = {path: i for i, (path, _) in enumerate(paths)}
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Model":
+        """Return the model of a case file."""
+        handle = ctypes.c_void_p()
+        _call("separatrix_model_read", os.fsencode(path), ctypes.byref(handle))
+        return cls(handle)
+
+    @classmethod
+    def from_text(cls, text: str, directory: str | Path = ".") -> "Model":
+        """Return the model of a case in memory; files that it names are looked for in `directory`."""
+        handle = ctypes.c_void_p()
+        _call("separatrix_model_from_text", text.encode(), os.fsencode(directory), ctypes.byref(handle))
+        return cls(handle)
+
+    @property
+    def period(self) -> float:
+        """Drive period of the case as it is [s]."""
+        return 2 * np.pi / self.drive_frequency({})
+
+    def drive_frequency(self, values: Mapping[str, float]) -> float:
+        """Return the angular frequency of the drive [rad/s] with other values."""
+        frequency = ctypes.c_double()
+        _call("separatrix_drive_frequency", self._handle, *self._chosen(values), ctypes.byref(frequency))
+        return frequency.value
+
+    def to_text(self, values: Mapping[str, float]) -> str:
+        """Return the resolved case with other values: the text of an ordinary case file."""
+        chosen, length = self._chosen(values), ctypes.c_size_t()
+        _call("separatrix_model_text", self._handle, *chosen, None, ctypes.c_size_t(0), ctypes.byref(length))
+        text = ctypes.create_string_buffer(length.value + 1)
+        _call("separatrix_model_text", self._handle, *chosen, text, _size(text), ctypes.byref(length))
+        return text.value.decode()
+
+    def segments(
+        self,
+        active: list[str],
+        values: np.ndarray,
+        start: np.ndarray,
+        first: np.ndarray,
+        times: np.ndarray,
+        force: tuple[np.ndarray, float, np.ndarray] | None = None,
+        derivatives: bool = True,
+        tolerance: float = 1e-9,
+    ) -> Segments:
+        """Fly many segments, each from its own start, and sample them.
+
+        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start` is
+        (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are
+        at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that
+        of the adaptive flight.
+        """
+        for path in active:
+            if active.count(path) > 1:
+                raise CaseError(f"active: found '{path}' twice")
+        if force is not None:
+            raise CaseError('force: given, allowed with drive.law = "measured_force"')
+        chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
+        start = np.asarray(start, float)
+        start = _array(start, (len(start), 3), "start")
+        count = len(start)
+        first = np.ascontiguousarray(first, np.int32)
+        if first.shape != (count + 1,):
+            raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
+        times = _array(times, (int(first[-1]),), "times")
+        m, columns = len(times), len(active) + 3
+        x, v = np.empty(m), np.empty(m)
+        slopes = [np.empty((m, columns)) for _ in range(2)] if derivatives else [None, None]
+        report = np.zeros((3, count), np.int32)
+        room = 4 * count + 64
+        while True:
+            found = ctypes.c_int()
+            impact_segment, impact = np.empty(room, np.int32), np.empty((room, 4))
+            _call(
+                "separatrix_segments",
+                self._handle,
+                *chosen,
+                count,
+                *(_pointer(array) for array in (start, first, times)),
+                int(derivatives),
+                ctypes.c_double(tolerance),
+                *(_pointer(array) for array in (x, v, *slopes, *report)),
+                room,
+                ctypes.byref(found),
+                _pointer(impact_segment),
+                _pointer(impact),
+            )
+            if found.value <= room:
+                break
+            room = found.value
+        time, before, after, side = impact[: found.value].T
+        impacts = Impacts(impact_segment[: found.value], time, before, after, side.astype(int))
+        return Segments(x, v, *slopes, report[0], impacts, report[1].astype(bool), report[2])
+
+    def _parameter(self, index: int) -> tuple[str, Parameter]:
+        path, unit = ctypes.create_string_buffer(_TEXT), ctypes.create_string_buffer(_TEXT)
+        numbers = (ctypes.c_double * 3)()
+        _call("separatrix_parameter", self._handle, index, path, _size(path), unit, _size(unit), numbers)
+        value, lower, upper = numbers
+        return path.value.decode(), _parameter(value, unit.value.decode(), lower, upper)
+
+    def _chosen(self, values: Mapping[str, float]) -> tuple[int, ctypes.Array, ctypes.Array]:
+        """Return number, indices and values of parameters by path."""
+        index = (ctypes.c_int * len(values))(*(self._find(path) for path in values))
+        return len(values), index, (ctypes.c_double * len(values))(*values.values())
+
+    def _find(self, path: str) -> int:
+        if path not in self._index:
+            # The library knows the one that was meant.
+            _call("separatrix_find_parameter", self._handle, path.encode(), ctypes.byref(ctypes.c_int()))
+        return self._index[path]
+
+
+def effects() -> dict[str, Effect]:
+    """Return the catalogue of effects that may be added to a case, by name, as the law table has it."""
+    found: dict[str, Effect] = {}
+    index = 0
+    while True:
+        texts = [ctypes.create_string_buffer(_TEXT) for _ in range(4)]
+        numbers = (ctypes.c_double * 4)()
+        sized = [argument for text in texts for argument in (text, _size(text))]
+        try:
+            _call("separatrix_effect_parameter", index, *sized, numbers)
+        except CaseError:
+            return found
+        name, meaning, parameter, unit = (text.value.decode() for text in texts)
+        default, lower, upper, optional = numbers
+        effect = found.setdefault(name, Effect(name, meaning, {}))
+        effect.parameters[parameter] = _parameter(default if optional else np.nan, unit, lower, upper)
+        index += 1
+
+
+def library_path() -> Path:
+    """Return where the library is: $SEPARATRIX_LIBRARY, beside the installed program, or in build/lib."""
+    asked = os.environ.get("SEPARATRIX_LIBRARY")
+    if asked:
+        return Path(asked)
+    program = shutil.which("separatrix")
+    folders = [Path(program).resolve().parent.parent / "lib"] if program else []
+    folders.append(Path(__file__).resolve().parents[2] / "build" / "lib")
+    for folder in folders:
+        path = folder / "libseparatrix.so"
+        if path.is_file():
+            return path
+    tried = ", ".join(str(folder) for folder in folders)
+    raise CaseError(
+        f"no libseparatrix.so in {tried}; build it (cmake --build build --target separatrix_library) "
+        "or name it in SEPARATRIX_LIBRARY"
+    )
+
+
+@functools.cache
+def _library() -> ctypes.CDLL:
+    path = library_path()
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as reason:
+        raise CaseError(f"{path}: cannot be loaded: {reason}") from reason
+    library.separatrix_model_free.restype = None
+    return library
+
+
+def _call(name: str, *arguments: object) -> None:
+    """Call a function that ends with a buffer for its message; refusals become a CaseError."""
+    message = ctypes.create_string_buffer(_TEXT)
+    code = getattr(_library(), name)(*arguments, message, _size(message))
+    if code:
+        raise CaseError(message.value.decode(errors="replace"), code)
+
+
+def _parameter(value: float, unit: str, lower: float, upper: float) -> Parameter:
+    lower = -np.inf if lower < -_NONE else lower
+    upper = np.inf if upper > _NONE else upper
+    return Parameter(value, unit, lower, upper)
+
+
+def _size(buffer: ctypes.Array) -> ctypes.c_size_t:
+    return ctypes.c_size_t(len(buffer))
+
+
+def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
+    array = np.ascontiguousarray(values, float)
+    if array.shape != shape:
+        raise CaseError(f"{name}: found shape {array.shape}, allowed {shape}")
+    return array
+
+
+def _pointer(array: np.ndarray | None) -> ctypes.c_void_p | None:
+    return None if array is None else ctypes.c_void_p(array.ctypes.data)

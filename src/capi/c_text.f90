@@ -1,0 +1,43 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Texts across the C interface.
+module c_text
+  use, intrinsic :: iso_c_binding, only: c_char, c_null_char, c_size_t
+  implicit none
+  private
+
+  public :: from_c, to_c
+
+contains
+
+  !> A text that ends with the null character.
+  pure function from_c(string) result(text)
+    character(kind=c_char), intent(in) :: string(*)
+    character(len=:), allocatable :: text
+    integer :: length, i
+    length = 0
+    do while (string(length + 1) /= c_null_char)
+      length = length + 1
+    end do
+    allocate (character(len=length) :: text)
+    do i = 1, length
+      text(i:i) = string(i)
+    end do
+  end function from_c
+
+  !> Copies a text into a buffer of `size` characters, cut to fit, with a null character at the end.
+  pure subroutine to_c(text, buffer, size)
+    character(len=*), intent(in) :: text
+    integer(c_size_t), intent(in) :: size
+    character(kind=c_char), intent(inout) :: buffer(*)
+    integer :: i, length
+    if (size < 1) return
+    length = int(min(int(len(text), c_size_t), size - 1))
+    do i = 1, length
+      buffer(i) = text(i:i)
+    end do
+    buffer(length + 1) = c_null_char
+  end subroutine to_c
+
+end module c_text

@@ -1,0 +1,127 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What a handle of the C interface stands for: a case and the list of its numbers.
+module model_type
+  use case_echo, only: echo_case
+  use case_reader, only: load_case, load_case_text
+  use case_type, only: case_t
+  use case_values, only: allowed_range, bounds_t
+  use errors, only: error_t, fail
+  use kinds, only: int64, wp
+  use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
+  use parameter_list, only: list_parameters, parameter_t, put_values
+  use status, only: exit_bad_case, exit_usage
+  use suggest, only: nearest_word
+  use text, only: join, to_text
+  implicit none
+  private
+
+  public :: read_model, model_from_text, find_parameter, check_values, model_options, text_with
+
+  type, public :: model_t
+    type(case_t) :: the_case
+    type(parameter_t), allocatable :: parameters(:)
+  end type model_t
+
+contains
+
+  !> The model of the case file `path`. Code 66: it cannot be read; 65: anything wrong in it.
+  subroutine read_model(path, model, error)
+    character(len=*), intent(in) :: path
+    type(model_t), intent(out) :: model
+    type(error_t), allocatable, intent(out) :: error
+    character(len=1) :: no_overrides(0)
+    call load_case(path, no_overrides, model%the_case, error)
+    if (.not. allocated(error)) model%parameters = list_parameters(model%the_case%laws)
+  end subroutine read_model
+
+  !> The model of a case in memory; `directory` is where the files that it names are. Code 65.
+  subroutine model_from_text(text, directory, model, error)
+    character(len=*), intent(in) :: text, directory
+    type(model_t), intent(out) :: model
+    type(error_t), allocatable, intent(out) :: error
+    character(len=1) :: no_overrides(0)
+    character(len=:), allocatable :: name
+    name = 'case'
+    if (len(directory) > 0) name = directory//'/case'
+    call load_case_text(text, name, no_overrides, model%the_case, error)
+    if (.not. allocated(error)) model%parameters = list_parameters(model%the_case%laws)
+  end subroutine model_from_text
+
+  !> Position of the parameter `path`, from 1. Code 65 if there is none.
+  subroutine find_parameter(model, path, position, error)
+    type(model_t), intent(in) :: model
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: position
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: meant
+    position = findloc(model%parameters%path == path, .true., dim=1)
+    if (position > 0) return
+    meant = nearest_word(path, model%parameters%path)
+    if (len(meant) > 0) meant = ' (did you mean '''//meant//'''?)'
+    call fail(error, exit_bad_case, model%the_case%path//': parameter '''//path//''': unknown'//meant//'; allowed '// &
+              join(model%parameters%path, ', '))
+  end subroutine find_parameter
+
+  !> Whether `chosen` are positions in the list, each once (code 64), and `values` within their bounds (code 65).
+  subroutine check_values(model, chosen, values, error)
+    type(model_t), intent(in) :: model
+    integer, intent(in) :: chosen(:)
+    real(wp), intent(in) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: problem
+    integer :: i
+    do i = 1, size(chosen)
+      if (chosen(i) < 1 .or. chosen(i) > size(model%parameters)) then
+        call fail(error, exit_usage, 'parameter index: found '//to_text(chosen(i) - 1)//', allowed 0 to '// &
+                  to_text(size(model%parameters) - 1))
+        return
+      end if
+      associate (one => model%parameters(chosen(i)))
+        if (any(chosen(:i - 1) == chosen(i))) then
+          call fail(error, exit_usage, 'parameter '''//trim(one%path)//''': chosen twice')
+          return
+        end if
+        problem = allowed_range(values(i), bounds_t(one%lower, one%upper, one%lower_open, one%unit))
+        if (len(problem) == 0) cycle
+        call fail(error, exit_bad_case, model%the_case%path//': parameter '''//trim(one%path)//''': '//problem)
+        return
+      end associate
+    end do
+  end subroutine check_values
+
+  !> Integrator options of the case with another `tolerance` of the adaptive flight.
+  pure function model_options(model, tolerance) result(options)
+    type(model_t), intent(in) :: model
+    real(wp), intent(in) :: tolerance
+    type(options_t) :: options
+    select case (model%the_case%integrator%flight)
+    case ('exact')
+      options%flight = flight_exact
+    case ('adaptive')
+      options%flight = flight_adaptive
+    case default
+      options%flight = flight_auto
+    end select
+    options%tolerance = tolerance
+    options%event_budget = int(model%the_case%integrator%event_budget, int64)
+    options%domain = model%the_case%run%domain
+  end function model_options
+
+  !> The resolved case with other values. Code 65 if together they make no valid case.
+  subroutine text_with(model, chosen, values, text, error)
+    type(model_t), intent(in) :: model
+    integer, intent(in) :: chosen(:)
+    real(wp), intent(in) :: values(:)
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+    type(case_t) :: changed, read_back
+    character(len=1) :: no_overrides(0)
+    changed = model%the_case
+    call put_values(changed%laws, model%parameters(chosen), values)
+    text = echo_case(changed)
+    call load_case_text(text, model%the_case%path, no_overrides, read_back, error)
+  end subroutine text_with
+
+end module model_type

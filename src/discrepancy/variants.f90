@@ -1,0 +1,204 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A machine and its neighbours: for every chosen parameter the machine with that parameter a step further, and the one with
+!> it a step back. They are built once for all segments.
+!> A difference over a step e of a natural size has the error e of the series cut off and the error s/e of the results'
+!> own error s: both are least at e = sqrt(s), s being rounding for exact flights and, for adaptive ones, the part of the
+!> tolerance that neighbours do not share.
+module variants
+  use build_motion, only: machine_of
+  use errors, only: error_t, fail
+  use kinds, only: wp
+  use law_table, only: law_choice_t
+  use motion, only: motion_t
+  use motion_state, only: flight_adaptive, options_t
+  use natural_scale, only: natural_size, scales_of, scales_t
+  use parameter_list, only: parameter_t, put_values
+  use status, only: exit_bad_case
+  implicit none
+  private
+
+  public :: prepare_family
+
+  !> Relative error of an exact flight: rounding, somewhat grown.
+  real(wp), parameter :: exact_error = 1e-14_wp
+  !> Part of the tolerance of an adaptive flight by which the errors of two neighbours differ, found by comparison with
+  !> flights of much smaller tolerance.
+  real(wp), parameter :: uncommon = 4e-4_wp
+  !> A parameter smaller than this share of its natural size is stepped as if it had that size.
+  real(wp), parameter :: smallest_share = 0.1_wp
+
+  !> What a parameter of the sensor is: its derivative follows from the samples and from those by the crank angle, and needs
+  !> no machine.
+  integer, parameter, public :: of_the_machine = 0, sensor_bias = 1, sensor_gain = 2, sensor_delay = 3
+  character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
+    'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
+
+  !> Laws that decide only what happens at the barriers.
+  character(len=*), parameter :: contact_tables(4) = [character(len=26) :: &
+    'contact', 'effect.restitution_slope', 'effect.compliant_contact', 'effect.second_barrier']
+
+  !> A machine one parameter of which is a step away.
+  type, public :: variant_t
+    type(motion_t) :: moving
+    !> Signed step of the parameter, SI; 0 where there is no such machine.
+    real(wp) :: step = 0
+    integer :: role = of_the_machine
+    !> Only what happens at the barriers differs, so a motion that reaches none is the same.
+    logical :: contact_only = .false.
+    !> It leaves the closed form that the machine itself has, as an effect of size 0 does: it is compared with the machine
+    !> flown adaptively.
+    logical :: leaves_exact = .false.
+  end type variant_t
+
+  type, public :: family_t
+    type(motion_t) :: moving
+    !> The same machine flown adaptively, where a variant needs it.
+    type(motion_t), allocatable :: adaptive
+    !> One per chosen parameter: a step further; and a step back.
+    type(variant_t), allocatable :: further(:), back(:)
+    !> Steps of x [m], v [m/s] and crank angle [rad] of a start.
+    real(wp) :: start_step(3) = 0
+    !> Distance to a barrier [m] and speed of an impact [m/s] below which a motion grazes: there a step changes the speed of
+    !> the impact by more than a hundredth.
+    real(wp) :: least_clearance = 0, least_speed = 0
+  end type family_t
+
+  !> What all machines of a family have in common.
+  type :: plan_t
+    type(law_choice_t), allocatable :: laws(:)
+    type(options_t) :: options
+    type(parameter_t), allocatable :: chosen(:)
+    real(wp), allocatable :: values(:)
+    type(scales_t) :: scales
+  end type plan_t
+
+contains
+
+  !> Builds the machine of `laws` with `values` in the parameters `chosen`, and its neighbours if `derivatives`. Code 65 if
+  !> a machine cannot be built or has two bodies.
+  pure subroutine prepare_family(laws, options, chosen, values, derivatives, family, error)
+    type(law_choice_t), intent(in) :: laws(:)
+    type(options_t), intent(in) :: options
+    type(parameter_t), intent(in) :: chosen(:)
+    real(wp), intent(in) :: values(:)
+    logical, intent(in) :: derivatives
+    type(family_t), intent(out) :: family
+    type(error_t), allocatable, intent(out) :: error
+    type(plan_t) :: plan
+    real(wp) :: share
+    integer :: i
+    plan = plan_t(laws, options, chosen, values)
+    call build(plan, values, .false., family%moving, error)
+    if (allocated(error)) return
+    if (allocated(family%moving%pair)) then
+      call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
+      return
+    end if
+    if (.not. derivatives) return
+    plan%scales = scales_of(family%moving%machine)
+    share = share_of(options, all_exact(family%moving))
+    family%start_step = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
+    family%least_clearance = 10*family%start_step(1)
+    family%least_speed = 10*sqrt(share)*plan%scales%length/plan%scales%time
+    allocate (family%further(size(chosen)), family%back(size(chosen)))
+    do i = 1, size(chosen)
+      family%further(i)%role = findloc(sensor_paths == chosen(i)%path, .true., dim=1)
+      if (family%further(i)%role /= of_the_machine) cycle
+      call build_neighbours(plan, i, all_exact(family%moving), family%further(i), family%back(i), error)
+      if (allocated(error)) return
+      if (.not. family%further(i)%leaves_exact .or. allocated(family%adaptive)) cycle
+      allocate (family%adaptive)
+      call build(plan, values, .true., family%adaptive, error)
+      if (allocated(error)) return
+    end do
+  end subroutine prepare_family
+
+  !> Whether no mode of a machine is flown adaptively.
+  pure logical function all_exact(moving)
+    type(motion_t), intent(in) :: moving
+    all_exact = moving%exact .and. .not. moving%layer > 0 .and. .not. moving%machine%contact%soft
+  end function all_exact
+
+  !> Step relative to the size of a quantity.
+  pure real(wp) function share_of(options, exact) result(share)
+    type(options_t), intent(in) :: options
+    logical, intent(in) :: exact
+    share = sqrt(merge(exact_error, max(exact_error, uncommon*options%tolerance), exact))
+  end function share_of
+
+  pure subroutine build(plan, values, adaptive, moving, error)
+    type(plan_t), intent(in) :: plan
+    real(wp), intent(in) :: values(:)
+    logical, intent(in) :: adaptive
+    type(motion_t), intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    type(law_choice_t) :: changed(size(plan%laws))
+    type(options_t) :: options
+    changed = plan%laws
+    call put_values(changed, plan%chosen, values)
+    options = plan%options
+    if (adaptive) options%flight = flight_adaptive
+    call machine_of(changed, options, moving, error)
+    ! Samples within the Stribeck layer need the adaptive flight anyhow.
+    moving%transit%available = .false.
+  end subroutine build
+
+  !> The neighbours of parameter `which`. If the first cannot be built, the other takes its place.
+  pure subroutine build_neighbours(plan, which, exact, further, back, error)
+    type(plan_t), intent(in) :: plan
+    integer, intent(in) :: which
+    logical, intent(in) :: exact
+    type(variant_t), intent(out) :: further, back
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: no_other
+    call build_variant(plan, which, 1, exact, further, error)
+    call build_variant(plan, which, -1, exact, back, no_other)
+    if (.not. allocated(error)) return
+    if (allocated(no_other)) return
+    deallocate (error)
+    further = back
+    back%step = 0
+  end subroutine build_neighbours
+
+  pure subroutine build_variant(plan, which, sense, exact, variant, error)
+    type(plan_t), intent(in) :: plan
+    integer, intent(in) :: which, sense
+    logical, intent(in) :: exact
+    type(variant_t), intent(out) :: variant
+    type(error_t), allocatable, intent(out) :: error
+    call take_step(plan, which, sense, share_of(plan%options, exact), .false., variant, error)
+    if (allocated(error)) return
+    if (exact .and. .not. all_exact(variant%moving)) then
+      variant%leaves_exact = .true.
+      call take_step(plan, which, sense, share_of(plan%options, .false.), .true., variant, error)
+    end if
+    associate (path => plan%chosen(which)%path)
+      variant%contact_only = any(contact_tables == path(:index(path, '.', back=.true.) - 1))
+    end associate
+  end subroutine build_variant
+
+  pure subroutine take_step(plan, which, sense, share, adaptive, variant, error)
+    type(plan_t), intent(in) :: plan
+    integer, intent(in) :: which, sense
+    real(wp), intent(in) :: share
+    logical, intent(in) :: adaptive
+    type(variant_t), intent(inout) :: variant
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: moved(size(plan%values))
+    moved = plan%values
+    associate (one => plan%chosen(which), value => plan%values(which))
+      moved(which) = value + sense*share*max(abs(value), smallest_share*natural_size(trim(one%unit), plan%scales))
+      variant%step = moved(which) - value
+      if (moved(which) < one%lower .or. moved(which) > one%upper .or. (one%lower_open .and. moved(which) <= one%lower)) then
+        variant%step = 0
+        call fail(error, exit_bad_case, 'parameter '//trim(one%path)//': no room for a step within its bounds')
+        return
+      end if
+    end associate
+    call build(plan, moved, adaptive, variant%moving, error)
+    if (allocated(error)) variant%step = 0
+  end subroutine take_step
+
+end module variants

@@ -1,0 +1,191 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Effects added to a machine that are not one of its own laws with other numbers, and what a sensor shows. While
+!> sliding in direction s = +1 or -1 at the position x, the spring stretched by l, they add the force
+!>   F - c s v^2 - b s v + k3 l^3 - (K + E)(h - 1) s - a h,  h = max(0, 1 + slope x),
+!> K + E being the dry friction of the machine. Dahl's friction -h z takes the place of all dry friction. As the velocity
+!> keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
+!>   z = s K + (z_0 - s K) exp(-sigma s (x - x_0)/K),  K the level in that direction.
+module effect_law
+  use elementary, only: exponential
+  use friction_law, only: friction_t, stribeck_excess
+  use kinds, only: wp
+  use law_table, only: law_choice_t, value_of
+  implicit none
+  private
+
+  public :: add_to_effects, add_to_sensor, replace_friction, finish_effects, effect_force, effect_energy, &
+    effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed
+
+  real(wp), parameter :: farthest_behind = 100
+
+  type, public :: effects_t
+    !> Any force at all, and one that leaves no closed form.
+    logical :: present = .false., nonlinear = .false.
+    !> c [N s^2/m^2], b [N s/m], a [N], slope [1/m], k3 [N/m^3], F [N].
+    real(wp) :: quadratic_drag = 0, asymmetric_viscous = 0, asymmetric_coulomb = 0, friction_slope = 0, cubic = 0, offset = 0
+    !> Dahl's friction: sigma [N/m], 0 = none, and mean sliding level [N].
+    real(wp) :: dahl_stiffness = 0, dahl_sliding = 0
+  end type effects_t
+
+  !> A slip: its direction, and where it began with which z [N].
+  type, public :: slip_memory_t
+    real(wp) :: direction = 1, x = 0, z = 0
+  end type slip_memory_t
+
+  !> What is recorded at t: (1 + gain) x(t - delay) + bias.
+  type, public :: sensor_t
+    real(wp) :: bias = 0, gain = 0, delay = 0
+  end type sensor_t
+
+contains
+
+  !> Adds the effect of a choice of the family `effect`, if it is one of these.
+  pure subroutine add_to_effects(effects, choice)
+    type(effects_t), intent(inout) :: effects
+    type(law_choice_t), intent(in) :: choice
+    select case (choice%name)
+    case ('quadratic_drag')
+      effects%quadratic_drag = value_of(choice, 'coefficient')
+    case ('asymmetric_friction')
+      effects%asymmetric_coulomb = value_of(choice, 'coulomb')
+      effects%asymmetric_viscous = value_of(choice, 'viscous')
+    case ('position_dependent_friction')
+      effects%friction_slope = value_of(choice, 'slope')
+    case ('cubic_spring')
+      effects%cubic = value_of(choice, 'stiffness')
+    case ('offset_force')
+      effects%offset = value_of(choice, 'force')
+    case ('dahl')
+      effects%dahl_stiffness = value_of(choice, 'stiffness')
+    end select
+  end subroutine add_to_effects
+
+  !> The same for what a sensor shows.
+  pure subroutine add_to_sensor(sensor, choice)
+    type(sensor_t), intent(inout) :: sensor
+    type(law_choice_t), intent(in) :: choice
+    select case (choice%name)
+    case ('sensor_bias')
+      sensor%bias = value_of(choice, 'bias')
+    case ('sensor_gain')
+      sensor%gain = value_of(choice, 'gain')
+    case ('sensor_delay')
+      sensor%delay = value_of(choice, 'delay')
+    end select
+  end subroutine add_to_sensor
+
+  !> Dahl's friction, where it is, takes the place of the dry friction of the machine.
+  pure subroutine replace_friction(effects, friction)
+    type(effects_t), intent(inout) :: effects
+    type(friction_t), intent(inout) :: friction
+    if (.not. effects%dahl_stiffness > 0) return
+    effects%dahl_sliding = friction%kinetic
+    friction = friction_t(damping=friction%damping)
+  end subroutine replace_friction
+
+  !> What the effects together mean for the flights.
+  pure subroutine finish_effects(effects)
+    type(effects_t), intent(inout) :: effects
+    effects%nonlinear = effects%dahl_stiffness > 0 .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous, &
+                                                                 effects%friction_slope, effects%cubic]) > 0)
+    effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
+  end subroutine finish_effects
+
+  !> Force [N] on a body at `x` [m] that slips at `v` [m/s] as `slip` says, the spring being stretched by `stretch` [m].
+  !> Continued smoothly beyond v = 0, where a slip ends.
+  pure real(wp) function effect_force(effects, friction, slip, x, v, stretch) result(force)
+    type(effects_t), intent(in) :: effects
+    type(friction_t), intent(in) :: friction
+    type(slip_memory_t), intent(in) :: slip
+    real(wp), intent(in) :: x, v, stretch
+    real(wp) :: factor
+    force = effects%offset - slip%direction*(effects%quadratic_drag*v + effects%asymmetric_viscous)*v + effects%cubic*stretch**3
+    if (effects%dahl_stiffness > 0) then
+      force = force - friction_factor(effects, x)*dahl_force(effects, slip, x)
+    else if (abs(effects%friction_slope) > 0) then
+      factor = friction_factor(effects, x)
+      force = force - slip%direction*(factor - 1)*(friction%kinetic + stribeck_excess(friction, slip%direction*v)) &
+              - factor*effects%asymmetric_coulomb
+    else
+      force = force - effects%asymmetric_coulomb
+    end if
+  end function effect_force
+
+  !> Energy [J] of a body at `x` [m], the spring being stretched by `stretch` [m], in the cubic spring and the offset.
+  pure real(wp) function effect_energy(effects, x, stretch) result(energy)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: x, stretch
+    energy = effects%cubic*stretch**4/4 - effects%offset*x
+  end function effect_energy
+
+  !> Power [W] that dry friction and damping lose to the effects beyond what the law of friction loses without them.
+  pure function effect_losses(effects, friction, slip, x, v) result(losses)
+    type(effects_t), intent(in) :: effects
+    type(friction_t), intent(in) :: friction
+    type(slip_memory_t), intent(in) :: slip
+    real(wp), intent(in) :: x, v
+    real(wp) :: losses(2), factor
+    factor = friction_factor(effects, x)
+    if (effects%dahl_stiffness > 0) then
+      losses(1) = factor*dahl_force(effects, slip, x)*v
+    else
+      losses(1) = (factor - 1)*(friction%kinetic + stribeck_excess(friction, abs(v)))*abs(v) &
+                  + factor*effects%asymmetric_coulomb*v
+    end if
+    losses(2) = (effects%quadratic_drag*abs(v) + effects%asymmetric_viscous*slip%direction)*v**2
+  end function effect_losses
+
+  !> h, by which the place `x` [m] changes dry friction.
+  pure elemental real(wp) function friction_factor(effects, x) result(factor)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: x
+    factor = max(0.0_wp, 1 + effects%friction_slope*x)
+  end function friction_factor
+
+  !> Largest force [N] in `direction` +1 or -1 that holds no body at `x` [m].
+  pure real(wp) function break_away_level(effects, friction, x, direction) result(level)
+    type(effects_t), intent(in) :: effects
+    type(friction_t), intent(in) :: friction
+    real(wp), intent(in) :: x
+    integer, intent(in) :: direction
+    level = 0
+    if (effects%dahl_stiffness > 0) return
+    level = friction_factor(effects, x)*(friction%break_away + direction*effects%asymmetric_coulomb)
+  end function break_away_level
+
+  !> Dahl's z [N] after a long slip in `direction`; 0 at rest.
+  pure elemental real(wp) function dahl_level(effects, direction) result(z)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: direction
+    z = direction*effects%dahl_sliding + abs(direction)*effects%asymmetric_coulomb
+  end function dahl_level
+
+  !> Dahl's z [N] where a slip has come to `x` [m].
+  pure real(wp) function dahl_force(effects, slip, x) result(z)
+    type(effects_t), intent(in) :: effects
+    type(slip_memory_t), intent(in) :: slip
+    real(wp), intent(in) :: x
+    real(wp) :: level
+    z = 0
+    level = dahl_level(effects, slip%direction)
+    ! A trial step may look far behind the start.
+    if (abs(level) > 0) z = level + (slip%z - level)*exponential(min(farthest_behind, &
+                                                                     -effects%dahl_stiffness*(x - slip%x)/level))
+  end function dahl_force
+
+  !> The part of the force [N] that is the same wherever the body slides.
+  pure real(wp) function constant_force(effects) result(force)
+    type(effects_t), intent(in) :: effects
+    force = effects%offset - effects%asymmetric_coulomb
+  end function constant_force
+
+  !> What a sensor shows of a position [m].
+  pure elemental real(wp) function observed(sensor, x)
+    type(sensor_t), intent(in) :: sensor
+    real(wp), intent(in) :: x
+    observed = (1 + sensor%gain)*x + sensor%bias
+  end function observed
+
+end module effect_law

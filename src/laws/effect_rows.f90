@@ -1,0 +1,90 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Effects that may be added to a machine of one body: the rows of the catalogue. Any number of them, each once.
+module effect_rows
+  use kinds, only: wp
+  use law_row, only: law_row_t, none_above, none_below, parameter_row_t
+  implicit none
+  private
+
+  character(len=*), parameter :: sum_of_laws = 'sum of two laws'
+  character(len=*), parameter :: sensor = 'what a sensor shows; the motion is the same'
+
+  type(law_row_t), parameter, public :: effect_laws(17) = [ &
+    law_row_t('effect', 'viscous', '-b v', sum_of_laws), &
+    law_row_t('effect', 'coulomb', '-F sgn v; adds to sliding and to break-away friction', sum_of_laws), &
+    law_row_t('effect', 'quadratic_drag', '-c v |v|', 'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
+    law_row_t('effect', 'stribeck', '-E exp(-|v/v_s|^n) sgn v; adds E to break-away friction', &
+              'Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083'), &
+    law_row_t('effect', 'static_excess', 'adds to break-away friction', 'Coulomb, Theorie des machines simples (1785)'), &
+    law_row_t('effect', 'dahl', 'dry friction is -z, z'' = sigma (1 - z sgn(v)/Fc) v; no stick', &
+              'Dahl, Aerospace Corp. TOR-0158 (1968)'), &
+    law_row_t('effect', 'asymmetric_friction', '-a - b |v| while sliding; sticks up to Fs + a upwards, Fs - a downwards', &
+              'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)'), &
+    law_row_t('effect', 'position_dependent_friction', 'dry friction times max(0, 1 + slope x)', &
+              'Armstrong-Helouvry, Control of Machines with Friction (1991)'), &
+    law_row_t('effect', 'cubic_spring', 'k3 s^3, s = l0 + x_A - x', 'Duffing, Erzwungene Schwingungen (1918)'), &
+    law_row_t('effect', 'offset_force', 'constant force: preload or tilt', sum_of_laws), &
+    law_row_t('effect', 'restitution_slope', 'k falls with the speed of impact: k - slope |v|, not below 0', &
+              'Goldsmith, Impact (1960)'), &
+    law_row_t('effect', 'compliant_contact', 'rigid barriers become soft: K p^n (1 + a p''), never pulls', &
+              'Hunt, Crossley, J. Appl. Mech. 42 (1975)'), &
+    law_row_t('effect', 'second_barrier', 'a barrier on the free side, with the same law', sum_of_laws), &
+    law_row_t('effect', 'drive_ripple', 'crank angle phi + sine sin(n phi) + cosine cos(n phi) in place of phi', &
+              'Kononenko, Vibrating Systems with a Limited Power Supply (1969)'), &
+    law_row_t('effect', 'sensor_bias', 'a record shows x + bias', sensor), &
+    law_row_t('effect', 'sensor_gain', 'a record shows (1 + gain) x', sensor), &
+    law_row_t('effect', 'sensor_delay', 'a record shows x(t - delay)', sensor)]
+
+  type(parameter_row_t), parameter, public :: effect_parameters(24) = [ &
+    parameter_row_t('effect', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'b'), &
+    parameter_row_t('effect', 'coulomb', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'F'), &
+    parameter_row_t('effect', 'quadratic_drag', 'coefficient', 'N s^2/m^2', 0.0_wp, none_above, .false., .false., 0.0_wp, &
+                    .false., 'c'), &
+    parameter_row_t('effect', 'stribeck', 'excess', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'E, friction at zero speed above that at high speed'), &
+    parameter_row_t('effect', 'stribeck', 'velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'v_s'), &
+    parameter_row_t('effect', 'stribeck', 'exponent', '1', 0.0_wp, none_above, .true., .true., 2.0_wp, .false., &
+                    'n'), &
+    parameter_row_t('effect', 'static_excess', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'friction at break-away above that of the machine'), &
+    parameter_row_t('effect', 'dahl', 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'sigma, stiffness of the friction before it slides'), &
+    parameter_row_t('effect', 'asymmetric_friction', 'coulomb', 'N', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'a, dry friction upwards above the mean of both directions; at most that mean'), &
+    parameter_row_t('effect', 'asymmetric_friction', 'viscous', 'N s/m', none_below, none_above, .false., .true., 0.0_wp, &
+                    .false., 'b, viscous friction upwards above the mean of both directions'), &
+    parameter_row_t('effect', 'position_dependent_friction', 'slope', '1/m', none_below, none_above, .false., .false., 0.0_wp, &
+                    .false., 'relative change of dry friction per length'), &
+    parameter_row_t('effect', 'cubic_spring', 'stiffness', 'N/m^3', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'k3'), &
+    parameter_row_t('effect', 'offset_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'constant force upwards'), &
+    parameter_row_t('effect', 'restitution_slope', 'slope', 's/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'loss of restitution per speed'), &
+    parameter_row_t('effect', 'compliant_contact', 'stiffness', 'N/m^n', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'K'), &
+    parameter_row_t('effect', 'compliant_contact', 'damping', 's/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'a = lambda/K; 1/a bounds the speed of rebound'), &
+    parameter_row_t('effect', 'compliant_contact', 'exponent', '1', 0.5_wp, 10.0_wp, .false., .true., 1.5_wp, .false., &
+                    'n: 1 for flat surfaces, 1.5 for spheres (Hertz)'), &
+    parameter_row_t('effect', 'second_barrier', 'position', 'm', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'below an upper barrier, or above a lower one'), &
+    parameter_row_t('effect', 'drive_ripple', 'sine', 'rad', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'ripple of the crank angle in phase with sin(n phi)'), &
+    parameter_row_t('effect', 'drive_ripple', 'cosine', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'ripple of the crank angle in phase with cos(n phi)'), &
+    parameter_row_t('effect', 'drive_ripple', 'harmonic', '1', 1.0_wp, 64.0_wp, .false., .true., 1.0_wp, .false., &
+                    'n, a whole number'), &
+    parameter_row_t('effect', 'sensor_bias', 'bias', 'm', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'added to the position'), &
+    parameter_row_t('effect', 'sensor_gain', 'gain', '1', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'relative error of the scale'), &
+    parameter_row_t('effect', 'sensor_delay', 'delay', 's', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'of the sensor behind the drive; negative if it is ahead')]
+
+end module effect_rows

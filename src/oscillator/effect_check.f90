@@ -1,0 +1,149 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Which effects the laws of a machine have a place for.
+module effect_check
+  use errors, only: error_t, fail
+  use friction_law, only: add_to_friction, friction_of, friction_t
+  use kinds, only: real64, wp
+  use law_table, only: effect_family, law_choice_t, value_of
+  use status, only: exit_bad_case
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: refuse_effects
+
+contains
+
+  !> Refuses effects of one body that its laws have no place for. The message begins with the key.
+  pure subroutine refuse_effects(choices, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: problem
+    integer :: i
+    do i = 1, size(choices)
+      if (choices(i)%family /= effect_family) cycle
+      select case (choices(i)%name)
+      case ('restitution_slope', 'compliant_contact', 'second_barrier')
+        problem = contact_problem(choices, choices(i))
+      case ('drive_ripple')
+        problem = ripple_problem(choices, choices(i))
+      case ('dahl')
+        problem = dahl_problem(choices)
+      case ('asymmetric_friction')
+        problem = asymmetry_problem(choices, choices(i))
+      case default
+        cycle
+      end select
+      if (len(problem) == 0) cycle
+      call fail(error, exit_bad_case, 'effect.'//trim(choices(i)%name)//problem)
+      return
+    end do
+  end subroutine refuse_effects
+
+  !> What is wrong with an effect of the contact, '' if nothing.
+  pure function contact_problem(choices, effect) result(problem)
+    type(law_choice_t), intent(in) :: choices(:), effect
+    character(len=:), allocatable :: problem, law
+    real(wp) :: upper, lower, position
+    problem = ''
+    law = name_of(choices, 'contact')
+    select case (effect%name)
+    case ('restitution_slope')
+      if (law /= 'newton') problem = ': found with contact.law = "'//law//'", allowed with "newton"'
+      if (has_effect(choices, 'compliant_contact')) problem = ': found with effect.compliant_contact, allowed one of them'
+    case ('compliant_contact')
+      if (index(law, 'newton') /= 1) problem = ': found with contact.law = "'//law//'", allowed with the rigid ones: newton, '// &
+                                               'newton_linear, newton_power, newton_viscoelastic'
+    case default
+      if (law == 'none') then
+        problem = ': found with contact.law = "none", allowed with one barrier'
+        return
+      end if
+      upper = value_of(choices(position_of(choices, 'contact')), 'upper')
+      lower = value_of(choices(position_of(choices, 'contact')), 'lower')
+      position = value_of(effect, 'position')
+      if ((upper < huge(upper)) .eqv. (lower > -huge(lower))) then
+        problem = ': found with two barriers, allowed with one'
+      else if (upper < huge(upper) .and. position > upper) then
+        problem = '.position: found '//number(position)//' m, allowed at most contact.upper = '//number(upper)//' m'
+      else if (lower > -huge(lower) .and. position < lower) then
+        problem = '.position: found '//number(position)//' m, allowed at least contact.lower = '//number(lower)//' m'
+      end if
+    end select
+  end function contact_problem
+
+  pure function ripple_problem(choices, effect) result(problem)
+    type(law_choice_t), intent(in) :: choices(:), effect
+    character(len=:), allocatable :: problem, law
+    problem = ''
+    law = name_of(choices, 'drive')
+    if (law /= 'harmonic' .and. law /= 'fourier' .and. law /= 'crank_lever_rod') then
+      problem = ': found with drive.law = "'//law//'", allowed with harmonic, fourier, crank_lever_rod'
+    else if (abs(value_of(effect, 'harmonic') - anint(value_of(effect, 'harmonic'))) > 0) then
+      problem = '.harmonic: found '//number(value_of(effect, 'harmonic'))//', allowed a whole number'
+    end if
+  end function ripple_problem
+
+  !> Dahl's friction replaces break-away and the Stribeck excess.
+  pure function dahl_problem(choices) result(problem)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=:), allocatable :: problem
+    problem = ''
+    if (has_effect(choices, 'stribeck')) problem = ': found with effect.stribeck, allowed one of them'
+    if (has_effect(choices, 'static_excess')) problem = ': found with effect.static_excess, allowed one of them'
+  end function dahl_problem
+
+  !> Neither direction may have negative dry friction.
+  pure function asymmetry_problem(choices, effect) result(problem)
+    type(law_choice_t), intent(in) :: choices(:), effect
+    character(len=:), allocatable :: problem
+    type(friction_t) :: friction
+    real(wp) :: normal_force
+    integer :: i
+    normal_force = 0
+    i = position_of(choices, 'body')
+    if (i > 0) normal_force = value_of(choices(i), 'mass')*value_of(choices(i), 'gravity')
+    i = position_of(choices, 'friction')
+    if (i > 0) friction = friction_of(choices(i), normal_force)
+    do i = 1, size(choices)
+      if (choices(i)%family == effect_family) call add_to_friction(friction, choices(i))
+    end do
+    problem = ''
+    if (abs(value_of(effect, 'coulomb')) > friction%kinetic) then
+      problem = '.coulomb: found '//number(value_of(effect, 'coulomb'))//' N, allowed at most the sliding friction of the '// &
+                'machine, '//number(friction%kinetic)//' N, in magnitude'
+    end if
+  end function asymmetry_problem
+
+  !> Position of the choice of a family, 0 if there is none.
+  pure integer function position_of(choices, family)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: family
+    position_of = findloc(choices%family == family, .true., dim=1)
+  end function position_of
+
+  !> Name of the law of a family.
+  pure function name_of(choices, family) result(name)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: family
+    character(len=:), allocatable :: name
+    name = 'none'
+    if (position_of(choices, family) > 0) name = trim(choices(position_of(choices, family))%name)
+  end function name_of
+
+  pure logical function has_effect(choices, name)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: name
+    has_effect = any(choices%family == effect_family .and. choices%name == name)
+  end function has_effect
+
+  !> A value in a message, also where numbers are longer than doubles.
+  pure function number(value) result(text)
+    real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
+    text = to_text(real(value, real64))
+  end function number
+
+end module effect_check
