@@ -23,7 +23,7 @@ WINDOWS_PER_PERIOD = 10
 NEAR_BARRIER = 0.03
 """Share of the extent of the motion within which the body may be in impact."""
 STRIBECK_VELOCITY = 0.15
-THRESHOLDS = tuple(np.geomspace(0.02, 0.6, 12))
+THRESHOLDS = tuple(np.geomspace(0.005, 0.5, 14))
 MODELS = 40
 INCLUSION = 0.6
 

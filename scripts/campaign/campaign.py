@@ -15,7 +15,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2]
@@ -101,10 +101,8 @@ def ask(case: Path, seed: int, limit: float) -> dict:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-def run_case(folders: Folders, seed: int, number: int, limit: float) -> None:
+def run_case(folders: Folders, seed: int, number: int, limit: float, with_baselines: bool) -> None:
     """One case from hiding to result."""
-    from baselines import verdicts
-
     found = prepare(folders, seed, number)
     if found == UNREACHABLE:
         write_whole(folders.result(number), json.dumps({"number": number, "seal": found}) + "\n")
@@ -113,7 +111,11 @@ def run_case(folders: Folders, seed: int, number: int, limit: float) -> None:
     began = time.monotonic()
     verdict = ask(case, seed, limit)
     seconds = round(time.monotonic() - began, 2)
-    named = verdicts(case / records.BASE, [case / name for name in records.TRAINING], number)
+    named = {}
+    if with_baselines:
+        from baselines import verdicts
+
+        named = verdicts(case / records.BASE, [case / name for name in records.TRAINING], number)
     result = {"number": number, "seal": found, "verdict": verdict, "baselines": named, "seconds": seconds}
     write_whole(folders.result(number), json.dumps(result, default=plain) + "\n")
     told = " ".join(verdict.get("effects", [])) or "; ".join(verdict.get("reasons", []))
@@ -125,7 +127,7 @@ def plain(value: object) -> object:
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
-def work(numbers: list[int], do: "callable") -> None:
+def work(numbers: list[int], do: Callable[[int], None]) -> None:
     """Do all cases, handed out one by one by rank 0 where there is more than one rank."""
     if int(os.environ.get("OMPI_COMM_WORLD_SIZE", "1")) == 1:
         for number in numbers:
@@ -178,7 +180,9 @@ def main() -> int:
             work(missing, lambda number: prepare(folders, options.seed, number))
             return 0
         missing = [n for n in range(cases) if not folders.result(n).is_file()]
-        work(missing, lambda number: run_case(folders, options.seed, number, options.limit))
+        work(
+            missing, lambda number: run_case(folders, options.seed, number, options.limit, not options.subset)
+        )
     if int(os.environ.get("OMPI_COMM_WORLD_RANK", "0")) == 0:
         import report
 

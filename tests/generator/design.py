@@ -103,11 +103,11 @@ def plan(seed: int, number: int) -> tuple[str, str, float]:
         "pair": ["+".join(pair) for pair in PAIRS],
         "single": [*CATALOGUE, "asymmetric_viscous"],
     }[kind]
-    turn = np.random.default_rng([seed, 2, before // len(names), len(names)]).permutation(len(names))
+    turn, place = divmod(before, len(names))
+    order = np.random.default_rng([seed, 2, turn, len(names)]).permutation(len(names))
+    index = int(order[place])
     targets = (10.0, 30.0) if kind in ("outside", "pair") else TARGETS
-    round_of_names = before // len(names)
-    target = targets[(round_of_names + list(turn).index(turn[before % len(names)])) % len(targets)]
-    return kind, names[turn[before % len(names)]], target
+    return kind, names[index], targets[(turn + index) % len(targets)]
 
 
 def draw(seed: int, number: int) -> Case:

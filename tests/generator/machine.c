@@ -30,9 +30,12 @@ static double foot(const struct machine *m, double t) {
     phi += m->ripple_sine * sin(m->ripple_harmonic * phi) + m->ripple_cosine * cos(m->ripple_harmonic * phi);
   }
   phi += m->angle;
-  double sum = 0;
+  double c1 = cos(phi), s1 = sin(phi), c = c1, s = s1, sum = 0;
   for (int n = 0; n < HARMONICS; n++) {
-    sum += m->cosine[n] * cos((n + 1) * phi) + m->sine[n] * sin((n + 1) * phi);
+    sum += m->cosine[n] * c + m->sine[n] * s;
+    double next = c * c1 - s * s1;
+    s = s * c1 + c * s1;
+    c = next;
   }
   return m->mean + m->scale * sum;
 }
