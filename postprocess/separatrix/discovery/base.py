@@ -30,7 +30,10 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     best = Fitted((), model, problem, fit, ())
     if not fit.converged or fit.reduced_chi2 > 2:
         # from the case as it stands, at the full length at once, and on from where the first try ended
-        for begin, stages in ((np.array([one.value for one in free]), [data.last]), (fit.values, [1, data.last])):
+        for begin, stages in (
+            (np.array([one.value for one in free]), [data.last]),
+            (fit.values, [1, data.last]),
+        ):
             problem, fit = fit_stages(data, model, free, begin, stages=stages, most=40)
             if fit.good.sum() >= best.fit.good.sum() and fit.total < best.fit.total:
                 best = Fitted((), model, problem, fit, ())
@@ -46,7 +49,9 @@ def measure_noise(data: Data, problem: Problem, fit, mass: float) -> None:
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
         elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m")
+            prepared.note(
+                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
+            )
         if prepared.record.v is not None and not prepared.velocity_sigma_stated:
             prepared.velocity_sigma *= noise_of(problem, fit, number, 1, mass)[0]
 
@@ -81,4 +86,7 @@ def copy_noise(source: Data, target: Data) -> None:
 
 def with_fitted_values(base: Fitted) -> list[Free]:
     """What is free in the base, with the fitted values."""
-    return [replace(one, value=float(value)) for one, value in zip(base.problem.free, base.fit.values, strict=True)]
+    return [
+        replace(one, value=float(value))
+        for one, value in zip(base.problem.free, base.fit.values, strict=True)
+    ]

@@ -52,7 +52,7 @@ class Effect:
         return [f"effect.{self.name}.{key}" for key in self.starts(scales)]
 
 
-_FAR = 300.0
+_FAR = 20.0
 _SLIDING = "while the body slides, friction that differs with the direction by a constant is a constant force"
 _SHIFT = "where the position of the barrier is fitted, a shifted sensor is a constant force"
 
@@ -101,14 +101,21 @@ CATALOGUE: tuple[Effect, ...] = (
     Effect(
         "compliant_contact",
         lambda s: {
-            "stiffness": [1.25 * s.mass * s.impact_speed**2 / (share * s.length) ** 2.5 for share in (0.03, 0.008, 0.1)],
+            "stiffness": [
+                1.25 * s.mass * s.impact_speed**2 / (share * s.length) ** 2.5 for share in (0.03, 0.008, 0.1)
+            ],
             "damping": [0.6 / s.impact_speed],
         },
         positive=("stiffness", "damping"),
         needs=("contact.restitution",),
     ),
     Effect("second_barrier", lambda s: {"position": [np.nan]}, needs=("contact.restitution",)),
-    Effect("drive_ripple", lambda s: {"sine": [0.02], "cosine": [0.02]}, ("sine", "cosine"), needs=("drive.ratio",)),
+    Effect(
+        "drive_ripple",
+        lambda s: {"sine": [0.02], "cosine": [0.02]},
+        ("sine", "cosine"),
+        needs=("drive.ratio",),
+    ),
     Effect(
         "sensor_bias",
         lambda s: {"bias": [0.01 * s.length]},
@@ -133,8 +140,10 @@ class Candidate:
     # places of the parameters of the last effect in `free`
     added: tuple[int, ...]
     starts: list[np.ndarray]
-    # values of the added parameters at which the effect is absent, where there are such
-    absent: np.ndarray | None
+    # forms of the effect to screen: absent but for its shape, or of usual size where it is never absent
+    forms: list[np.ndarray]
+    # which of the added parameters are linear
+    linear: np.ndarray
 
 
 def text_with(text: str, effect: str, values: dict[str, float]) -> str:
@@ -171,10 +180,10 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
         else:
             added.append(Free(path, value, lower, upper, abs(value) or 1.0))
     place = tuple(range(len(whole), len(whole) + len(added)))
-    absent = None
-    if effect.linear:
-        absent = np.array([0.0 if key in effect.linear else one.value for key, one in zip(first, added, strict=True)])
-    return Candidate((*names, name), extended, whole + added, place, _starts(effect, sizes, added), absent)
+    starts = _starts(effect, sizes, added)
+    linear = np.array([key in effect.linear for key in first])
+    forms = np.unique(np.where(linear, 0.0, np.array(starts)), axis=0)
+    return Candidate((*names, name), extended, whole + added, place, starts, list(forms), linear)
 
 
 def _starts(effect: Effect, sizes: dict[str, list[float]], added: list[Free]) -> list[np.ndarray]:

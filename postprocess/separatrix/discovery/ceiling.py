@@ -70,7 +70,9 @@ def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
     weights = evaluation.used * fit.good[:, None]
     p = evaluation.by_parameter.shape[2]
     whole = np.concatenate([evaluation.by_parameter, columns], axis=2)
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0].total()
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[
+        0
+    ].total()
     left, score = project(matrix, gradient, p, ~fit.at_bound)
     # relative to what the columns were before anything was projected out
     size = np.sqrt(np.maximum(np.diag(matrix)[p:], 1e-300))
@@ -107,7 +109,9 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
         "speed": _splines(v, 7),
         "place": _splines(x, 7),
         "speed and place": _products(_splines(v, 4), _splines(x, 4)),
-        "time": np.stack([time * f for f in (one, x, v, sign)] + [time**2 * f for f in (one, x, sign)], axis=2),
+        "time": np.stack(
+            [time * f for f in (one, x, v, sign)] + [time**2 * f for f in (one, x, sign)], axis=2
+        ),
     }
     if phase is not None:
         waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
@@ -146,7 +150,9 @@ def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
         return None
     speed = before / state["speed"]
     scale = 0.1 * state["speed"]
-    return scale * np.stack([at * speed**n for n in range(4)] + [at * state["time"], at * state["time"] ** 2], axis=2)
+    return scale * np.stack(
+        [at * speed**n for n in range(4)] + [at * state["time"], at * state["time"] ** 2], axis=2
+    )
 
 
 def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:

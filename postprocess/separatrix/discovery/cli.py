@@ -80,7 +80,9 @@ def summary(verdict: dict) -> list[str]:
             unit = "" if found["unit"] == "1" else f" {found['unit']}"
             lines.append(f"  {path} = {found['value']:.4g} +- {found['standard_error']:.2g}{unit}")
     for use, gap in verdict["gap"].items():
-        lines.append(f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)")
+        lines.append(
+            f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"
+        )
     lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
     lines += [f"  {reason}" for reason in verdict["reasons"]]
     if verdict["separating_experiment"]:
@@ -122,18 +124,29 @@ def _parser() -> argparse.ArgumentParser:
         description="Find where measured records and a case disagree, name the missing effect, add it, and prove it.",
         epilog="Exit codes: 0 done (whatever the verdict), 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
     )
-    parser.add_argument("base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be")
+    parser.add_argument(
+        "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"
+    )
     parser.add_argument("records", metavar="RECORD", nargs="+", type=Path, help="record to fit (CSV or HDF5)")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results")
     parser.add_argument(
-        "--hold-out", metavar="FILE", type=Path, action="append", default=[], help="record that is never fitted; repeatable"
+        "--hold-out",
+        metavar="FILE",
+        type=Path,
+        action="append",
+        default=[],
+        help="record that is never fitted; repeatable",
     )
     parser.add_argument("--rest", metavar="FILE", type=Path, help="record at rest, for the noise")
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")
     parser.add_argument("--seed", type=_seed, default=1, help="of all random choices [1]")
     parser.add_argument("--effects", metavar="LIST", type=_names, help="only these effects of the catalogue")
     parser.add_argument(
-        "--segment-periods", metavar="N", type=_positive, default=1.0, help="longest segment in drive periods [1]"
+        "--segment-periods",
+        metavar="N",
+        type=_positive,
+        default=1.0,
+        help="longest segment in drive periods [1]",
     )
     parser.add_argument("--segment-seconds", metavar="S", type=_positive, help="longest segment in seconds")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")

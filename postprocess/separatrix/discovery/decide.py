@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 from separatrix.discovery.catalogue import BY_NAME
 from separatrix.discovery.ceiling import Ceiling, ceiling
 from separatrix.discovery.heldout import Prediction
-from separatrix.discovery.judge import Judged, adequate, admissible, detection, held_out_bounds, judged, stable
+from separatrix.discovery.judge import (
+    Judged,
+    adequate,
+    admissible,
+    detection,
+    held_out_bounds,
+    judged,
+    stable,
+)
 from separatrix.discovery.refit import Fitted, refit
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 
@@ -117,7 +125,9 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     return decision
 
 
-def _with_more(bench: Bench, decision: Decision, base: Fitted, best: Judged, rivals: list[Judged]) -> Decision:
+def _with_more(
+    bench: Bench, decision: Decision, base: Fitted, best: Judged, rivals: list[Judged]
+) -> Decision:
     """One effect is not enough: try a second on top of the best, and the pairs that the screen finds."""
     if bench.options.most_effects < 2:
         return _give_up(decision)

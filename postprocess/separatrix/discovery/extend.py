@@ -81,6 +81,13 @@ def machine_values(fitted: Fitted) -> dict[str, float]:
     for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
         if one.path == "nuisance:drive_scale":
             values |= {path: float(value) * size for path, size in fitted.problem.amplitudes.items()}
+    if fitted.problem.prepared[0].frequency is not None:
+        # a ratio to the natural frequency: that of the drive stays what it is in the base case
+        model = fitted.model
+        ratio = model.parameters["drive.ratio"].value
+        values["drive.ratio"] = (
+            ratio * model.drive_frequency({}) / model.drive_frequency({**values, "drive.ratio": ratio})
+        )
     return values
 
 

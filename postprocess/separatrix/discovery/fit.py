@@ -108,7 +108,9 @@ def eliminate(blocks: Blocks, damping: float = 0.0) -> tuple[Reduced, np.ndarray
     return Reduced(matrix, gradient), inverse, coupling
 
 
-def solve_scaled(matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float = 0.0) -> np.ndarray:
+def solve_scaled(
+    matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float = 0.0
+) -> np.ndarray:
     """Solve for the open unknowns in units of their own diagonal; directions without information stay."""
     step = np.zeros(gradient.size)
     diagonal = np.diag(matrix)
@@ -124,7 +126,9 @@ def solve_scaled(matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray, da
     return step
 
 
-def gauss_newton_step(blocks: Blocks, open_: np.ndarray, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray, float]:
+def gauss_newton_step(
+    blocks: Blocks, open_: np.ndarray, damping: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Steps of the starts and the parameters, and the decrease of chi^2 that the linear model promises."""
     reduced, inverse, coupling = eliminate(blocks, damping)
     matrix, gradient = reduced.total()
@@ -207,7 +211,9 @@ def _open_at(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.nda
     return (values > lower) & (values < upper)
 
 
-def _open(blocks: Blocks, values: np.ndarray, lower: np.ndarray, upper: np.ndarray, movable: np.ndarray) -> np.ndarray:
+def _open(
+    blocks: Blocks, values: np.ndarray, lower: np.ndarray, upper: np.ndarray, movable: np.ndarray
+) -> np.ndarray:
     """Unknowns that may move: not those at a bound that the step would leave."""
     open_ = movable.copy()
     for _ in range(values.size):

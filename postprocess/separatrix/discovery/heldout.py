@@ -49,7 +49,9 @@ def predict(data: Data, model, free: list[Free], values: np.ndarray, covariance:
     )
 
 
-def _fit_own(data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray) -> tuple[Problem, Fit]:
+def _fit_own(
+    data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray
+) -> tuple[Problem, Fit]:
     return fit_stages(data, model, free, values, stages=list(range(len(data.stages))), most=12, fixed=fixed)
 
 

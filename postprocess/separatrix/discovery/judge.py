@@ -41,7 +41,9 @@ class Judged:
         return self.training - self.parameters + self.held_out
 
 
-def judged(base: Fitted, foretold: Prediction | None, fitted: Fitted, prediction: Prediction | None) -> Judged:
+def judged(
+    base: Fitted, foretold: Prediction | None, fitted: Fitted, prediction: Prediction | None
+) -> Judged:
     """Evidence of a candidate over the base."""
     training, _ = gain_over(fitted, base)
     parts = np.zeros(0)

@@ -15,13 +15,17 @@ _LADDER = 4.0 ** np.arange(-3, 4)
 _RATIOS = np.linspace(0.6, 1.5, 19)
 _PERIODS = 3
 _ADVICE = {
-    frozenset(("offset_force", "asymmetric_friction")): "stop the drive and let the body stick: the middle between the "
+    frozenset(
+        ("offset_force", "asymmetric_friction")
+    ): "stop the drive and let the body stick: the middle between the "
     "places where it breaks away in either direction is off by force/stiffness for a constant force, not for friction "
     "that differs with the direction",
-    frozenset(("offset_force", "sensor_bias")): "measure the place of the barrier: the sensor's error shifts it, a "
-    "force does not",
-    frozenset(("asymmetric_friction", "sensor_bias")): "measure the place of the barrier: the sensor's error shifts it, "
-    "friction does not",
+    frozenset(
+        ("offset_force", "sensor_bias")
+    ): "measure the place of the barrier: the sensor's error shifts it, a force does not",
+    frozenset(
+        ("asymmetric_friction", "sensor_bias")
+    ): "measure the place of the barrier: the sensor's error shifts it, friction does not",
     frozenset(("sensor_gain", "sensor_bias")): "calibrate the sensor at two known positions",
     frozenset(("sensor_gain", "offset_force")): "calibrate the sensor at two known positions",
     frozenset(("sensor_gain", "asymmetric_friction")): "calibrate the sensor at two known positions",
@@ -37,9 +41,11 @@ def detectable(bench: Bench, found: Round) -> dict[str, dict]:
             continue
         path = made.free[made.added[0]].path
         unit = made.model.parameters[path].unit
-        if made.absent is not None and found.screened.live[name][0]:
-            size = bench.options.visible * float(found.screened.error[name][0]) * made.free[made.added[0]].size
-        elif made.absent is None and not bench.options.quick:
+        if found.screened.live[name][:1].any():
+            size = (
+                bench.options.visible * float(found.screened.error[name][0]) * made.free[made.added[0]].size
+            )
+        elif not made.linear.any() and not bench.options.quick:
             size = _by_ladder(bench, found, made)
         else:
             continue
@@ -62,7 +68,8 @@ def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
     for rung in rungs:
         free = list(made.free)
         free[place] = replace(free[place], value=float(np.log(rung) if free[place].positive else rung))
-        shown = signature(found.base.problem, found.base.fit, replace(made, free=free))
+        here = np.array([free[i].value for i in made.added])
+        shown = signature(found.base.problem, found.base.fit, replace(made, free=free, forms=[here]))
         if shown is None:
             visible.append(0.0)
             continue
@@ -111,7 +118,9 @@ def _distance(bench: Bench, one: Fitted, other: Fitted, ratio: float) -> float:
         times = np.tile(np.linspace(0, _PERIODS * period, 60), len(starts))
         state = np.column_stack([starts, np.zeros(len(starts))])
         first = np.arange(len(starts) + 1) * 60
-        flown = fitted.model.segments(list(values), np.array(list(values.values())), state, first, times, derivatives=False)
+        flown = fitted.model.segments(
+            list(values), np.array(list(values.values())), state, first, times, derivatives=False
+        )
         seen.append(flown.x)
     difference = seen[0] - seen[1]
     return float(np.sqrt(np.nanmean(difference**2))) if np.isfinite(difference).any() else np.nan

@@ -113,7 +113,9 @@ def drive_nuisances(model, phase_known: list[bool]) -> list[Free]:
 
 def record_nuisances(phase_known: list[bool]) -> list[Free]:
     """What is free for each record by itself."""
-    free = [Free("nuisance:phase", 0.0, size=0.01, record=i) for i, known in enumerate(phase_known) if not known]
+    free = [
+        Free("nuisance:phase", 0.0, size=0.01, record=i) for i, known in enumerate(phase_known) if not known
+    ]
     return free + [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(len(phase_known))]
 
 

@@ -61,7 +61,14 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
             f"{record.name}: x moves by {np.std(record.x):.3g} m (standard deviation) at a noise of {sigma:.3g} m: "
             "nothing but noise"
         )
-    prepared = Prepared(record, sigma, _velocity_noise(record), resolution, notes=notes, origin=record.header.get("phase_origin_s", float(record.t[0])))
+    prepared = Prepared(
+        record,
+        sigma,
+        _velocity_noise(record),
+        resolution,
+        notes=notes,
+        origin=record.header.get("phase_origin_s", float(record.t[0])),
+    )
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
     prepared.sigma_stated = rest is not None or "sensor_noise_sigma_m" in record.header
     prepared.velocity_sigma_stated = "sensor_noise_sigma_m_s" in record.header
@@ -110,7 +117,9 @@ def _find_drive(prepared: Prepared, model) -> None:
     ratio = model.parameters.get("drive.ratio")
     if ratio is None or not ratio.value:
         if "drive.interval" in model.parameters and record.force is None:
-            raise SeparatrixError(f"{record.name}: the machine has a measured force, the record has no column 'force'")
+            raise SeparatrixError(
+                f"{record.name}: the machine has a measured force, the record has no column 'force'"
+            )
         return
     if record.phi is not None:
         slope, start = np.polyfit(record.t - record.t[0], np.unwrap(record.phi), 1)
@@ -135,15 +144,21 @@ def _find_drive(prepared: Prepared, model) -> None:
         )
     periods = record.duration / record.interval / samples
     if periods < _FEWEST_PERIODS:
-        raise SeparatrixError(f"{record.name}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed")
+        raise SeparatrixError(
+            f"{record.name}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
+        )
 
 
 def _check_size(prepared: Prepared, model) -> None:
     """A record far larger or smaller than the machine has the wrong unit or another machine."""
     sizes = [
-        abs(p.value) for path, p in model.parameters.items() if path.startswith(("drive.cosine", "drive.sine", "drive.amplitude"))
+        abs(p.value)
+        for path, p in model.parameters.items()
+        if path.startswith(("drive.cosine", "drive.sine", "drive.amplitude"))
     ]
-    sizes += [abs(p.value) for path, p in model.parameters.items() if path in ("contact.upper", "contact.lower")]
+    sizes += [
+        abs(p.value) for path, p in model.parameters.items() if path in ("contact.upper", "contact.lower")
+    ]
     sizes = [size for size in sizes if 0 < size < 1e100]
     if prepared.frequency is None or not sizes:
         return
@@ -180,6 +195,8 @@ def _note_delay(prepared: Prepared) -> None:
     overlap = [float(np.corrcoef(np.roll(record.v, shift)[inner], slope[inner])[0, 1]) for shift in shifts]
     best = int(np.argmax(overlap))
     if overlap[best] < 0.5:
-        raise SeparatrixError(f"{record.name}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})")
+        raise SeparatrixError(
+            f"{record.name}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
+        )
     if shifts[best]:
         prepared.notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")

@@ -67,7 +67,9 @@ class Problem:
         rows = np.flatnonzero(self.segments.record == number)
         first, last = self.segments.first[rows], self.segments.last[rows]
         offsets = np.concatenate([[0], np.cumsum(last - first)])
-        samples = np.concatenate([np.arange(a, b) for a, b in zip(first, last, strict=True)] or [np.zeros(0, int)])
+        samples = np.concatenate(
+            [np.arange(a, b) for a, b in zip(first, last, strict=True)] or [np.zeros(0, int)]
+        )
         starts = record.t[first]
         times = record.t[samples] - np.repeat(starts, last - first)
         return {
@@ -130,7 +132,13 @@ class Problem:
         return table
 
     def _evaluate_record(
-        self, number: int, part: dict, values: np.ndarray, starts: np.ndarray, derivatives: bool, out: Evaluation
+        self,
+        number: int,
+        part: dict,
+        values: np.ndarray,
+        starts: np.ndarray,
+        derivatives: bool,
+        out: Evaluation,
     ) -> None:
         prepared = self.prepared[number]
         active, given, chain = self._active(number, values, derivatives)
@@ -145,7 +153,9 @@ class Problem:
         out.x[rows] = _padded(result.x, inside)
         out.v[rows] = _padded(result.v, inside)
         hits = result.impact
-        out.impacts[number] = np.column_stack([hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side])
+        out.impacts[number] = np.column_stack(
+            [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side]
+        )
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
@@ -167,7 +177,9 @@ class Problem:
                 out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma, inside))
                 out.by_parameter[rows, columns] = np.nan_to_num(_padded(by_parameter / sigma, inside))
 
-    def _simulate(self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, derivatives: bool):
+    def _simulate(
+        self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, derivatives: bool
+    ):
         more = {} if part["force"] is None else {"force": part["force"]}
         return self.model.segments(
             active, given, start, part["offsets"], part["times"], derivatives=derivatives, **more
@@ -176,7 +188,9 @@ class Problem:
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
         chosen = {
-            one.path: one.physical(value) for one, value in zip(self.free, values, strict=True) if not one.is_nuisance
+            one.path: one.physical(value)
+            for one, value in zip(self.free, values, strict=True)
+            if not one.is_nuisance
         }
         prepared = self.prepared[number]
         scale = prepared.drive_scale * self._nuisance("nuisance:drive_scale", number, values, 1.0)
@@ -230,7 +244,10 @@ class Problem:
         if one.path not in ("restoring.stiffness", "restoring.moment", "body.mass"):
             return 0.0
         step = 1e-5 * abs(chosen[one.path])
-        ends = [self.model.drive_frequency({**chosen, one.path: chosen[one.path] + sign * step}) for sign in (1, -1)]
+        ends = [
+            self.model.drive_frequency({**chosen, one.path: chosen[one.path] + sign * step})
+            for sign in (1, -1)
+        ]
         slope = (ends[0] - ends[1]) / (2 * step)
         return -ratio * slope / (0.5 * (ends[0] + ends[1]))
 
@@ -265,9 +282,13 @@ class Problem:
             active = [*active, *self.amplitudes]
             base = np.concatenate([np.zeros(given.size), list(self.amplitudes.values())])
             given = np.concatenate([given, list(self.amplitudes.values())])
-        ends = [self._simulate(part, active, given + sign * _SCALE_STEP * base, start, False) for sign in (1, -1)]
+        ends = [
+            self._simulate(part, active, given + sign * _SCALE_STEP * base, start, False) for sign in (1, -1)
+        ]
         steady = np.asarray(ends[0].impacts) == np.asarray(ends[1].impacts)
-        return [(getattr(ends[0], name) - getattr(ends[1], name)) / (2 * _SCALE_STEP) for name in ("x", "v")], steady
+        return [
+            (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * _SCALE_STEP) for name in ("x", "v")
+        ], steady
 
 
 def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -106,7 +106,9 @@ def _read_csv(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], int]:
 def _names(path: Path, number: int, text: str) -> list[str]:
     names = [name.strip() for name in text.split(",")]
     if "t" not in names or "x" not in names:
-        raise SeparatrixError(f"{path}:{number}: found the header row '{text}', expected 't,x[,v,a,force,phi]'")
+        raise SeparatrixError(
+            f"{path}:{number}: found the header row '{text}', expected 't,x[,v,a,force,phi]'"
+        )
     if len(set(names)) != len(names):
         raise SeparatrixError(f"{path}:{number}: a column is named twice in '{text}'")
     return names
@@ -148,7 +150,9 @@ def _text(value: object) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
-def _checked(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], first_row: int | None) -> Record:
+def _checked(
+    path: Path, header: dict[str, str], columns: dict[str, np.ndarray], first_row: int | None
+) -> Record:
     def where(row: int) -> str:
         return f"{path}, row {row + 1}" if first_row is None else f"{path}:{first_row + row}"
 
@@ -166,7 +170,9 @@ def _checked(path: Path, header: dict[str, str], columns: dict[str, np.ndarray],
     back = np.flatnonzero(steps <= 0)
     if back.size:
         row = int(back[0]) + 1
-        raise SeparatrixError(f"{where(row)}: time does not increase ({t[row]:.9g} s after {t[row - 1]:.9g} s)")
+        raise SeparatrixError(
+            f"{where(row)}: time does not increase ({t[row]:.9g} s after {t[row - 1]:.9g} s)"
+        )
     usual = float(np.median(steps))
     rate = numbers.get("sampling_rate_hz")
     if rate is not None and not 0.99 < rate * usual < 1.01:
@@ -237,7 +243,9 @@ def _check_clipping(x: np.ndarray, numbers: dict, where, warnings: list[str]) ->
         if not long:
             continue
         share = sum(last - first for first, last in long) / x.size
-        message = f"{where(long[0][0])}: x stays at its {name} value {extreme:.6g} m for {len(long)} stretches"
+        message = (
+            f"{where(long[0][0])}: x stays at its {name} value {extreme:.6g} m for {len(long)} stretches"
+        )
         if len(long) >= 2 and share > _CLIPPED_SHARE and not grid:
             raise SeparatrixError(f"{message}, {100 * share:.0f} % of the samples: clipped")
         warnings.append(f"{message}: clipped?")

@@ -47,8 +47,18 @@ class Fitted:
         return covariance * max(1.0, self.fit.reduced_chi2)
 
 
-def refit(data: Data, base: Fitted, candidate: Candidate, screened: Screened | None, quick: bool = False) -> Fitted:
-    """The best of several starts: the linearised estimate first, then usual sizes from short segments on."""
+def refit(
+    data: Data,
+    base: Fitted,
+    candidate: Candidate,
+    screened: Screened | None,
+    quick: bool = False,
+    floor: float = 0.0,
+) -> Fitted:
+    """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
+
+    `floor`: the reduced chi^2 that is good enough, that of noise as far as it is known.
+    """
     best = None
     tries = 0
     values = _base_values(base, candidate)
@@ -70,14 +80,16 @@ def refit(data: Data, base: Fitted, candidate: Candidate, screened: Screened | N
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, tries)
         if best is None or gain_over(found, best)[0] > 0:
             best = found
-        if (kind == "linear" or quick) and best.fit.converged and best.fit.reduced_chi2 < _FINE:
+        if best.fit.converged and best.fit.reduced_chi2 < max(_FINE, floor) and (quick or kind != "far"):
             break
     best.tries = tries
     return best
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
-    known = {(one.path, one.record): value for one, value in zip(base.problem.free, base.fit.values, strict=True)}
+    known = {
+        (one.path, one.record): value for one, value in zip(base.problem.free, base.fit.values, strict=True)
+    }
     return np.array([known.get((one.path, one.record), one.value) for one in candidate.free])
 
 
@@ -86,17 +98,19 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
     lower = np.array([candidate.free[i].lower for i in candidate.added])
     upper = np.array([candidate.free[i].upper for i in candidate.added])
     starts = []
-    if candidate.absent is not None and screened is not None and name in screened.step:
-        sizes = np.array([candidate.free[i].size for i in candidate.added])
-        step = np.zeros(sizes.size)
+    if screened is not None and name in screened.step:
+        guess = screened.origin[name].copy()
         live = screened.live[name]
-        step[live] = screened.step[name] * sizes[live]
-        guess = np.clip(candidate.absent + step, lower, upper)
-        # away from zero, where its other parameters could not move
-        small = guess == candidate.absent
-        starts.append(("linear", np.where(small & (candidate.absent == 0), 0.01 * sizes, guess)))
-    else:
-        starts += [("near", start) for start in candidate.starts]
+        if live.any():
+            sizes = np.array([candidate.free[i].size for i in candidate.added])
+            guess[live] += screened.step[name] * sizes[live]
+            guess = np.clip(guess, lower, upper)
+            # away from zero, where its other parameters could not move
+            guess = np.where((guess == 0) & candidate.linear, 0.01 * sizes, guess)
+            starts.append(("linear", guess))
+        else:
+            starts.append(("near", guess))
+    starts += [("near", start) for start in candidate.starts if not candidate.linear.all()]
     starts += [("far", start) for start in candidate.starts]
     return [(kind, np.clip(start, lower, upper)) for kind, start in starts]
 

@@ -20,7 +20,9 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
     inside = segments.inside
     transition = fit.evaluation.transition
     times = sample_times(problem)
-    determinant = transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
+    determinant = (
+        transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
+    )
     # a body that sticks forgets: from there on a force does nothing
     alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & inside, axis=1)
     safe = np.where(alive, determinant, 1.0)
@@ -39,7 +41,9 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
 def kick_columns(problem: Problem, fit: Fit, kicks: np.ndarray) -> np.ndarray:
     """Columns of sudden changes of velocity (segments, length, q) [m/s] at the samples."""
     transition = fit.evaluation.transition
-    determinant = transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
+    determinant = (
+        transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
+    )
     alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & problem.segments.inside, axis=1)
     safe = np.where(alive, determinant, 1.0)
     back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)

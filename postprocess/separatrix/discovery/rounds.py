@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from separatrix.discovery.catalogue import BY_NAME, CATALOGUE, Candidate, Scales, candidate
+from separatrix.discovery.catalogue import CATALOGUE, Candidate, Scales, candidate
 from separatrix.discovery.data import Data
 from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
@@ -17,8 +17,10 @@ from separatrix.discovery.screen import Screened, Signature, screen, signature
 
 _CERTAIN_REFITS = 5
 _RELATED = 0.7
-# half the chi^2 that a candidate must take to be worth a refit, where the base is good already
-_WORTH = 2.0
+# log-likelihood that a candidate must promise to be worth a refit, where the base is good already
+_WORTH = 1.0
+_FEWEST = 2
+_BAD = 1.3
 
 
 @dataclass
@@ -86,18 +88,16 @@ def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: fl
 def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
     order = sorted(screened.names, key=lambda name: -screened.gain[name])
-    if base.fit.reduced_chi2 > 1.3 and not options.quick:
+    if base.fit.reduced_chi2 > _BAD and not options.quick:
         return order
-    best = order[:_CERTAIN_REFITS]
-    kept = [
+    return [
         name
-        for name in order
-        if name in best
-        or any(screened.cosine(name, other) > _RELATED for other in best[:3])
-        or not BY_NAME[name].linear
+        for place, name in enumerate(order)
+        if place < _CERTAIN_REFITS
+        and (screened.gain[name] > _WORTH or place < _FEWEST)
         or screened.gain[name] > _WORTH
+        and (not options.quick and any(screened.cosine(name, other) > _RELATED for other in order[:3]))
     ]
-    return kept[:_CERTAIN_REFITS] if options.quick else kept
 
 
 def pair_gains(screen_round: Round) -> list[tuple[float, str, str]]:
@@ -110,7 +110,9 @@ def pair_gains(screen_round: Round) -> list[tuple[float, str, str]]:
     signatures = screen_round.signatures
     columns = np.concatenate([evaluation.by_parameter, *[one.columns for one in signatures]], axis=2)
     weights = evaluation.used * fit.good[:, None]
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[0].total()
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
+        0
+    ].total()
     left, score = project(matrix, gradient, evaluation.by_parameter.shape[2], ~fit.at_bound)
     edges = np.cumsum([0, *[one.columns.shape[2] for one in signatures]])
     found = []

@@ -18,13 +18,12 @@ from separatrix.discovery.problem import Problem
 
 @dataclass
 class Signature:
-    """Columns (segments, width, q) of the effect of size `size`, and the values of its parameters there."""
+    """Columns (segments, width, q) of an effect of the usual size, and the values of its parameters there."""
 
     name: str
     columns: np.ndarray
-    sizes: np.ndarray
     origin: np.ndarray
-    steady: np.ndarray
+    # which parameters the columns belong to; none: the effect as a whole
     live: np.ndarray
 
 
@@ -38,6 +37,7 @@ class Screened:
     error: dict[str, np.ndarray]
     # which parameters of an effect have a signature of their own
     live: dict[str, np.ndarray]
+    origin: dict[str, np.ndarray]
     cosines: np.ndarray
 
     def cosine(self, one: str, other: str) -> float:
@@ -46,33 +46,43 @@ class Screened:
 
 
 def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None:
-    """What the added effect does at the fitted base; None where the simulator cannot say."""
-    values = np.array([one.value for one in candidate.free])
+    """What the added effect does at the fitted base, in its most telling form; None where it does nothing."""
     by_path = {(one.path, one.record): value for one, value in zip(base.free, fit.values, strict=True)}
-    for i, one in enumerate(candidate.free):
-        values[i] = by_path.get((one.path, one.record), values[i])
-    added = list(candidate.added)
+    values = np.array([by_path.get((one.path, one.record), one.value) for one in candidate.free])
     problem = Problem(candidate.model, base.prepared, base.segments, candidate.free)
-    sizes = np.array([candidate.free[i].size for i in added])
+    added = list(candidate.added)
+    best, best_gain = None, -1.0
+    for origin in candidate.forms:
+        values[added] = origin
+        shown = _shown(problem, fit, candidate, values)
+        if shown is not None:
+            gain = screen(fit, [shown]).gain[shown.name]
+            if gain > best_gain:
+                best, best_gain = shown, gain
+    return best
+
+
+def _shown(problem: Problem, fit: Fit, candidate: Candidate, values: np.ndarray) -> Signature | None:
+    """The signature at given shape parameters."""
+    added = list(candidate.added)
     good = fit.good
-    if candidate.absent is None:
-        # no size at which the effect is absent: the difference that its usual size makes
+    if not candidate.linear.any():
+        # no size at which the effect is absent: the difference that this one makes
         shown = problem.evaluate(values, fit.starts, derivatives=False)
         columns = (fit.evaluation.residual - shown.residual)[:, :, None]
         steady = good & ~shown.failed
-        origin, sizes, live = values[added], np.ones(1), np.zeros(len(added), bool)
+        live = np.zeros(len(added), bool)
     else:
-        values[added] = candidate.absent
         shown = problem.evaluate(values, fit.starts)
+        sizes = np.array([candidate.free[i].size for i in added])
         columns = shown.by_parameter[:, :, added] * sizes
-        live = np.any(columns != 0, axis=(0, 1))
-        columns, sizes = columns[:, :, live], np.where(live, sizes, 0)
+        live = candidate.linear & np.any(columns != 0, axis=(0, 1))
+        columns = columns[:, :, live]
         steady = good & ~shown.failed & shown.steady
-        origin = candidate.absent
     if steady.sum() < 2 or not np.any(columns):
         return None
     columns = np.where(steady[:, None, None], columns, 0)
-    return Signature(candidate.names[-1], columns, sizes, origin, steady, live)
+    return Signature(candidate.names[-1], columns, values[added], live)
 
 
 def screen(fit: Fit, signatures: list[Signature]) -> Screened:
@@ -106,10 +116,14 @@ def screen(fit: Fit, signatures: list[Signature]) -> Screened:
             shared = roots[i] @ cross @ roots[j].T
             size = np.linalg.norm(shared, 2) if shared.size else 0.0
             cosines[i, j] = cosines[j, i] = min(1.0, float(size))
-    return Screened(names, gain, step, error, {one.name: one.live for one in signatures}, cosines)
+    live = {one.name: one.live for one in signatures}
+    origin = {one.name: one.origin for one in signatures}
+    return Screened(names, gain, step, error, live, origin, cosines)
 
 
-def project(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def project(
+    matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Schur complement of the first p unknowns (those that are open)."""
     kept = np.flatnonzero(open_ & (np.diag(matrix)[:p] > 0))
     inner = matrix[np.ix_(kept, kept)]

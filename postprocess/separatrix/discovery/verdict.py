@@ -51,7 +51,10 @@ def verdict_of(findings: Findings) -> dict:
         "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
         "candidates": [_candidate(one) for one in first.judged],
-        "ceiling": {one.name: {"gain": one.gain, "rank": one.rank, "p": one.p} for one in decision.base_ceiling.families},
+        "ceiling": {
+            one.name: {"gain": one.gain, "rank": one.rank, "p": one.p}
+            for one in decision.base_ceiling.families
+        },
         "not_tested": bench.absent,
         "warnings": _warnings(findings),
         "records": _records(findings),
@@ -96,7 +99,9 @@ def _warnings(findings: Findings) -> list[str]:
         notes.append("the base machine did not converge")
     lost = int((~fit.good).sum())
     if lost:
-        notes.append(f"{lost} of {lost + int(fit.good.sum())} segments are not used: their impacts are not steady")
+        notes.append(
+            f"{lost} of {lost + int(fit.good.sum())} segments are not used: their impacts are not steady"
+        )
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     if contact and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)

@@ -83,7 +83,9 @@ def _bins(name: str, unit: str, values: np.ndarray, inside: np.ndarray, count: i
     edges = np.unique(np.quantile(values[usable], np.linspace(0, 1, count + 1)))
     if edges.size < 3:
         return None
-    place = np.clip(np.searchsorted(edges, np.where(usable, values, edges[0]), side="right") - 1, 0, edges.size - 2)
+    place = np.clip(
+        np.searchsorted(edges, np.where(usable, values, edges[0]), side="right") - 1, 0, edges.size - 2
+    )
     member = ((place[:, :, None] == np.arange(edges.size - 1)) & usable[:, :, None]).astype(float)
     return name, unit, edges, None, member
 
@@ -109,7 +111,9 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
     total, gradient = reduced.total()
     # parameters of the base projected out, segment by segment, by the same combination of their columns
     scale = 1 / np.sqrt(np.maximum(np.diag(total)[:p], 1e-300))
-    inner = np.linalg.pinv(total[:p, :p] * np.outer(scale, scale), rcond=1e-11, hermitian=True) * np.outer(scale, scale)
+    inner = np.linalg.pinv(total[:p, :p] * np.outer(scale, scale), rcond=1e-11, hermitian=True) * np.outer(
+        scale, scale
+    )
     mixture = inner @ total[:p, p:]
     cross = reduced.matrix[:, p:, :p]
     size = (
@@ -163,7 +167,12 @@ def sentences(maps: list[Map]) -> list[dict]:
 def _region(one: Map, place: int) -> dict:
     if one.other_edges is None:
         low, high = float(one.edges[place]), float(one.edges[place + 1])
-        return {"from": low, "to": high, "unit": one.unit, "text": f"at {one.name} {low:.3g} to {high:.3g} {one.unit}"}
+        return {
+            "from": low,
+            "to": high,
+            "unit": one.unit,
+            "text": f"at {one.name} {low:.3g} to {high:.3g} {one.unit}",
+        }
     columns = one.other_edges.size - 1
     i, j = divmod(place, columns)
     x, v = one.edges[i : i + 2], one.other_edges[j : j + 2]

@@ -72,7 +72,11 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
 
     free = with_values(fitted.problem.free, fitted.fit.values)
     shared = [one for one in free if one.record is None]
-    own = record_nuisances([one.phase_known for one in held_out.prepared]) if held_out.prepared[0].frequency else []
+    own = (
+        record_nuisances([one.phase_known for one in held_out.prepared])
+        if held_out.prepared[0].frequency
+        else []
+    )
     whole = shared + own
     find_phases(held_out, model, whole)
     problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0])
@@ -100,15 +104,34 @@ def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record],
         return records[:-1], records[-1:], f"the last record, {records[-1].name}"
     whole = records[0]
     at = int(0.7 * whole.t.size)
-    return [_cut(whole, 0, at, "")], [_cut(whole, at, whole.t.size, "_end")], "the last 30 % of the only record"
+    return (
+        [_cut(whole, 0, at, "")],
+        [_cut(whole, at, whole.t.size, "_end")],
+        "the last 30 % of the only record",
+    )
 
 
 def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
     part = slice(first, last)
-    pieces = [(max(a, first) - first, min(b, last) - first) for a, b in record.pieces if min(b, last) > max(a, first)]
-    channels = {name: None if getattr(record, name) is None else getattr(record, name)[part] for name in ("v", "a", "force", "phi")}
+    pieces = [
+        (max(a, first) - first, min(b, last) - first)
+        for a, b in record.pieces
+        if min(b, last) > max(a, first)
+    ]
+    channels = {
+        name: None if getattr(record, name) is None else getattr(record, name)[part]
+        for name in ("v", "a", "force", "phi")
+    }
     header = dict(record.header)
     if first and "phase" in header:
         # the header tells the crank angle at the first row of the whole record
         header["phase_origin_s"] = float(record.t[0])
-    return Record(record.name + suffix, record.t[part], record.x[part], header=header, pieces=pieces, warnings=list(record.warnings), **channels)
+    return Record(
+        record.name + suffix,
+        record.t[part],
+        record.x[part],
+        header=header,
+        pieces=pieces,
+        warnings=list(record.warnings),
+        **channels,
+    )
