@@ -22,11 +22,11 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     free = base_parameters(model, force) + drive_nuisances(model, [one.phase_known for one in data.prepared])
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
-    for _ in range(2):
-        problem, fit = fit_stages(data, model, free, values, stages=[0])
-        measure_noise(data, problem, fit, mass)
-        values = fit.values
-    problem, fit = fit_stages(data, model, free, values, stages=[0, *range(1, data.last + 1)])
+    problem, fit = fit_stages(data, model, free, values, stages=[0, 1])
+    measure_noise(data, problem, fit, mass)
+    problem, fit = fit_stages(
+        data, model, free, fit.values, stages=list(range(1, data.last + 1)), begin=(1, fit)
+    )
     best = Fitted((), model, problem, fit, ())
     if not fit.converged or fit.reduced_chi2 > 2:
         # from the case as it stands, at the full length at once, and on from where the first try ended
@@ -41,19 +41,24 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
 
 
 def measure_noise(data: Data, problem: Problem, fit, mass: float) -> None:
-    """Set what the records do not state, and doubt what they state if the samples scatter more."""
+    """Set what the records do not state, and doubt what they state if the samples scatter more.
+
+    The fit must have been made without memory.
+    """
+    factors, memory = noise_of(problem, fit, 0, mass)
     for number, prepared in enumerate(data.prepared):
-        factor, memory = noise_of(problem, fit, number, 0, mass)
-        prepared.memory = memory
-        measured = prepared.sigma * factor
+        measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
         elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(
-                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
-            )
-        if prepared.record.v is not None and not prepared.velocity_sigma_stated:
-            prepared.velocity_sigma *= noise_of(problem, fit, number, 1, mass)[0]
+            prepared.note(f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m")
+    if any(one.record.v is not None for one in data.prepared):
+        factors, _ = noise_of(problem, fit, 1, mass)
+        for number, prepared in enumerate(data.prepared):
+            if prepared.record.v is not None and not prepared.velocity_sigma_stated:
+                prepared.velocity_sigma *= factors.get(number, 1.0)
+    for prepared in data.prepared:
+        prepared.memory = memory
 
 
 def find_phases(data: Data, model, free: list[Free]) -> None:

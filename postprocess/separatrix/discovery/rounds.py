@@ -12,7 +12,7 @@ from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, refit
+from separatrix.discovery.refit import Fitted, gain_over, refit
 from separatrix.discovery.screen import Screened, Signature, screen, signature
 
 _CERTAIN_REFITS = 5
@@ -76,10 +76,13 @@ def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: fl
         bench.absent.setdefault(name, "it changes nothing in these records")
     screened = screen(base.fit, signatures)
     chosen = choose(base, screened, options)
-    found = []
+    found: list[Judged] = []
+    rival = None
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, options.quick)
+        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick)
+        if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
+            rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted)))
     found.sort(key=lambda one: -one.evidence)
     return Round(base, foretold, candidates, signatures, screened, found)

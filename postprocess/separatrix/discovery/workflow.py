@@ -79,7 +79,7 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
     )
     whole = shared + own
     find_phases(held_out, model, whole)
-    problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0])
+    problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0, 1])
     measure_noise(held_out, problem, fit, mass)
     copy_noise(training, held_out)
 
