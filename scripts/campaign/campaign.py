@@ -12,10 +12,12 @@ import argparse
 import json
 import os
 import signal
+import subprocess
 import sys
 import time
 import traceback
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2]
@@ -30,6 +32,14 @@ KEPT = (
     " records seed version runtime_s"
 ).split()
 UNREACHABLE = "unreachable"
+
+
+@cache
+def commit() -> str:
+    """The commit of the source, as far as that is known."""
+    words = ["git", "-C", str(SOURCE), "rev-parse", "--short", "HEAD"]
+    result = subprocess.run(words, capture_output=True, text=True)
+    return result.stdout.strip() or "unknown"
 
 
 class Late(Exception):
@@ -116,7 +126,8 @@ def run_case(folders: Folders, seed: int, number: int, limit: float, with_baseli
         from baselines import verdicts
 
         named = verdicts(case / records.BASE, [case / name for name in records.TRAINING], number)
-    result = {"number": number, "seal": found, "verdict": verdict, "baselines": named, "seconds": seconds}
+    result = {"number": number, "commit": commit(), "seal": found, "verdict": verdict}
+    result |= {"baselines": named, "seconds": seconds}
     write_whole(folders.result(number), json.dumps(result, default=plain) + "\n")
     told = " ".join(verdict.get("effects", [])) or "; ".join(verdict.get("reasons", []))
     print(f"case {number}: {verdict['outcome']} {told} ({seconds:.0f} s)", flush=True)

@@ -41,11 +41,9 @@ def scores_of(folders: object, cases: int) -> tuple[list[Score], int]:
 
 
 def versions(folders: object, found: list[Score]) -> str:
-    """Versions of the program that gave the verdicts."""
-    names = {
-        json.loads(folders.result(one.number).read_text())["verdict"].get("version", "none") for one in found
-    }
-    return ", ".join(sorted(names - {"none"}))
+    """Commits whose workflow gave the verdicts."""
+    commits = [json.loads(folders.result(one.number).read_text())["commit"] for one in found]
+    return ", ".join(f"{name} ({commits.count(name)})" for name in dict.fromkeys(commits))
 
 
 def percent(share: float) -> str:
