@@ -5,7 +5,7 @@
 import json
 import math
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import figure
@@ -23,10 +23,10 @@ class Broken(Exception):
     """A truth does not fit its seal."""
 
 
-def scores_of(folders: object, cases: int) -> tuple[list[Score], int]:
+def scores_of(folders: object, numbers: Sequence[int]) -> tuple[list[Score], int]:
     """All cases with a result, judged, and the number of those whose effect could not have its size."""
     found, unreachable = [], 0
-    for number in range(cases):
+    for number in numbers:
         if not folders.result(number).is_file():
             continue
         result = json.loads(folders.result(number).read_text())
@@ -146,15 +146,17 @@ def baselines(found: list[Score]) -> list[list[str]]:
     return rows
 
 
-def failures(folders: object, found: list[Score]) -> str:
-    """Why there was no verdict."""
-    reasons: dict[str, int] = {}
+def undecided(folders: object, found: list[Score]) -> list[list[str]]:
+    """Why strong effects of the catalogue got no single answer."""
+    reasons: dict[tuple[str, str], int] = {}
     for one in found:
-        if one.answer == "failed":
-            verdict = json.loads(folders.result(one.number).read_text())["verdict"]
-            text = "; ".join(verdict.get("reasons", [])).split("/")[-1]
-            reasons[text] = reasons.get(text, 0) + 1
-    return "\n".join(f"* {text} ({count})" for text, count in reasons.items()) or "Every case got a verdict."
+        if not one.strong or one.decided:
+            continue
+        verdict = json.loads(folders.result(one.number).read_text())["verdict"]
+        for text in verdict.get("reasons") or ["nothing was detected"]:
+            key = (one.column, text)
+            reasons[key] = reasons.get(key, 0) + 1
+    return [[*key, str(count)] for key, count in sorted(reasons.items(), key=lambda item: -item[1])]
 
 
 def page(folders: object, found: list[Score], unreachable: int, seed: int, asked: int) -> str:
@@ -214,7 +216,8 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
             ["method", "right, d' >= 5", "right, noise <= 1 %", "name where nothing is hidden"],
             baselines(found),
         ),
-        "failures": failures(folders, found),
+        "undecided": table(["answer", "reason", "cases"], undecided(folders, found)),
+        "failed": str(rate([one.answer == "failed" for one in found])),
     }
     return TEMPLATE.read_text().format(**fields)
 
@@ -264,15 +267,15 @@ def outside(found: list[Score]) -> list[list[str]]:
     return rows
 
 
-def write(folders: object, seed: int, asked: int, output: Path) -> int:
+def write(folders: object, seed: int, numbers: Sequence[int], output: Path) -> int:
     """Write page and figure; return the exit code."""
-    found, unreachable = scores_of(folders, asked)
+    found, unreachable = scores_of(folders, numbers)
     if not found:
         print("discovery_campaign: there is no result yet")
         return 1
-    text = page(folders, found, unreachable, seed, asked)
+    text = page(folders, found, unreachable, seed, len(numbers))
     (output.parent / "figures").mkdir(parents=True, exist_ok=True)
     figure.confusion(found, truths(found), output.parent / "figures" / "discovery_confusion.png")
     output.write_text(text)
-    print(f"discovery_campaign: {len(found)} of {asked} cases; wrote {output}")
+    print(f"discovery_campaign: {len(found)} of {len(numbers)} cases; wrote {output}")
     return 0
