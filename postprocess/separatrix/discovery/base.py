@@ -14,6 +14,7 @@ from separatrix.discovery.refit import Fitted
 
 _PHASES = 12
 _DISAGREEMENT = 1.3
+_RENEWED = 1.04
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
@@ -59,6 +60,25 @@ def measure_noise(data: Data, problem: Problem, fit, mass: float) -> None:
                 prepared.velocity_sigma *= factors.get(number, 1.0)
     for prepared in data.prepared:
         prepared.memory = memory
+
+
+def renew_noise(data: Data, problem: Problem, fit, mass: float) -> bool:
+    """Measure the noise again by a better fit, on top of what is known; whether it changed enough to matter."""
+    factors, memory = noise_of(problem, fit, 0, mass)
+    others, _ = noise_of(problem, fit, 1, mass) if fit.evaluation.residual.shape[1] > problem.segments.inside.shape[1] else ({}, 0)
+    changed = False
+    for number, prepared in enumerate(data.prepared):
+        if not prepared.sigma_stated and not 1 / _RENEWED < factors.get(number, 1.0) < _RENEWED:
+            prepared.sigma = max(prepared.sigma * factors[number], prepared.resolution / np.sqrt(12))
+            changed = True
+        speed = prepared.record.v is not None and not prepared.velocity_sigma_stated
+        if speed and not 1 / _RENEWED < others.get(number, 1.0) < _RENEWED:
+            prepared.velocity_sigma *= others[number]
+            changed = True
+        if prepared.memory == 0 and memory > 0:
+            prepared.memory = memory
+            changed = True
+    return changed
 
 
 def find_phases(data: Data, model, free: list[Free]) -> None:

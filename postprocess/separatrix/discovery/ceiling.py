@@ -115,8 +115,11 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     }
     if phase is not None:
         waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
-        forces["phase"] = np.stack(waves + [f(4 * phase) for f in (np.sin, np.cos)], axis=2)
+        forces["phase"] = np.stack(waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2)
         forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
+    since = after_impacts(problem, fit)
+    if np.isfinite(since).sum() > 100:
+        forces["time since impact"] = _splines(since, 12)
     made = {name: force_columns(problem, fit, values, mass) for name, values in forces.items()}
     kicks = impact_kicks(problem, fit, state)
     if kicks is not None:
@@ -177,12 +180,14 @@ def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
 
 def _splines(values: np.ndarray, count: int) -> np.ndarray:
     """Cubic B-splines over the middle 98 % of the values, knots at their quantiles."""
-    flat = values[np.isfinite(values) & (values != 0)]
+    known = np.isfinite(values)
+    flat = values[known & (values != 0)]
     inner = np.quantile(flat, np.linspace(0.01, 0.99, count - 2))
     inner += np.arange(inner.size) * 1e-9
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    clipped = np.clip(values, knots[0], knots[-1])
-    return BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
+    clipped = np.clip(np.where(known, values, knots[0]), knots[0], knots[-1])
+    table = BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
+    return table * known[:, :, None]
 
 
 def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:

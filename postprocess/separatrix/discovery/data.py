@@ -11,6 +11,7 @@ from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.machine import Free
 from separatrix.discovery.preflight import Prepared
 from separatrix.discovery.problem import Problem
+from separatrix.discovery.rescue import rescued
 from separatrix.discovery.segments import Segments, cut
 from separatrix.discovery.smoother import Smoothed, smooth
 
@@ -38,6 +39,16 @@ class Data:
         segments = self.stages[stage]
         return np.array(
             [self.smoothed[r].state[a, :2] for r, a in zip(segments.record, segments.first, strict=True)]
+        ).reshape(-1, 2)
+
+    def smoothed_errors(self, stage: int) -> np.ndarray:
+        """Standard errors of those starts."""
+        segments = self.stages[stage]
+        return np.array(
+            [
+                np.sqrt(np.diag(self.smoothed[r].covariance[a])[:2])
+                for r, a in zip(segments.record, segments.first, strict=True)
+            ]
         ).reshape(-1, 2)
 
     def carried_starts(self, stage: int, known: int, fit: Fit) -> np.ndarray:
@@ -113,6 +124,9 @@ def fit_stages(
             fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
             values = fit.values
         known = (stage, fit)
+    starts, improved = rescued(problem, fit, data.smoothed_starts(stages[-1]), data.smoothed_errors(stages[-1]))
+    if improved.any():
+        fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
     return problem, fit
 
 

@@ -4,8 +4,10 @@
 
 from dataclasses import dataclass, field
 
-from separatrix.discovery.catalogue import BY_NAME
+from separatrix.discovery.base import copy_noise, renew_noise
+from separatrix.discovery.catalogue import BY_NAME, candidate
 from separatrix.discovery.ceiling import Ceiling, ceiling
+from separatrix.discovery.data import fit_stages
 from separatrix.discovery.heldout import Prediction
 from separatrix.discovery.judge import (
     Judged,
@@ -16,8 +18,10 @@ from separatrix.discovery.judge import (
     judged,
     stable,
 )
+from separatrix.discovery.machine import with_values
 from separatrix.discovery.refit import Fitted, refit
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.screen import screen, signature
 
 _PAIRS = 6
 _INCLUSION = 0.9
@@ -46,7 +50,13 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     foretold = bench.foretell(base)
     bench.options.progress("looking for a gap", 0.15)
     gap = ceiling(base.problem, base.fit, bench.scales.mass)
-    first = run_round(bench, base, foretold, 0.2, 0.75)
+    first = run_round(bench, base, foretold, 0.2, 0.6)
+    again = remeasured(bench, first)
+    if again is not None:
+        base = again
+        foretold = bench.foretell(base)
+        gap = ceiling(base.problem, base.fit, bench.scales.mass)
+        first = run_round(bench, base, foretold, 0.6, 0.75)
     decision = Decision("none", [], [], [], [first], gap, foretold)
     if not first.judged:
         return _without_name(bench, decision)
@@ -59,6 +69,25 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     if best.gates["adequate"]:
         return _conclude(decision, best, rivals)
     return _with_more(bench, decision, base, best, rivals)
+
+
+def remeasured(bench: Bench, first: Round) -> Fitted | None:
+    """The base fitted again where the best candidate shows that the noise is not what the base let it seem."""
+    leaders = [one for one in first.judged if one.fitted.fit.converged]
+    if not leaders:
+        return None
+    best = leaders[0].fitted
+    if not renew_noise(bench.training, best.problem, best.fit, bench.scales.mass):
+        return None
+    if bench.held_out is not None and leaders[0].prediction is not None:
+        held = leaders[0].prediction
+        renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
+        copy_noise(bench.training, bench.held_out)
+    base = first.base
+    free = with_values(base.problem.free, base.fit.values)
+    stages = [bench.training.last]
+    problem, fit = fit_stages(bench.training, base.model, free, base.fit.values, stages=stages, most=30)
+    return Fitted(base.names, base.model, problem, fit, base.added)
 
 
 def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
@@ -183,10 +212,6 @@ def _fit_pair(bench: Bench, found: Round, one: str, other: str) -> Fitted | None
         one, other = other, one
     if one not in singles:
         return None
-    from separatrix.discovery.catalogue import candidate
-    from separatrix.discovery.machine import with_values
-    from separatrix.discovery.screen import screen, signature
-
     fitted = singles[one].fitted
     free = with_values(fitted.problem.free, fitted.fit.values)
     made = candidate(fitted.model, free, fitted.names, other, bench.scales)

@@ -8,12 +8,13 @@ import numpy as np
 
 from separatrix.discovery.catalogue import CATALOGUE, Candidate, Scales, candidate
 from separatrix.discovery.data import Data
+from separatrix.discovery.fit import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, gain_over, refit
-from separatrix.discovery.screen import Screened, Signature, screen, signature
+from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
 _RELATED = 0.7
@@ -105,9 +106,6 @@ def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
 
 def pair_gains(screen_round: Round) -> list[tuple[float, str, str]]:
     """Linearised gain of every pair of effects, best first."""
-    from separatrix.discovery.fit import blocks_of, eliminate, solve_scaled
-    from separatrix.discovery.screen import project
-
     fit = screen_round.base.fit
     evaluation = fit.evaluation
     signatures = screen_round.signatures
