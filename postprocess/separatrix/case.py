@@ -20,6 +20,13 @@ _CONTACT = {
     "upper": (r"$x_\mathrm{upper}$", "m"),
     "lower": (r"$x_\mathrm{lower}$", "m"),
 }
+_BODIES = {"mass": ("$m_1$", "kg"), "driven_mass": ("$m_2$", "kg"), "friction": ("$b$", "N")}
+_STOP = {
+    "restitution": ("$k$", ""),
+    "stiffness": ("$K$", ""),
+    "exponent": ("$n$", ""),
+    "damping": ("damping", ""),
+}
 _START = {"x0": ("$x_0$", "m"), "v0": ("$v_0$", "m/s")}
 _LAW_NAMES = {
     "none": "no",
@@ -41,13 +48,15 @@ def resolved_case(result: xr.Dataset) -> dict:
 
 
 def describe_case(result: xr.Dataset) -> list[str]:
-    """Return short pieces of a caption: friction, contact and drive ratio.
+    """Return short pieces of a caption: friction, contact and drive ratio, or two bodies and what joins them.
 
     A parameter that is an axis of the map or of the sweep, or differs between the points, is left out; so is
     the ratio of a machine without a drive.
     """
     case = resolved_case(result)
     axes = _axes(result, case)
+    if "driven_mass" in case.get("body", {}):
+        return _two_bodies(case, axes)
     pieces = []
     friction = case.get("friction")
     if isinstance(friction, dict):
@@ -61,6 +70,25 @@ def describe_case(result: xr.Dataset) -> list[str]:
     ratio = _drive_ratio(result, case)
     if ratio is not None and "drive_ratio" not in axes:
         pieces.append(rf"$\Omega_p/\omega$ = {ratio:g}")
+    return pieces
+
+
+def _two_bodies(case: dict, axes: set[str]) -> list[str]:
+    """The bodies, the friction between them, the drive and the stop; what is an axis is left out."""
+    body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
+    pieces = [
+        ", ".join(_values(body, _BODIES, "body", axes)),
+        f"drive: {drive.get('law', 'none')}".replace("_", " "),
+    ]
+    law = str(contact.get("law", "none"))
+    if law != "none":
+        carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
+        stop = (
+            [f"stop on {carrier}"]
+            if law.startswith("newton")
+            else [f"stop on {carrier}", law.replace("_", "-")]
+        )
+        pieces.append(", ".join([*stop, *_values(contact, _STOP, "contact", axes)]))
     return pieces
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A motion of two bodies coupled by dry friction: positions with modes shaded, where the energy went."""
+"""A motion of two bodies coupled by dry friction: positions with modes shaded."""
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.case import resolved_case, version_text
+from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -18,11 +18,6 @@ from separatrix.open import flag_names
 DRIVER = "#555555"
 # light enough that lines are seen on them; slip is left white
 BANDS = {"stick": "#E3E3E3", "upper_barrier": "#C9E4DA", "lower_barrier": "#E6DCC4", "held": "#D6D3EA"}
-_LOSSES = {
-    "friction_loss": style.OKABE_ITO[0],
-    "damping_loss": style.OKABE_ITO[3],
-    "contact_loss": style.OKABE_ITO[2],
-}
 
 
 def history(result: xr.Dataset, title: str) -> Figure:
@@ -50,33 +45,7 @@ def history(result: xr.Dataset, title: str) -> Figure:
         Line2D([], [], color=DRIVER, linewidth=0.8, linestyle=(0, (4, 2)), label="driving body"),
         *(Patch(color=BANDS[mode], label=flag_text(mode)) for mode in BANDS if mode in shaded),
     ]
-    compose(figure, title, _caption(result), handles, columns=len(handles))
-    return figure
-
-
-def energy(result: xr.Dataset, title: str) -> Figure:
-    """Return the energy over time and, stacked on it, what was lost; the top is what was put in."""
-    figure = style.new_figure(style.DOUBLE_COLUMN, 62.0)
-    ax = figure.add_subplot()
-    time = result["time"].values
-    level = result["energy"].values
-    ax.fill_between(time, 0, level, color=style.MOTION, alpha=0.35, linewidth=0)
-    handles = [Patch(color=style.MOTION, alpha=0.35, label="spring and bodies")]
-    for name, colour in _LOSSES.items():
-        lost = result[name].values
-        if not np.any(lost > 0):
-            continue
-        ax.fill_between(time, level, level + lost, color=colour, alpha=0.6, linewidth=0)
-        handles.append(Patch(color=colour, alpha=0.6, label=name.replace("_loss", "").replace("_", " ")))
-        level = level + lost
-    supplied = float(result.attrs["energy_start"]) + result["drive_work"].values
-    ax.plot(time, supplied, color="black", linewidth=0.8)
-    handles.append(Line2D([], [], color="black", linewidth=0.8, label="energy at the start and work"))
-    ax.set_xlim(time[0], time[-1])
-    ax.set_xlabel(axis_label(result["time"]))
-    ax.set_ylabel("energy (J)")
-    caption = [f"missing at the end: {float(result.attrs['energy_closing_error']):.1e} J", *_caption(result)]
-    compose(figure, title, caption, handles, columns=len(handles))
+    compose(figure, title, caption(result), handles, columns=len(handles))
     return figure
 
 
@@ -106,23 +75,10 @@ def _distance(result: xr.Dataset) -> tuple[str, np.ndarray]:
     return "$x_2 - x_1$", result["x"].values - result["driver_x"].values
 
 
-def _caption(result: xr.Dataset) -> list[str]:
+def caption(result: xr.Dataset) -> list[str]:
+    """Return the bodies, their regime, and the version of the program."""
     return [
-        *_machine(result),
+        *describe_case(result),
         f"regime: {flag_text(str(result.attrs['regime']))}",
         plain(version_text(result)),
     ]
-
-
-def _machine(result: xr.Dataset) -> list[str]:
-    """The bodies, the friction between them, the drive and the stop."""
-    case = resolved_case(result)
-    body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
-    pieces = [
-        f"$m_1$ = {body['mass']:g} kg, $m_2$ = {body['driven_mass']:g} kg, $b$ = {body['friction']:g} N",
-        f"drive: {flag_text(drive.get('law', 'none'))}",
-    ]
-    if "restitution" in contact:
-        carrier = "the driving body" if body["law"] == "backlash_pair" else "the ground"
-        pieces.append(f"stop on {carrier}, $k$ = {contact['restitution']:g}")
-    return pieces

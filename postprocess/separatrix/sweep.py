@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from separatrix import style
-from separatrix.case import describe_case, version_text
+from separatrix import pair_sweep, style
+from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, count_text, plain
 from separatrix.layout import compose
 from separatrix.open import table
@@ -21,7 +21,9 @@ _NOT_RUN = 0
 
 
 def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
-    """Return the two figures of a sweep file by name."""
+    """Return the figures of a sweep file by name."""
+    if "driven_mass" in resolved_case(result).get("body", {}):
+        return {"regimes": pair_sweep.regimes(result, swept_axis(result), title)}
     return {"amplitude": amplitude_diagram(result, title), "bifurcation": bifurcation_diagram(result, title)}
 
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from separatrix import contact, pair, style
+from separatrix import contact, energy, pair, style
 from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
@@ -26,10 +26,12 @@ _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 
 def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
     """Return the figures of a trajectory file by name."""
-    if "driver_x" in result:
-        made = {"history": pair.history(result, title), "energy": pair.energy(result, title)}
-    else:
-        made = {"history": time_history(result, title)}
+    two_bodies = "driver_x" in result
+    made = {"history": pair.history(result, title) if two_bodies else time_history(result, title)}
+    # files of earlier versions have no energies of one body
+    if "kinetic_energy" in result:
+        caption = pair.caption(result) if two_bodies else _caption(result)
+        made["energy"] = energy.decomposition(result, title, caption)
     if "contact_force" in result:
         made["contact"] = contact.loops(result, title)
     return {**made, "phase": phase_portrait(result, title)}

@@ -30,7 +30,8 @@ class Sizes:
     stopped: tuple[int, int] = (200, 1000)
     stopped_single: tuple[int, int] = (100, 500)
     viscous: tuple[int, int] = (100, 400)
-    stribeck: tuple[int, int] = (15, 35)
+    stribeck: tuple[int, int] = (50, 200)
+    stribeck_single: tuple[int, int] = (15, 35)
     heyoka: int = 2000
     heyoka_batch: int = 4000
     gsl: int = 1500
@@ -39,10 +40,27 @@ class Sizes:
     reference: int = 10000
     stopped_reference: int = 4000
     flips: int = 1000
+    stribeck_starts: int = 100000
 
 
 QUICK = Sizes(
-    3, (50, 200), (15, 50), (100, 400), (50, 200), (50, 150), (8, 20), 600, 1200, 500, 30, 2, 2000, 500, 300
+    rounds=3,
+    full=(50, 200),
+    full_single=(15, 50),
+    stopped=(100, 400),
+    stopped_single=(50, 200),
+    viscous=(50, 150),
+    stribeck=(20, 100),
+    stribeck_single=(8, 20),
+    heyoka=600,
+    heyoka_batch=1200,
+    gsl=500,
+    cvode=30,
+    scipy=2,
+    reference=2000,
+    stopped_reference=500,
+    flips=300,
+    stribeck_starts=3000,
 )
 
 
@@ -87,6 +105,8 @@ class Results:
     outcomes: dict[str, Outcomes] = field(default_factory=dict)
     flips: tuple[int, int] = (0, 0)
     """Labels of settle-and-stop that differ from our own full runs, and points compared."""
+    stribeck: Accuracy | None = None
+    """Coulomb-Stribeck in lanes against one by one."""
     version: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -125,6 +145,7 @@ def contestants(program: Program, build_folder: Path, sizes: Sizes) -> dict[str,
         "flow": Peer(Heyoka(machine, TOLERANCE, BATCH, events=False), starts[: sizes.heyoka_batch]),
         "viscous": Maps(program, "viscous", sizes.viscous, *FULL),
         "stribeck": Maps(program, "stribeck", sizes.stribeck, *FULL),
+        "stribeck_single": Maps(program, "stribeck", sizes.stribeck_single, *FULL, *ONE_BY_ONE),
     }
 
 
@@ -151,6 +172,12 @@ def judge(everybody: dict, reference: Reference, program: Program, results: Resu
         wrong = int(np.sum(reference.run(starts).label != labels))
         results.accuracy[name] = Accuracy(count, None, None, wrong)
     results.flips = flips(program, sizes.flips)
+    starts = start_points(sizes.stribeck_starts)
+    flown = [
+        read_points(program.points("stribeck", starts, f"points_stribeck_{len(words)}", *words)[1])
+        for words in ((), ONE_BY_ONE)
+    ]
+    results.stribeck = compare(*flown)
 
 
 def main() -> None:

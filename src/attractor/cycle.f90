@@ -4,12 +4,14 @@
 !> A cycle of the stroboscopic map: Newton's method to its fixed point, its multipliers, and the
 !> neighbourhood that provably (by sampling its rings) contracts into it with the same events.
 module cycle
-  use attractors, only: attractor_t, features_t, longest_period, regime_of
+  use attractors, only: attractor_t, longest_period, metric_numbers, most_coordinates, squared_distance
   use constants, only: two_pi
   use elementary, only: sine_cosine
-  use kinds, only: int64, wp
-  use motion, only: advance_period, motion_t, start_state
-  use motion_state, only: mode_slip_minus, mode_slip_plus, reset_tally, state_t, tally_t
+  use kinds, only: wp
+  use matrices, only: cholesky, solve, spectral_radius
+  use motion, only: motion_t
+  use motion_state, only: mode_slip_minus, mode_slip_plus, reset_tally, tally_t
+  use strobe, only: advance_strobe_period, features_over, scales_of, section_point, strobe_at, strobe_t
   implicit none
   private
 
@@ -20,27 +22,29 @@ module cycle
 
 contains
 
-  !> Image of a section point (x [m], v [m/s]) after `periods` drive periods and what happened on the
+  !> Image of a section point (its coordinates, SI) after `periods` drive periods and what happened on the
   !> way; `ok` is false if the trajectory had to be given up.
   pure subroutine map_point(moving, point, periods, image, tally, ok, wants_v_max)
     type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: point(2)
+    real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
-    real(wp), intent(out) :: image(2)
+    real(wp), intent(out) :: image(:)
     type(tally_t), intent(out) :: tally
     logical, intent(out) :: ok
     logical, intent(in), optional :: wants_v_max
-    type(state_t) :: state
+    type(strobe_t) :: strobe
+    real(wp) :: reached(most_coordinates)
     integer :: i, reason
-    state = start_state(moving, point(1), point(2), 0.0_wp)
+    strobe = strobe_at(moving, point)
     if (present(wants_v_max)) tally%wants_v_max = wants_v_max
-    call reset_tally(tally, state)
+    call reset_tally(tally, strobe%state)
     reason = 0
     do i = 1, periods
-      call advance_period(moving, state, tally, reason)
+      call advance_strobe_period(moving, strobe, tally, reason)
       if (reason /= 0) exit
     end do
-    image = [state%x, state%v]
+    reached = section_point(moving, strobe)
+    image = reached(:size(image))
     ok = reason == 0
   end subroutine map_point
 
@@ -48,46 +52,50 @@ contains
   !> method does not converge nearby, the cycle is not stable, or no neighbourhood contracts.
   pure subroutine refine_cycle(moving, guess, period, attractor, found)
     type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: guess(2)
+    real(wp), intent(in) :: guess(:)
     integer, intent(in) :: period
     type(attractor_t), intent(out) :: attractor
     logical, intent(out) :: found
-    real(wp) :: point(2), image(2), jacobian(2, 2)
+    real(wp) :: point(size(guess)), image(size(guess)), jacobian(size(guess), size(guess))
     type(tally_t) :: tally
-    integer :: i
+    integer :: i, n
+    n = size(guess)
     call map_point(moving, guess, period, image, tally, found)
     if (.not. found) return
+    attractor%coordinates = n
     attractor%period = period
     attractor%scale = scale_of(moving, tally)
     point = guess
-    call newton(moving, period, attractor%scale, point, found)
+    call newton(moving, period, attractor%scale(:n), point, found)
     if (.not. found) return
     call order_points(moving, attractor, point, found)
     if (.not. found) return
     do i = 1, attractor%period
-      call differentiate(moving, attractor%points(:, i), attractor%period, attractor%scale, jacobian, found)
+      call differentiate(moving, attractor%points(:n, i), attractor%period, attractor%scale(:n), jacobian, found)
       if (.not. found) return
-      if (i == 1) attractor%multiplier = largest_modulus(jacobian)
+      if (i == 1) attractor%multiplier = spectral_radius(jacobian)
       found = attractor%multiplier < 1 - 1e-7_wp
       if (.not. found) return
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
-    call map_point(moving, attractor%points(:, 1), attractor%period, image, tally, found, .true.)
-    attractor%features = regime_of(tally, real(attractor%period, wp))
+    call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true.)
+    attractor%features = features_over(moving, tally, real(attractor%period, wp))
     call verify_neighbourhood(moving, attractor, found)
   end subroutine refine_cycle
 
-  !> Half the range of the position, and that times the drive frequency.
+  !> Scales of the coordinates, from half the range of the position.
   pure function scale_of(moving, tally) result(scale)
     type(motion_t), intent(in) :: moving
     type(tally_t), intent(in) :: tally
-    real(wp) :: scale(2), floor
+    real(wp) :: scale(most_coordinates), floor
     floor = 1e-3_wp
     if (moving%machine%restoring%stiffness > 0) then
       floor = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
     end if
-    scale(1) = max((tally%x_max - tally%x_min)/2, floor, tiny(floor))
-    scale(2) = scale(1)*moving%machine%drive_frequency
+    if (allocated(moving%pair)) then
+      floor = 1e-3_wp*moving%pair%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
+    end if
+    scale = max(scales_of(moving, max((tally%x_max - tally%x_min)/2, floor)), tiny(floor))
   end function scale_of
 
   !> Newton's method on P^period(z) - z, derivatives by central differences, steps no longer than a fifth of
@@ -95,12 +103,13 @@ contains
   pure subroutine newton(moving, period, scale, point, converged)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: period
-    real(wp), intent(in) :: scale(2)
-    real(wp), intent(inout) :: point(2)
+    real(wp), intent(in) :: scale(:)
+    real(wp), intent(inout) :: point(:)
     logical, intent(out) :: converged
-    real(wp) :: image(2), miss(2), jacobian(2, 2), step(2), determinant, start(2), best
+    real(wp), dimension(size(point)) :: image, miss, step, start
+    real(wp) :: jacobian(size(point), size(point)), best
     type(tally_t) :: tally
-    integer :: i
+    integer :: i, k
     start = point
     best = huge(best)
     do i = 1, most_newton
@@ -112,13 +121,11 @@ contains
       best = min(best, norm2(miss))
       call differentiate(moving, point, period, scale, jacobian, converged)
       if (.not. converged) return
-      jacobian(1, 1) = jacobian(1, 1) - 1
-      jacobian(2, 2) = jacobian(2, 2) - 1
-      determinant = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
-      converged = abs(determinant) > 0
+      do k = 1, size(point)
+        jacobian(k, k) = jacobian(k, k) - 1
+      end do
+      call solve(jacobian, -miss, step, converged)
       if (.not. converged) return
-      step = [jacobian(1, 2)*miss(2) - jacobian(2, 2)*miss(1), &
-              jacobian(2, 1)*miss(1) - jacobian(1, 1)*miss(2)]/determinant
       if (norm2(step) > 0.2_wp) step = 0.2_wp*step/norm2(step)
       point = point + scale*step
       point(1) = min(max(point(1), moving%machine%contact%lower), moving%machine%contact%upper)
@@ -131,15 +138,16 @@ contains
   !> Scaled derivative of P^period by central differences; one-sided at a barrier.
   pure subroutine differentiate(moving, point, period, scale, jacobian, ok)
     type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: point(2), scale(2)
+    real(wp), intent(in) :: point(:), scale(:)
     integer, intent(in) :: period
-    real(wp), intent(out) :: jacobian(2, 2)
+    real(wp), intent(out) :: jacobian(:, :)
     logical, intent(out) :: ok
-    real(wp) :: ahead(2), behind(2), image_ahead(2), image_behind(2), h
+    real(wp), dimension(size(point)) :: ahead, behind, image_ahead, image_behind
+    real(wp) :: h
     type(tally_t) :: tally
     integer :: k
     h = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
-    do k = 1, 2
+    do k = 1, size(point)
       ahead = point
       behind = point
       ahead(k) = ahead(k) + h*scale(k)
@@ -154,21 +162,22 @@ contains
     end do
   end subroutine differentiate
 
-  !> Section points of the cycle, the one with the smallest position first; the period is reduced to the
+  !> Section points of the cycle, the one with the smallest first coordinate first; the period is reduced to the
   !> smallest one.
   pure subroutine order_points(moving, attractor, point, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
-    real(wp), intent(in) :: point(2)
+    real(wp), intent(in) :: point(:)
     logical, intent(out) :: ok
-    real(wp) :: cycle_points(2, longest_period), image(2)
+    real(wp) :: cycle_points(size(point), longest_period), image(size(point))
     type(tally_t) :: tally
-    integer :: i
+    integer :: i, n
+    n = size(point)
     cycle_points(:, 1) = point
     do i = 2, attractor%period
       call map_point(moving, cycle_points(:, i - 1), 1, image, tally, ok)
       if (.not. ok) return
-      if (norm2((image - point)/attractor%scale) < 1e-8_wp) then
+      if (norm2((image - point)/attractor%scale(:n)) < 1e-8_wp) then
         attractor%period = i - 1
         exit
       end if
@@ -176,36 +185,31 @@ contains
     end do
     ok = .true.
     i = minloc(cycle_points(1, :attractor%period), 1)
-    attractor%points(:, :attractor%period) = cshift(cycle_points(:, :attractor%period), i - 1, 2)
+    attractor%points(:n, :attractor%period) = cshift(cycle_points(:, :attractor%period), i - 1, 2)
   end subroutine order_points
 
-  !> Largest modulus of the eigenvalues of a 2 x 2 matrix.
-  pure real(wp) function largest_modulus(a)
-    real(wp), intent(in) :: a(2, 2)
-    real(wp) :: half_trace, determinant, discriminant
-    half_trace = (a(1, 1) + a(2, 2))/2
-    determinant = a(1, 1)*a(2, 2) - a(1, 2)*a(2, 1)
-    discriminant = half_trace**2 - determinant
-    if (discriminant >= 0) then
-      largest_modulus = abs(half_trace) + sqrt(discriminant)
-    else
-      largest_modulus = sqrt(determinant)
-    end if
-  end function largest_modulus
-
-  !> S = sum over n of (M^n)' M^n, the metric in which a stable M contracts: s11, s12, s22.
+  !> S = sum over k of (M^k)' M^k, the metric in which a stable M contracts: its upper triangle, column by column.
   pure function contracting_metric(jacobian) result(metric)
-    real(wp), intent(in) :: jacobian(2, 2)
-    real(wp) :: metric(3), s(2, 2), m(2, 2)
-    integer :: i
-    s = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+    real(wp), intent(in) :: jacobian(:, :)
+    real(wp) :: metric(metric_numbers)
+    real(wp), dimension(size(jacobian, 1), size(jacobian, 1)) :: s, m
+    integer :: i, j, k
+    s = 0
+    do i = 1, size(s, 1)
+      s(i, i) = 1
+    end do
     m = jacobian
     do i = 1, 30
       s = s + matmul(transpose(m), matmul(s, m))
       m = matmul(m, m)
       if (maxval(abs(m)) < epsilon(1.0_wp)) exit
     end do
-    metric = [s(1, 1), (s(1, 2) + s(2, 1))/2, s(2, 2)]
+    metric = 0
+    do j = 1, size(s, 1)
+      do k = 1, j
+        metric((j*(j - 1))/2 + k) = (s(k, j) + s(j, k))/2
+      end do
+    end do
   end function contracting_metric
 
   !> Halves the capture radius until every sampled start on rings within it, around every point of the cycle,
@@ -215,15 +219,14 @@ contains
     type(attractor_t), intent(inout) :: attractor
     logical, intent(out) :: found
     type(tally_t) :: reference(longest_period)
-    real(wp) :: image(2), smallest
+    real(wp) :: image(attractor%coordinates), smallest, bounds(2)
     integer :: i
     logical :: ok
     smallest = huge(smallest)
     do i = 1, attractor%period
-      call map_point(moving, attractor%points(:, i), attractor%period, image, reference(i), ok)
-      associate (s => attractor%metric(:, i))
-        smallest = min(smallest, (s(1) + s(3))/2 - sqrt(((s(1) - s(3))/2)**2 + s(2)**2))
-      end associate
+      call map_point(moving, attractor%points(:attractor%coordinates, i), attractor%period, image, reference(i), ok)
+      bounds = eigenvalue_bounds(attractor, i)
+      smallest = min(smallest, bounds(1))
     end do
     attractor%capture_radius = 0.5_wp*sqrt(smallest)
     do i = 1, most_halvings
@@ -233,46 +236,103 @@ contains
     end do
   end subroutine verify_neighbourhood
 
+  !> Bounds of the eigenvalues of the metric at the `i`-th point: exact up to two coordinates, else 1, which none is below,
+  !> and their sum.
+  pure function eigenvalue_bounds(attractor, i) result(bounds)
+    type(attractor_t), intent(in) :: attractor
+    integer, intent(in) :: i
+    real(wp) :: bounds(2)
+    integer :: k
+    associate (s => attractor%metric(:, i))
+      select case (attractor%coordinates)
+      case (1)
+        bounds = s(1)
+      case (2)
+        bounds = (s(1) + s(3))/2 + [-1, 1]*sqrt(((s(1) - s(3))/2)**2 + s(2)**2)
+      case default
+        bounds = [1.0_wp, sum([(s((k*(k + 1))/2), k=1, attractor%coordinates)])]
+      end select
+    end associate
+  end function eigenvalue_bounds
+
   pure logical function contracts(moving, attractor, reference)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     type(tally_t), intent(in) :: reference(:)
-    real(wp) :: radius, point(2), image(2), second(2), d(2), l11, l21, l22, promised, sine, cosine
+    real(wp) :: radius, promised, bounds(2), lower(attractor%coordinates, attractor%coordinates)
+    real(wp), dimension(attractor%coordinates) :: centre, point, image, second
     type(tally_t) :: tally
-    type(state_t) :: state
-    integer :: i, ring, k
+    type(strobe_t) :: strobe
+    integer :: i, ring, k, n
     logical :: ok, at_rest
     contracts = .false.
+    n = attractor%coordinates
     do i = 1, attractor%period
-      state = start_state(moving, attractor%points(1, i), attractor%points(2, i), 0.0_wp)
-      at_rest = state%mode /= mode_slip_plus .and. state%mode /= mode_slip_minus
-      associate (s => attractor%metric(:, i))
-        ! Cholesky factor of the metric: S = L L'.
-        l11 = sqrt(s(1))
-        l21 = s(2)/l11
-        l22 = sqrt(s(3) - l21**2)
-        promised = sqrt(max(0.0_wp, 1 - 1/((s(1) + s(3))/2 + sqrt(((s(1) - s(3))/2)**2 + s(2)**2))))
-        promised = promised + 0.75_wp*(1 - promised)
-        do ring = 1, size(rings)
-          radius = rings(ring)*attractor%capture_radius
-          do k = 1, directions
-            call sine_cosine(k*two_pi/directions, sine, cosine)
-            d(2) = radius*sine/l22
-            d(1) = (radius*cosine - l21*d(2))/l11
-            point = attractor%points(:, i) + attractor%scale*d
-            if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
-            call map_point(moving, point, attractor%period, image, tally, ok)
-            ! Around a section point at rest every start slips first; there the next round must have the events.
-            if (ok .and. at_rest) call map_point(moving, image, attractor%period, second, tally, ok)
-            if (.not. ok .or. .not. same_events(tally, reference(i))) return
-            d = (image - attractor%points(:, i))/attractor%scale
-            if (sqrt(s(1)*d(1)**2 + 2*s(2)*d(1)*d(2) + s(3)*d(2)**2) > promised*radius + 1e-12_wp) return
-          end do
+      centre = attractor%points(:n, i)
+      strobe = strobe_at(moving, centre)
+      at_rest = strobe%state%mode /= mode_slip_plus .and. strobe%state%mode /= mode_slip_minus
+      lower = cholesky(matrix_of(attractor%metric(:, i), n))
+      bounds = eigenvalue_bounds(attractor, i)
+      promised = sqrt(max(0.0_wp, 1 - 1/bounds(2)))
+      promised = promised + 0.75_wp*(1 - promised)
+      do ring = 1, size(rings)
+        radius = rings(ring)*attractor%capture_radius
+        do k = 1, directions
+          point = centre + attractor%scale(:n)*back_substituted(lower, radius*direction(k, n))
+          if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
+          call map_point(moving, point, attractor%period, image, tally, ok)
+          ! Around a section point at rest every start slips first; there the next round must have the events.
+          if (ok .and. at_rest) call map_point(moving, image, attractor%period, second, tally, ok)
+          if (.not. ok .or. .not. same_events(tally, reference(i))) return
+          if (sqrt(squared_distance(attractor, i, image)) > promised*radius + 1e-12_wp) return
         end do
-      end associate
+      end do
     end do
     contracts = .true.
   end function contracts
+
+  !> Unit vectors: round a circle, there and back on a line, in more dimensions along the axes and spread over the sphere
+  !> by an additive recurrence.
+  pure function direction(k, n) result(unit)
+    integer, intent(in) :: k, n
+    real(wp) :: unit(n), sine, cosine
+    integer :: j
+    real(wp), parameter :: irrational(most_coordinates) = sqrt([2.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 11.0_wp])
+    if (n == 2) then
+      call sine_cosine(k*two_pi/directions, sine, cosine)
+      unit = [cosine, sine]
+    else if (k <= 2*n .or. n == 1) then
+      unit = 0
+      unit(1 + modulo(k, 2*n)/2) = merge(1, -1, modulo(k, 2) == 1)
+    else
+      unit = [(2*modulo(k*irrational(j), 1.0_wp) - 1, j=1, n)]
+      unit = unit/norm2(unit)
+    end if
+  end function direction
+
+  !> x with L' x = b.
+  pure function back_substituted(lower, b) result(x)
+    real(wp), intent(in) :: lower(:, :), b(:)
+    real(wp) :: x(size(b))
+    integer :: k
+    do k = size(b), 1, -1
+      x(k) = (b(k) - sum(lower(k + 1:, k)*x(k + 1:)))/lower(k, k)
+    end do
+  end function back_substituted
+
+  !> The symmetric matrix with this upper triangle.
+  pure function matrix_of(triangle, n) result(s)
+    real(wp), intent(in) :: triangle(:)
+    integer, intent(in) :: n
+    real(wp) :: s(n, n)
+    integer :: j, k
+    do j = 1, n
+      do k = 1, j
+        s(k, j) = triangle((j*(j - 1))/2 + k)
+        s(j, k) = s(k, j)
+      end do
+    end do
+  end function matrix_of
 
   pure logical function same_events(a, b)
     type(tally_t), intent(in) :: a, b

@@ -70,15 +70,16 @@ contains
   !> Nearest distance between points of two cycles of the same regime and period; huge if they cannot be one branch.
   pure real(wp) function branch_distance(a, b) result(distance)
     type(attractor_t), intent(in) :: a, b
-    integer :: i
+    integer :: i, n
     distance = huge(1.0_wp)
-    if (a%period /= b%period .or. a%features%regime /= b%features%regime) return
+    n = a%coordinates
+    if (a%period /= b%period .or. a%features%regime /= b%features%regime .or. n /= b%coordinates) return
     if (a%rests .or. a%period == 0) then
       distance = 0
       return
     end if
     do i = 1, b%period
-      distance = min(distance, norm2((a%points(:, 1) - b%points(:, i))/max(a%scale, b%scale)))
+      distance = min(distance, norm2((a%points(:n, 1) - b%points(:n, i))/max(a%scale(:n), b%scale(:n))))
     end do
   end function branch_distance
 

@@ -4,19 +4,17 @@
 !> One trajectory from its start to its label: a pure function of the machine, the frozen catalogue and
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
-  use attractors, only: attractor_t, features_t, find_box, find_capture, regime_at_rest, regime_of, &
-    regime_stuck
-  use energy, only: energy_of_body
+  use attractors, only: attractor_t, features_t, find_box, find_capture
   use kinds, only: int64, wp
-  use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
-  use pair_flight, only: body_state
-  use pair_trajectory, only: pair_course_t, run_pair
+  use motion, only: advance, motion_t
+  use motion_state, only: log_t, reset_tally, tally_t
+  use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, rest_lasts, section_point, &
+    start_strobe, strobe_t
   use status, only: reason_settled, reason_time_over
   implicit none
   private
 
-  public :: run_trajectory, begin_course, go_to_stop, pass_stop, conclude
+  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, conclude
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -48,8 +46,7 @@ module trajectory
   integer, parameter, public :: phase_transient = 1, phase_window = 2, phase_extension = 3, phase_over = 4
 
   !> A trajectory under way. It moves from stop to stop: the stroboscopic sections, and the ends of its phases.
-  type, public :: course_t
-    type(state_t) :: state
+  type, extends(strobe_t), public :: course_t
     type(tally_t) :: tally
     integer :: phase = phase_transient
     !> Time since the start [s], up to the last stop.
@@ -77,13 +74,9 @@ contains
     type(log_t), intent(inout), optional :: log
     type(course_t) :: course
     logical :: slipped
-    if (allocated(moving%pair)) then
-      call run_two_bodies(moving, span, x, v, crank_angle, outcome, log)
-      return
-    end if
     call begin_course(moving, span, x, v, crank_angle, course)
     if (present(log)) then
-      log%book%at_start = energy_of_body(moving%machine, course%state)
+      log%book%at_start = energy_now(moving, course)
       log%origin = -course%state%time
       if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
     end if
@@ -92,38 +85,14 @@ contains
       call pass_stop(moving, catalogue, span, slipped, course, outcome)
     end do
     if (present(log)) then
-      log%book%at_end = energy_of_body(moving%machine, course%state)
-      if (log%sample_interval > 0 .and. course%elapsed >= span%duration) call record_sample(log, course%state)
+      call record_end(moving, course, log%sample_interval > 0 .and. course%elapsed >= span%duration, log)
     end if
     do while (course%phase == phase_extension)
       call go_to_stop(moving, course, slipped)
       call pass_stop(moving, catalogue, span, slipped, course, outcome)
     end do
-    call conclude(catalogue, course, outcome)
+    call conclude(moving, catalogue, course, outcome)
   end subroutine run_trajectory
-
-  !> The same for two bodies, which no attractor captures.
-  pure subroutine run_two_bodies(moving, span, x, v, angle, outcome, log)
-    type(motion_t), intent(in) :: moving
-    type(span_t), intent(in) :: span
-    real(wp), intent(in) :: x, v, angle
-    type(outcome_t), intent(inout) :: outcome
-    type(log_t), intent(inout), optional :: log
-    type(pair_course_t) :: course
-    type(state_t) :: body
-    call run_pair(moving%pair, span%duration, span%window, x, v, angle, course, log)
-    body = body_state(course%state)
-    outcome%x = body%x
-    outcome%v = body%v
-    outcome%impacts = course%impacts
-    outcome%last_impact_speed = course%last_impact_speed
-    outcome%reason = merge(course%reason, reason_time_over, course%reason /= 0)
-    if (course%reason /= 0) return
-    outcome%window = regime_of(course%tally, span%window/moving%machine%period)
-    if (outcome%window%regime == regime_at_rest) outcome%window%regime = regime_stuck
-    outcome%features = outcome%window
-    outcome%features%word = 0
-  end subroutine run_two_bodies
 
   !> A body set off from `x` [m], `v` [m/s], with the crank at `crank_angle` [rad].
   pure subroutine begin_course(moving, span, x, v, crank_angle, course)
@@ -131,7 +100,7 @@ contains
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: x, v, crank_angle
     type(course_t), intent(out) :: course
-    course%state = start_state(moving, x, v, crank_angle)
+    course%strobe_t = start_strobe(moving, [x, v, crank_angle])
     call reset_tally(course%tally, course%state)
     if (.not. span%duration - span%window > 0) call open_window(course)
     call set_stop(moving, span, course)
@@ -146,12 +115,31 @@ contains
     integer(int64) :: slips
     slips = course%tally%slips
     if (course%until >= moving%machine%period) then
-      call advance_period(moving, course%state, course%tally, course%reason, log)
+      call advance_strobe_period(moving, course, course%tally, course%reason, log)
     else
-      call advance(moving, course%state, course%until, course%tally, course%reason, log)
+      call advance_strobe(moving, course, course%until, course%tally, course%reason, log)
     end if
     slipped = course%tally%slips > slips
   end subroutine go_to_stop
+
+  !> Moves past a turn of the body to a slip at `speed` [m/s] or faster, if that comes before the next stop.
+  pure subroutine go_past_turn(moving, speed, course)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: speed
+    type(course_t), intent(inout) :: course
+    call advance(moving, course%state, course%until, course%tally, course%reason, slip_speed=speed)
+  end subroutine go_past_turn
+
+  !> Sections to come where nothing is due but the question whether the motion has been captured, and no answer stops it.
+  pure integer function sections_ahead(moving, span, course)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(course_t), intent(in) :: course
+    sections_ahead = 0
+    if (span%stop_when_captured .or. course%phase == phase_extension .or. course%until < moving%machine%period) return
+    ! One is left out in case that rounding shifts the last.
+    sections_ahead = max(0, int((end_of_phase(span, course%phase) - course%elapsed)/moving%machine%period) - 2)
+  end function sections_ahead
 
   !> What is due at a stop, the state being there: has the motion been captured, is a phase over, where to stop next.
   !> `slipped` tells whether the body moved since the last stop.
@@ -168,7 +156,7 @@ contains
     if (course%reason == 0) then
       if (course%until >= moving%machine%period) then
         course%elapsed = course%elapsed + (moving%machine%period - course%since)
-        call note_section(catalogue, slipped .or. course%since > 0, course, outcome)
+        call note_section(moving, catalogue, slipped .or. course%since > 0, course, outcome)
         course%since = 0
       else
         course%elapsed = phase_end
@@ -209,12 +197,13 @@ contains
   end subroutine set_stop
 
   !> On the section: captured, and since when?
-  pure subroutine note_section(catalogue, slipped, course, outcome)
+  pure subroutine note_section(moving, catalogue, slipped, course, outcome)
+    type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     logical, intent(in) :: slipped
     type(course_t), intent(inout) :: course
     type(outcome_t), intent(inout) :: outcome
-    course%captured = find_capture(catalogue, course%state, slipped)
+    course%captured = find_capture(catalogue, section_point(moving, course), slipped .or. .not. rest_lasts(moving))
     if (course%captured == 0) then
       outcome%settle_time = -1
     else if (outcome%settle_time < 0) then
@@ -234,7 +223,7 @@ contains
       if (ended) call note_state(course, outcome)
       if (.not. ended) call open_window(course)
     case (phase_window)
-      outcome%window = regime_of(course%tally, span%window/moving%machine%period)
+      outcome%window = features_over(moving, course%tally, span%window/moving%machine%period)
       call note_state(course, outcome)
       course%phase = merge(phase_over, phase_extension, ended .or. course%captured > 0 .or. .not. can_be_captured)
       course%tally%wants_v_max = .false.
@@ -272,7 +261,8 @@ contains
   end function latest_impact_speed
 
   !> Reason, label and features of a finished course.
-  pure subroutine conclude(catalogue, course, outcome)
+  pure subroutine conclude(moving, catalogue, course, outcome)
+    type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(course_t), intent(in) :: course
     type(outcome_t), intent(inout) :: outcome
@@ -291,7 +281,7 @@ contains
       outcome%features%grazing_margin = min(margin, outcome%features%grazing_margin)
     else
       outcome%reason = reason_time_over
-      box = find_box(catalogue, course%state, outcome%window%regime)
+      box = find_box(catalogue, section_point(moving, course), outcome%window%regime)
       if (box > 0) outcome%attractor = catalogue(box)%id
       outcome%features = outcome%window
       outcome%features%word = 0

@@ -61,7 +61,7 @@ contains
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: at
-    real(wp) :: static, kinetic
+    real(wp) :: static, kinetic, tension
     kinetic = parameter_value(laws, 'friction.kinetic_coefficient', 0.0_wp)
     static = parameter_value(laws, 'friction.static_coefficient', kinetic)
     if (static < kinetic) then
@@ -69,6 +69,8 @@ contains
                   ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
     end if
     if (laws(contact_law)%name /= 'none') call check_barriers(source, laws(contact_law), at)
+    tension = parameter_value(laws, 'contact.tension', 1.0_wp)
+    if (tension > 0 .and. tension < 1) call report(source, 'contact.tension', 'found '//to_text(tension)//', allowed 0 or 1'//at)
     call check_bodies(source, laws, at)
     if (needs_spring(laws(drive_law)%name) .and. laws(restoring_law)%name /= 'linear') then
       call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
@@ -337,10 +339,7 @@ contains
   subroutine require_sweep(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    if (is_pair(the_case%laws)) then
-      call fail(error, exit_bad_case, the_case%path//': key ''body.law'': found "'//trim(the_case%laws(1)%name)// &
-                '", allowed for a sweep point_mass; a basin over parameters shows the regimes of two bodies')
-    else if (.not. the_case%sweep%present) then
+    if (.not. the_case%sweep%present) then
       call fail(error, exit_bad_case, the_case%path//': a sweep needs a table [sweep]')
     else
       call allow_start(the_case, [the_case%sweep%swept], error)

@@ -17,6 +17,8 @@ module case_echo
   public :: echo_case, case_identity
 
   character(len=1), parameter :: newline = new_line('a')
+  !> Characters of a number with its comma and blank, at most.
+  integer, parameter :: longest_number = 40
 
 contains
 
@@ -117,6 +119,7 @@ contains
              line('lanes', quoted(trim(integrator%lanes)))// &
              line('tolerance', to_text(integrator%tolerance))// &
              line('event_budget', to_text(integrator%event_budget))// &
+             line('step_budget', to_text(integrator%step_budget))// &
              newline//'[attractors]'//newline// &
              line('sample', to_text(attractors%sample))// &
              line('seed', to_text(attractors%seed))// &
@@ -170,14 +173,20 @@ contains
 
   pure function reals(values) result(text)
     real(wp), intent(in) :: values(:)
-    character(len=:), allocatable :: text
-    integer :: i
-    text = '['
+    character(len=:), allocatable :: text, number
+    integer :: i, length
+    ! Room for all: records are long.
+    allocate (character(len=longest_number*size(values) + 2) :: text)
+    length = 0
     do i = 1, size(values)
-      if (i > 1) text = text//', '
-      text = text//to_text(values(i))
+      number = to_text(values(i))
+      if (i > 1) number = ', '//number
+      text(length + 2:length + 1 + len(number)) = number
+      length = length + len(number)
     end do
-    text = text//']'
+    text(1:1) = '['
+    text(length + 2:length + 2) = ']'
+    text = text(:length + 2)
   end function reals
 
   pure function integers(values) result(text)

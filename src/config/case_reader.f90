@@ -102,6 +102,7 @@ contains
       call take_choice(source, 'integrator.lanes', ['auto', 'off '], integrator%lanes)
       call take_real(source, 'integrator.tolerance', between(1e-15_wp, 1e-3_wp, '1'), integrator%tolerance)
       call take_integer(source, 'integrator.event_budget', 1, integrator%event_budget)
+      call take_integer(source, 'integrator.step_budget', 1, integrator%step_budget)
     end associate
   end subroutine read_integrator
 

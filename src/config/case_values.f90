@@ -4,6 +4,7 @@
 !> Typed values out of a case's text. Each reader declares its key as known, leaves `value` (the
 !> default) as it is when the key is absent, and notes a wrong type, unit or bound.
 module case_values
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use case_source, only: case_source_t, description, find, know, list_size, report
   use kinds, only: wp
   use text, only: join, to_text
@@ -55,6 +56,9 @@ contains
   pure logical function inside(value, bounds)
     real(wp), intent(in) :: value
     type(bounds_t), intent(in) :: bounds
+    ! Comparing the order of NaN would stop a program with floating-point traps.
+    inside = .false.
+    if (.not. ieee_is_finite(value)) return
     inside = value >= bounds%lower .and. value <= bounds%upper
     if (bounds%lower_open) inside = inside .and. value > bounds%lower
   end function inside
@@ -78,7 +82,7 @@ contains
       range = 'a finite number'
     end if
     problem = 'found '//to_text(value)//unit//', allowed '//range//unit
-    if (range /= 'a finite number' .and. .not. abs(value) <= huge(1.0_wp)) problem = problem//', a finite number'
+    if (range /= 'a finite number' .and. .not. ieee_is_finite(value)) problem = problem//', a finite number'
   end function allowed_range
 
   !> The entry's number in the SI unit of `bounds`, or what is wrong with it.
@@ -249,13 +253,27 @@ contains
     call look_up(source, path, required, at)
     if (at == 0) return
     associate (entry => source%entries(at)%entry)
-      if (entry%kind == toml_string) then
-        value = entry%string
-      else
+      if (entry%kind /= toml_string) then
         call report(source, path, 'found '//description(entry)//', allowed a text in quotes')
+      else if (has_control_characters(entry%string)) then
+        call report(source, path, 'found a control character, allowed a text without')
+      else
+        value = entry%string
       end if
     end associate
   end subroutine take_text
+
+  !> Whether a text would end early in the file or spoil a terminal; tabs and ends of lines do neither.
+  pure logical function has_control_characters(string)
+    character(len=*), intent(in) :: string
+    integer :: i
+    has_control_characters = .true.
+    do i = 1, len(string)
+      if (any(iachar(string(i:i)) == [9, 10, 13])) cycle
+      if (iachar(string(i:i)) < 32 .or. iachar(string(i:i)) == 127) return
+    end do
+    has_control_characters = .false.
+  end function has_control_characters
 
   !> One of a few words, blank-padded.
   subroutine take_choice(source, path, words, value)

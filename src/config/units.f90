@@ -5,7 +5,7 @@
 module units
   use constants, only: pi
   use kinds, only: wp
-  use text, only: join, number_length, replace_all
+  use text, only: join, number_length, read_number, replace_all
   implicit none
   private
 
@@ -79,7 +79,7 @@ contains
     trimmed = trim(adjustl(string))
     length = number_length(trimmed)
     status = 1
-    if (length > 0) read (trimmed(1:length), *, iostat=status) value
+    if (length > 0) call read_number(trimmed(1:length), value, status)
     if (status /= 0) then
       problem = 'allowed '//allowed_units(unit)
       return

@@ -7,7 +7,7 @@ module text
   implicit none
   private
 
-  public :: to_text, join, number_length, replace_all, starts_with
+  public :: to_text, read_number, join, number_length, replace_all, starts_with
 
   !> Shortest common form of a number: integers plain, reals with up to 17 significant digits so
   !> that reading them back gives the same bits.
@@ -47,11 +47,18 @@ contains
       return
     end if
     first = 1
-    if (present(digits)) first = digits
+    if (present(digits)) then
+      first = digits
+    else
+      ! What 15 digits do not give, no fewer do.
+      text = with_digits(value, 15)
+      call read_number(text, back, status)
+      if (status == 0 .and. abs(back - value) > 0) first = 16
+    end if
     do count = first, 17
       text = with_digits(value, count)
       if (present(digits)) return
-      read (text, *, iostat=status) back
+      call read_number(text, back, status)
       if (status == 0 .and. back == value) return
     end do
   end function real_to_text
@@ -85,6 +92,22 @@ contains
       text = text//'e'//integer_to_text(exponent)
     end if
   end function with_digits
+
+  !> Reads a number by Fortran's list-directed rules; `status` is 0 if it is one. One that is too large is infinite, also
+  !> where the program stops at an overflow.
+  pure subroutine read_number(text, value, status)
+    ! Here and not above: gfortran 12 gives the halting mode back only where the procedure itself uses the module.
+    use, intrinsic :: ieee_exceptions, only: ieee_set_flag, ieee_set_halting_mode, ieee_usual
+    character(len=*), intent(in) :: text
+    real(real64), intent(out) :: value
+    integer, intent(out) :: status
+    call ieee_set_halting_mode(ieee_usual, .false.)
+    value = 0
+    read (text, *, iostat=status) value
+    if (status /= 0) value = 0
+    ! With a flag up the return to the halting mode of before would stop the program.
+    call ieee_set_flag(ieee_usual, .false.)
+  end subroutine read_number
 
   pure function logical_to_text(value) result(text)
     logical, intent(in) :: value

@@ -11,8 +11,8 @@ module bindings
   public :: c_crashed, c_fork, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
     c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
-    c_stderr_is_terminal, c_default_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
-    c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, &
+    c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
+    c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
     c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
     c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment
@@ -138,6 +138,11 @@ module bindings
       character(kind=c_char), intent(in) :: name(*), value(*)
     end function c_default_environment
 
+    integer(c_int) function c_set_environment(name, value) bind(c, name='separatrix_set_environment')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: name(*), value(*)
+    end function c_set_environment
+
     subroutine c_sleep_microseconds(microseconds) bind(c, name='separatrix_sleep_microseconds')
       import :: c_int
       integer(c_int), value :: microseconds
@@ -182,6 +187,18 @@ module bindings
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
     end function c_remove_file
+
+    integer(c_int) function c_take_lock(path, descriptor) bind(c, name='separatrix_take_lock')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), intent(out) :: descriptor
+    end function c_take_lock
+
+    subroutine c_give_lock(path, descriptor) bind(c, name='separatrix_give_lock')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: descriptor
+    end subroutine c_give_lock
 
     subroutine c_error_text(number, text, size) bind(c, name='separatrix_error_text')
       import :: c_char, c_int

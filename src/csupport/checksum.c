@@ -8,3 +8,13 @@
 uint32_t separatrix_crc32(uint32_t previous, const void *bytes, int64_t size) {
   return (uint32_t)crc32_z(previous, bytes, (z_size_t)size);
 }
+
+/* 64-bit FNV-1a hash of `length` bytes. */
+uint64_t separatrix_fnv1a(const char *text, int64_t length) {
+  uint64_t hash = 14695981039346656037ULL;
+  for (int64_t i = 0; i < length; ++i) {
+    hash ^= (unsigned char)text[i];
+    hash *= 1099511628211ULL;
+  }
+  return hash;
+}

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -108,6 +109,35 @@ int separatrix_publish_file(const char *from, const char *to) {
 
 /* A file that does not exist counts as removed. */
 int separatrix_remove_file(const char *path) { return unlink(path) == 0 || errno == ENOENT ? 0 : errno; }
+
+/* Takes the lock of the file `path`, which is made for it: *descriptor is what holds it. -1 where another
+   process has it. Where files cannot be locked *descriptor is -1, and the status 0. */
+int separatrix_take_lock(const char *path, int *descriptor) {
+  struct stat held, named;
+  for (;;) {
+    *descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (*descriptor < 0)
+      return errno;
+    const int status = flock(*descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
+    /* The one who had it may have removed the file meanwhile. */
+    if (status == 0 && fstat(*descriptor, &held) == 0 && stat(path, &named) == 0 &&
+        held.st_ino == named.st_ino)
+      return 0;
+    if (status != 0 && status != EWOULDBLOCK)
+      unlink(path);
+    close(*descriptor);
+    *descriptor = -1;
+    if (status != 0)
+      return status == EWOULDBLOCK ? -1 : 0;
+  }
+}
+
+void separatrix_give_lock(const char *path, int descriptor) {
+  if (descriptor < 0)
+    return;
+  unlink(path);
+  close(descriptor);
+}
 
 void separatrix_error_text(int number, char *text, int size) {
   snprintf(text, (size_t)size, "%s", strerror(number));

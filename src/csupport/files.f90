@@ -5,7 +5,7 @@
 module files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
   use bindings, only: c_error_text, c_file_exists, c_is_special, c_folder_status, c_free_bytes, &
-    c_publish_file, c_remove_file, c_reserve_file
+    c_give_lock, c_publish_file, c_remove_file, c_reserve_file, c_take_lock
   use errors, only: error_t, fail
   use kinds, only: int64
   use status, only: exit_cannot_create, exit_io
@@ -13,7 +13,8 @@ module files
   implicit none
   private
 
-  public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file
+  public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
+    take_lock, give_lock
 
 contains
 
@@ -62,6 +63,30 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call test(c_remove_file(path//c_null_char), exit_io, 'cannot remove', path, error)
   end subroutine remove_file
+
+  !> Locks `path`, a file made for that, until `give_lock` or the end of the process; code 73 if another process has it.
+  !> `lock` is what to give back; -1 on a file system without locks.
+  subroutine take_lock(path, lock, error)
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: lock
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: descriptor
+    integer(c_int) :: number
+    number = c_take_lock(path//c_null_char, descriptor)
+    lock = descriptor
+    if (number < 0) then
+      call fail(error, exit_cannot_create, "another run is at work on this file; it has the lock '"//path//"'")
+    else
+      call test(number, exit_cannot_create, 'cannot create', path, error)
+    end if
+  end subroutine take_lock
+
+  !> Removes the file of a lock; does nothing for -1.
+  subroutine give_lock(path, lock)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: lock
+    call c_give_lock(path//c_null_char, int(lock, c_int))
+  end subroutine give_lock
 
   subroutine test(number, code, action, path, error)
     integer(c_int), intent(in) :: number

@@ -139,6 +139,8 @@ int separatrix_stderr_is_terminal(void) { return isatty(STDERR_FILENO) == 1; }
 /* Sets an environment variable unless the user has set it. */
 int separatrix_default_environment(const char *name, const char *value) { return setenv(name, value, 0); }
 
+int separatrix_set_environment(const char *name, const char *value) { return setenv(name, value, 1); }
+
 void separatrix_sleep_microseconds(int microseconds) {
   const struct timespec pause = {microseconds / 1000000, (long)(microseconds % 1000000) * 1000};
   nanosleep(&pause, NULL);

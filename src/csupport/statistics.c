@@ -3,6 +3,7 @@
 
 // Confidence limits, from the GNU Scientific Library.
 
+#include <fenv.h>
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdint.h>
@@ -16,6 +17,9 @@ double separatrix_share_upper_limit(int64_t found, int64_t sample, double confid
   if (found == 0) {
     return -expm1(log1p(-confidence) / (double)sample);
   }
+  // Underflows and the like are the library's daily work, also where the program stops at them.
+  fenv_t before;
+  feholdexcept(&before);
   double lower = (double)found / (double)sample, upper = 1.0;
   for (int i = 0; i < 60; i++) {
     const double middle = lower + (upper - lower) / 2;
@@ -25,5 +29,6 @@ double separatrix_share_upper_limit(int64_t found, int64_t sample, double confid
       upper = middle;
     }
   }
+  fesetenv(&before);
   return upper;
 }

@@ -5,15 +5,15 @@
 module system
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
   use bindings, only: c_core_list, c_cpu_name, c_crashed, c_default_environment, c_environment, c_exit, c_exit_now, c_fork, &
-    c_host_name, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_sleep_microseconds, &
-    c_stderr_is_terminal, c_utc_now
+    c_host_name, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_set_environment, &
+    c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
   use kinds, only: int64, real64
   implicit none
   private
 
   public :: monotonic_seconds, utc_now, resident_bytes, host_name, stderr_is_terminal, &
-    default_environment, sleep_microseconds, exit_program, exit_at_once, fork_process, has_crashed, from_c, core_list, &
-    may_use_core, online_cores, cpu_name, environment_text
+    default_environment, set_environment, sleep_microseconds, exit_program, exit_at_once, fork_process, has_crashed, &
+    from_c, core_list, may_use_core, online_cores, cpu_name, environment_text
 
 contains
 
@@ -95,6 +95,13 @@ contains
     integer(c_int) :: ignored
     ignored = c_default_environment(name//c_null_char, value//c_null_char)
   end subroutine default_environment
+
+  !> Sets an environment variable.
+  subroutine set_environment(name, value)
+    character(len=*), intent(in) :: name, value
+    integer(c_int) :: ignored
+    ignored = c_set_environment(name//c_null_char, value//c_null_char)
+  end subroutine set_environment
 
   !> Gives the core away for at least this long.
   subroutine sleep_microseconds(microseconds)

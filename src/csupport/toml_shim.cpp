@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cfenv>
 #include <cfloat>
 #include <cstdlib>
 #include <cstring>
@@ -332,17 +333,19 @@ char *separatrix_toml_read_file(const char *path, int64_t *length, char **messag
 void separatrix_toml_free_text(char *text) { std::free(text); }
 
 void *separatrix_toml_parse(const char *text, int64_t length) {
+  // A number that is too large gets a message, also where the program stops at an overflow.
+  std::fenv_t before;
+  std::feholdexcept(&before);
+  Document *document = nullptr;
   try {
-    auto *document = new Document;
-    try {
-      parse(std::string(text, static_cast<std::size_t>(length)), *document);
-      return document;
-    } catch (...) {
-      delete document;
-    }
+    document = new Document;
+    parse(std::string(text, static_cast<std::size_t>(length)), *document);
   } catch (...) {
+    delete document;
+    document = nullptr;
   }
-  return nullptr;
+  std::fesetenv(&before);
+  return document;
 }
 
 void separatrix_toml_free(void *document) { delete static_cast<Document *>(document); }
@@ -386,15 +389,6 @@ int64_t separatrix_first_bad_byte(const char *text, int64_t length) {
   } catch (...) {
     return 0;
   }
-}
-
-uint64_t separatrix_fnv1a(const char *text, int64_t length) {
-  uint64_t hash = 14695981039346656037ULL;
-  for (int64_t i = 0; i < length; ++i) {
-    hash ^= static_cast<unsigned char>(text[i]);
-    hash *= 1099511628211ULL;
-  }
-  return hash;
 }
 
 } // extern "C"

@@ -46,9 +46,6 @@ int64_t separatrix_toml_text(const void *document, int entry, int field, char *b
  * if nowhere. */
 int64_t separatrix_first_bad_byte(const char *text, int64_t length);
 
-/* 64-bit FNV-1a hash of `length` bytes. */
-uint64_t separatrix_fnv1a(const char *text, int64_t length);
-
 #ifdef __cplusplus
 }
 #endif

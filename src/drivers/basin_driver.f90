@@ -9,7 +9,7 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_search, only: search_catalogues
+  use catalogue_search, only: pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
@@ -21,8 +21,10 @@ module basin_driver
   use refinement, only: automatic_block, last_origin
   use refinement_report, only: add_refinement, report_refinement
   use refined_tile, only: layers_of, pilot_share
-  use session, only: describe_file, open_session, session_t
+  use pair, only: is_pair
+  use session, only: describe_file, identity_of, open_session, session_t
   use shard, only: describe_shard, finish_shard, shard_path
+  use share_files, only: read_catalogue
   use status, only: last_reason, exit_done, reason_names, reason_settled
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
@@ -91,8 +93,12 @@ contains
       call prepare_counts(work)
       call report_plan(session, work, tile)
     end if
-    call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
-                           command%time_limit, work%catalogues, error)
+    if (len(command%catalogue) > 0) then
+      call take_catalogues(session, work, error)
+    else
+      call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
+                             command%time_limit, work%catalogues, error)
+    end if
     call session%stop_if(error)
     if (size(work%catalogues) > 0) call points_at_a_time(work%grid, work%span, work%block, error)
     call session%stop_if(error)
@@ -100,7 +106,8 @@ contains
     if (command%dry_run) call report_plan(session, work, tile)
     call report_catalogue(session, work)
     call describe_basin(session, work, schema, dimensions)
-    if (command%shard > 0) call describe_shard(work%catalogues, command%shard, command%shard_count, schema)
+    if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema, &
+                                               pack_catalogues(work%catalogues, spread(.true., 1, size(work%catalogues))))
     call open_tiles(session, path, schema, dimensions, tile, file)
     call run_tiles(session, file, work, complete)
     if (command%shard > 0 .and. complete) call finish_shard(session, file)
@@ -120,6 +127,22 @@ contains
     tile = automatic_tile(work%grid, the_case%tile)
     if (work%refine%active) tile = tile_of_blocks(work%grid, work%refine, the_case%tile)
   end subroutine prepare_basin
+
+  !> The attractors that a share of the same map has found, on all ranks.
+  subroutine take_catalogues(session, work, error)
+    type(session_t), intent(in) :: session
+    type(basin_work_t), intent(inout) :: work
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: packed(:), all_values(:)
+    allocate (packed(0))
+    if (session%team%is_root()) call read_catalogue(session%command%catalogue, identity_of(session%the_case, 'basin'), packed, &
+                                                    error)
+    call session%team%agree(error)
+    if (allocated(error)) return
+    call session%team%allgather(packed, all_values)
+    allocate (work%catalogues(merge(work%grid%slices, 0_int64, any(work%grid%start_axis > 0))))
+    call unpack_catalogues(all_values, work%catalogues, error)
+  end subroutine take_catalogues
 
   !> Attributes, axes and variables of the file; returns the names of its dimensions.
   subroutine describe_basin(session, work, schema, dimensions)
@@ -144,7 +167,7 @@ contains
     logical, intent(in) :: complete
     type(schema_t) :: extra
     call sum_counts(session, work)
-    call add_catalogue(extra, work%catalogues, work%captured)
+    call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
     call finish_tiles(session, file, complete, extra)
     call report_shares(session, work)

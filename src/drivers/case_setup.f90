@@ -38,6 +38,7 @@ contains
     end select
     options%tolerance = the_case%integrator%tolerance
     options%event_budget = int(the_case%integrator%event_budget, int64)
+    options%step_budget = int(the_case%integrator%step_budget, int64)
     options%domain = the_case%run%domain
     if (the_case%integrator%lanes == 'auto') options%lane_width = lane_width()
   end function options_of

@@ -15,9 +15,10 @@ module catalogue_search
   use motion, only: motion_t
   use parallel, only: make_scheduler
   use scheduler, only: scheduler_options_t, scheduler_t
-  use status, only: exit_resumable
+  use status, only: exit_io, exit_resumable
   use stop_check, only: check_stop
   use team, only: team_t
+  use text, only: to_text
   use trajectory, only: span_t
   implicit none
   private
@@ -52,7 +53,8 @@ contains
       if (allocated(error)) return
       ! Large where the slices are many.
       if (round == rounds) deallocate (first_round)
-      call exchange(team, mine, catalogues)
+      call exchange(team, mine, catalogues, error)
+      if (allocated(error)) return
     end do
     call label_slices(grid, catalogues)
   end subroutine search_catalogues
@@ -141,13 +143,14 @@ contains
   end function attractors_of
 
   !> Every rank gets the catalogues of the slices that the others searched.
-  subroutine exchange(team, searched, catalogues)
+  subroutine exchange(team, searched, catalogues, error)
     class(team_t), intent(in) :: team
     logical, intent(in) :: searched(:)
     type(catalogue_t), intent(inout) :: catalogues(:)
+    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: all_values(:)
     call team%allgather(pack_catalogues(catalogues, searched), all_values)
-    call unpack_catalogues(all_values, catalogues)
+    call unpack_catalogues(all_values, catalogues, error)
   end subroutine exchange
 
   !> The catalogues of the slices that were `searched`, as numbers: slice, number of attractors, and these.
@@ -156,8 +159,11 @@ contains
     logical, intent(in) :: searched(:)
     real(wp), allocatable :: packed(:)
     integer :: slice, i, position
-    allocate (packed(sum([(merge(2 + packed_size*size(catalogues(slice)%attractors), 0, searched(slice)), &
-                           slice=1, size(catalogues))])))
+    position = 0
+    do slice = 1, size(catalogues)
+      if (searched(slice)) position = position + 2 + packed_size*size(catalogues(slice)%attractors)
+    end do
+    allocate (packed(position))
     position = 0
     do slice = 1, size(catalogues)
       if (.not. searched(slice)) cycle
@@ -170,13 +176,23 @@ contains
     end do
   end function pack_catalogues
 
-  !> What `pack_catalogues` packed, into the slices that it names.
-  pure subroutine unpack_catalogues(packed, catalogues)
+  !> What `pack_catalogues` packed, into the slices that it names. Code 74 if it is not that, as from a damaged file, or a
+  !> slice has no catalogue then.
+  pure subroutine unpack_catalogues(packed, catalogues, error)
     real(wp), intent(in) :: packed(:)
     type(catalogue_t), intent(inout) :: catalogues(:)
+    type(error_t), allocatable, intent(out) :: error
     integer :: slice, i, position, count
+    logical :: whole
     position = 0
     do while (position < size(packed))
+      whole = position + 2 <= size(packed)
+      if (whole) whole = packed(position + 1) >= 1 .and. packed(position + 1) <= size(catalogues) .and. &
+        packed(position + 2) >= 0 .and. packed(position + 2) <= (size(packed) - position - 2)/packed_size
+      if (.not. whole) then
+        call fail(error, exit_io, 'the catalogue of the attractors is damaged')
+        return
+      end if
       slice = nint(packed(position + 1))
       count = nint(packed(position + 2))
       position = position + 2
@@ -186,6 +202,11 @@ contains
         catalogues(slice)%attractors(i) = unpack_attractor(packed(position + 1:position + packed_size))
         position = position + packed_size
       end do
+    end do
+    do slice = 1, size(catalogues)
+      if (allocated(catalogues(slice)%attractors)) cycle
+      call fail(error, exit_io, 'the catalogue of slice '//to_text(slice - 1)//' is missing')
+      return
     end do
   end subroutine unpack_catalogues
 

@@ -6,7 +6,7 @@ module command_line
   use errors, only: error_t, fail
   use kinds, only: wp
   use status, only: exit_usage
-  use text, only: join, starts_with
+  use text, only: join, read_number, starts_with
   implicit none
   private
 
@@ -20,6 +20,9 @@ module command_line
   !> The commands that keep what is done when they are stopped.
   character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
 
+  !> The commands that write a table besides.
+  character(len=*), parameter :: tabulated(3) = [character(len=10) :: 'points', 'trajectory', 'merge']
+
   type, public :: command_t
     character(len=:), allocatable :: name
     !> The case, the file of `info` and `verify`, or the output of `merge`.
@@ -29,6 +32,8 @@ module command_line
     !> Which share of the tiles to compute, and of how many; 0 = all.
     integer :: shard = 0, shard_count = 0
     character(len=:), allocatable :: output, list, csv, record, log, tile_times
+    !> The share of a map from which to take the attractors.
+    character(len=:), allocatable :: catalogue
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
@@ -56,6 +61,7 @@ contains
     command%record = ''
     command%tile_times = ''
     command%log = ''
+    command%catalogue = ''
     allocate (command%overrides(0), command%shards(0))
     position = 0
     do while (position < command_argument_count())
@@ -71,7 +77,7 @@ contains
         command%path = argument
       else if (command%name == 'merge') then
         padded = argument
-        command%shards = [command%shards, padded]
+        command%shards = [character(len=longest_argument) :: command%shards, padded]
       else
         call fail(error, exit_usage, "unexpected argument '"//argument//"' after '"//command%path//"'")
       end if
@@ -94,14 +100,18 @@ contains
       call fail(error, exit_usage, "laws takes no file; found '"//command%path//"'")
     else if (command%name == 'merge' .and. size(command%shards) == 0) then
       call fail(error, exit_usage, 'merge: the shards are missing (see separatrix merge --help)')
-    else if (command%shard > 0 .and. command%name /= 'basin') then
-      call fail(error, exit_usage, '--shard belongs to the command basin')
+    else if (command%shard > 0 .and. command%name /= 'basin' .and. command%name /= 'points') then
+      call fail(error, exit_usage, '--shard belongs to the commands basin and points')
+    else if (command%shard > 0 .and. len(command%csv) > 0) then
+      call fail(error, exit_usage, '--csv needs the whole list: give it to merge')
+    else if (len(command%catalogue) > 0 .and. command%name /= 'basin') then
+      call fail(error, exit_usage, '--catalogue belongs to the command basin')
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
       call fail(error, exit_usage, '--list belongs to the command points')
-    else if (len(command%csv) > 0 .and. command%name /= 'points' .and. command%name /= 'trajectory') then
-      call fail(error, exit_usage, '--csv belongs to the commands points and trajectory')
+    else if (len(command%csv) > 0 .and. .not. any(command%name == tabulated)) then
+      call fail(error, exit_usage, '--csv belongs to the commands '//join(tabulated, ', '))
     else if (len(command%record) > 0 .and. command%name /= 'trajectory') then
       call fail(error, exit_usage, '--record belongs to the command trajectory')
     else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
@@ -169,8 +179,8 @@ contains
       command%json = .true.
     case ('-q', '--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--time-limit', &
-          '--ranks-per-node', '--sample', '--seed')
+    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
+          '--time-limit', '--ranks-per-node', '--sample', '--seed')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -195,15 +205,15 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv', '--record', '--log', '--tile-times')
+    case ('-o', '--output', '--list', '--csv', '--record', '--log', '--tile-times', '--catalogue')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
-      command%overrides = [command%overrides, padded]
+      command%overrides = [character(len=longest_argument) :: command%overrides, padded]
     case ('--shard')
       call read_shard(value, command, error)
     case ('--time-limit')
-      call read_number(name, value, command%time_limit, error)
+      call read_seconds(name, value, command%time_limit, error)
     case ('--ranks-per-node')
       call read_integer(name, value, 1, command%ranks_per_node, error)
     case ('--sample')
@@ -237,6 +247,8 @@ contains
       command%list = value
     case ('--tile-times')
       command%tile_times = value
+    case ('--catalogue')
+      command%catalogue = value
     case ('--csv')
       command%csv = value
     case ('--log')
@@ -248,18 +260,18 @@ contains
     end select
   end subroutine take_path
 
-  subroutine read_number(name, value, number, error)
+  subroutine read_seconds(name, value, number, error)
     character(len=*), intent(in) :: name, value
     real(wp), intent(out) :: number
     type(error_t), allocatable, intent(out) :: error
     integer :: status
     number = 0
     status = verify(value, '0123456789.eE+-')
-    if (status == 0) read (value, *, iostat=status) number
+    if (status == 0) call read_number(value, number, status)
     if (status /= 0 .or. .not. number > 0 .or. number > huge(number)) then
       call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of seconds above 0")
     end if
-  end subroutine read_number
+  end subroutine read_seconds
 
   subroutine read_integer(name, value, least, number, error)
     character(len=*), intent(in) :: name, value
@@ -308,8 +320,9 @@ contains
         '  --list FILE     table with the columns x0,v0 and optionally ratio; replaces the grid of the case'//nl// &
         '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl
     case ('merge')
-      lines = 'separatrix merge OUT SHARD...: one result file from the files that basin --shard I/N has written'//nl// &
+      lines = 'separatrix merge OUT SHARD...: one result file from the files that --shard I/N has written'//nl// &
         '  The shards must be all of one case: N files, each share once. They are kept.'//nl// &
+        '  --csv FILE      of a list of starts also the table that points --csv writes'//nl// &
         '  --force         replaces an existing OUT'//nl// &
         '  --json, --quiet, --log FILE  as for the other commands'//nl
       return
@@ -345,7 +358,8 @@ contains
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &
       '  --force            replaces an existing output'//nl// &
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
-      '  --shard I/N        basin: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'//nl// &
+      '  --shard I/N        basin, points: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'//nl// &
+      '  --catalogue FILE   basin: takes the attractors from a share of the same map instead of searching them'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &

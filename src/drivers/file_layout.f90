@@ -146,8 +146,9 @@ contains
   end subroutine add_refined_variables
 
   !> The catalogue as a table; `counts(entry)` = points captured.
-  subroutine add_catalogue(schema, catalogues, counts)
+  subroutine add_catalogue(schema, catalogues, counts, two_bodies)
     type(schema_t), intent(inout) :: schema
+    logical, intent(in) :: two_bodies
     type(catalogue_t), intent(in) :: catalogues(:)
     integer(int64), intent(in) :: counts(:)
     type(attractor_t), allocatable :: all_of_them(:)
@@ -170,8 +171,10 @@ contains
     call add('regime', type_int8, '1', 'regime, coded as in the map', real(all_of_them%features%regime, wp))
     call add('period', type_int16, '1', 'period in drive periods', real(all_of_them%period, wp))
     call add('event_word', type_int64, '1', 'events of one period', real(all_of_them%features%word, wp))
-    call add('x', type_float64, 'm', 'position at the section, crank angle 0', all_of_them%points(1, 1))
-    call add('v', type_float64, 'm/s', 'velocity at the section, crank angle 0', all_of_them%points(2, 1))
+    call add('x', type_float64, 'm', 'position at the section, crank angle 0', all_of_them%section(1))
+    call add('v', type_float64, 'm/s', 'velocity at the section, crank angle 0', all_of_them%section(2))
+    if (two_bodies) call add('driver_x', type_float64, 'm', 'position of the driving body there', all_of_them%section(3))
+    if (two_bodies) call add('driver_v', type_float64, 'm/s', 'velocity of the driving body there', all_of_them%section(4))
     call add('multiplier', type_float64, '1', 'largest modulus of the multipliers', all_of_them%multiplier)
     call add('capture_radius', type_float64, '1', 'radius of the neighbourhood found to contract', &
              all_of_them%capture_radius)

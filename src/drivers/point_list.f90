@@ -8,7 +8,7 @@ module point_list
   use kinds, only: int64, wp
   use output_check, only: is_folder
   use status, only: exit_bad_case, exit_no_input
-  use text, only: number_length, replace_all, starts_with, to_text
+  use text, only: number_length, read_number, replace_all, starts_with, to_text
   use toml_bindings, only: first_bad_byte, read_text_file
   implicit none
   private
@@ -152,7 +152,7 @@ contains
       if (columns(k) == 0) cycle
       word = field(line, columns(k))
       status = 1
-      if (len(word) > 0 .and. number_length(word) == len(word)) read (word, *, iostat=status) row(k)
+      if (len(word) > 0 .and. number_length(word) == len(word)) call read_number(word, row(k), status)
       if (status /= 0 .or. .not. abs(row(k)) <= huge(1.0_wp)) then
         call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed is a finite number")
         return

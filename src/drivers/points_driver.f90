@@ -8,7 +8,7 @@ module points_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
   use kinds, only: int64, int8, wp
@@ -18,8 +18,9 @@ module points_driver
   use map_schema, only: schema_t, type_float64, type_int32
   use point_list, only: point_list_t, read_point_list
   use session, only: describe_file, open_session, session_t
+  use shard, only: describe_shard, finish_shard, shard_path
   use span_check, only: check_periods
-  use status, only: last_reason, exit_done, reason_names
+  use status, only: last_reason, exit_done, exit_io, reason_names
   use text, only: to_text
   use text_table, only: table_t
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
@@ -28,15 +29,15 @@ module points_driver
   implicit none
   private
 
-  public :: run_points, open_list_journey
+  public :: run_points, open_list_journey, read_list, describe_list, end_points
 
-  integer, parameter :: points_per_tile = 256
+  integer, parameter, public :: points_per_tile = 256
   !> Starts, final state, impacts, last impact speed, regime, reason.
   integer, parameter :: bytes_per_point = 6*8 + 4 + 2
   !> x, v, impacts, last impact speed, regime, reason.
   integer, parameter :: point_variables = 6
 
-  type, extends(point_work_t) :: list_work_t
+  type, extends(point_work_t), public :: list_work_t
     type(grid_t) :: grid
     type(journey_t) :: journey
     type(point_list_t) :: list
@@ -55,11 +56,10 @@ contains
     type(session_t) :: session
     type(list_work_t) :: work
     type(map_file_t) :: file
-    type(schema_t) :: schema, extra
+    type(schema_t) :: schema
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
     real(wp) :: seconds
-    integer :: i
     logical :: complete
     call open_session(command, session)
     work%variables = point_variables
@@ -72,6 +72,7 @@ contains
     if (.not. allocated(error)) call check_periods(work%journey%span, shortest_period(work), error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
+    if (command%shard > 0) path = shard_path(path, command%shard, command%shard_count)
     if (command%validate) then
       call session%journal%line('valid', command%path//' and '//command%list//' are valid for points')
       call session%end_with(exit_done)
@@ -83,21 +84,36 @@ contains
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.true.)
-    call describe_file(session, 'points', schema, list_identity(work%list))
-    call describe_points(work%list, schema)
+    call describe_list(session, work%list, schema)
+    if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema)
     call open_tiles(session, path, schema, ['point'], [points_per_tile], file)
     call run_tiles(session, file, work, complete)
+    if (command%shard > 0 .and. complete) call finish_shard(session, file)
+    call end_points(session, work, file, complete)
+  end subroutine run_points
+
+  !> The final file and the table, how the points ended, and the end of the program.
+  subroutine end_points(session, work, file, complete)
+    type(session_t), intent(inout) :: session
+    type(list_work_t), intent(inout) :: work
+    type(map_file_t), intent(inout) :: file
+    logical, intent(in) :: complete
+    type(schema_t) :: extra
+    type(error_t), allocatable :: error
+    integer :: i
     call session%team%sum(work%reasons)
     call finish_tiles(session, file, complete, extra)
-    if (session%team%is_root() .and. len(command%csv) > 0) call write_csv(command%csv, path, work%list, error)
-    call session%stop_if(error)
+    associate (csv => session%command%csv)
+      if (session%team%is_root() .and. len(csv) > 0) call write_csv(csv, file%path, work%list, error)
+      call session%stop_if(error)
+      if (len(csv) > 0) call session%journal%line('written', 'wrote '//csv)
+    end associate
     do i = 0, last_reason
       if (work%reasons(i) > 0) call session%journal%line('reason', '  ended as '//trim(reason_names(i))//': '// &
         to_text(work%reasons(i))//' points')
     end do
-    if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     call session%end_with(exit_done)
-  end subroutine run_points
+  end subroutine end_points
 
   !> The machine of a list of starts: whole durations, of whose windows only the regime is told.
   subroutine open_list_journey(grid, the_case, journey, error)
@@ -131,6 +147,31 @@ contains
     sum_so_far = crc32(transfer(list%ratio, one), sum_so_far)
     identity = to_text(sum_so_far)
   end function list_identity
+
+  !> The starts that the file of a run keeps.
+  subroutine read_list(path, list, error)
+    character(len=*), intent(in) :: path
+    type(point_list_t), intent(out) :: list
+    type(error_t), allocatable, intent(out) :: error
+    type(reader_t) :: reader
+    call open_final(path, reader, error)
+    if (.not. allocated(error)) call reader%read_values('/x0', list%x0, error)
+    if (.not. allocated(error)) call reader%read_values('/v0', list%v0, error)
+    if (.not. allocated(error)) call reader%read_values('/ratio', list%ratio, error)
+    if (.not. allocated(error)) call reader%close(error)
+    if (allocated(error)) return
+    if (size(list%v0) /= size(list%x0) .or. size(list%ratio) /= size(list%x0)) call fail(error, exit_io, &
+      "'"//path//"' is damaged: x0, v0 and ratio have different lengths")
+  end subroutine read_list
+
+  !> Attributes, starts and variables of the file.
+  subroutine describe_list(session, list, schema)
+    type(session_t), intent(in) :: session
+    type(point_list_t), intent(in) :: list
+    type(schema_t), intent(inout) :: schema
+    call describe_file(session, 'points', schema, list_identity(list))
+    call describe_points(list, schema)
+  end subroutine describe_list
 
   subroutine describe_points(list, schema)
     type(point_list_t), intent(in) :: list

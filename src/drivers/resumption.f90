@@ -16,7 +16,7 @@ module resumption
   implicit none
   private
 
-  public :: inspect_interrupted
+  public :: inspect_interrupted, read_builder, builder_of
 
   !> What is kept of the run that began, beside the same of the run that ends.
   character(len=*), parameter :: kept(6) = [character(len=12) :: 'version', 'commit', 'compiler', 'flags', 'c_flags', &
@@ -49,12 +49,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: ignored
     type(reader_t) :: reader
-    character(len=:), allocatable :: resolved, keys, identity, version, commit, flags
+    character(len=:), allocatable :: resolved, keys, identity, version, builder
     call open_final(part, reader, error)
     if (.not. allocated(error)) call reader%text_attribute('/provenance', 'case_identity', identity, error)
     if (.not. allocated(error)) call reader%text_attribute('/provenance', 'version', version, error)
-    if (.not. allocated(error)) call reader%text_attribute('/provenance', 'commit', commit, error)
-    if (.not. allocated(error)) call reader%text_attribute('/provenance', 'flags', flags, error)
+    if (.not. allocated(error)) call read_builder(reader, builder, error)
     if (.not. allocated(error)) call reader%read_text('/provenance/resolved_case', resolved, error)
     if (allocated(error)) then
       error%message = error%message//'; what describes the run is damaged, --force begins again'
@@ -69,12 +68,34 @@ contains
                 session%provenance%version//'; --force begins again')
     else
       if (keys /= '') call session%journal%line('differs', 'the case differs in what does not matter: '//keys)
-      if (commit /= session%provenance%commit .or. flags /= session%provenance%flags) call session%journal%line('build', &
-        'begun by another build: commit '//commit//', flags '//flags//'; the file keeps both')
+      if (builder /= builder_of(session)) call session%journal%line('build', 'begun by another build: '//builder// &
+        '; the file keeps both')
       call take_over(reader, schema, error)
     end if
     call reader%close(ignored)
   end subroutine compare
+
+  !> The program that made a file, as `builder_of`.
+  subroutine read_builder(reader, builder, error)
+    type(reader_t), intent(in) :: reader
+    character(len=:), allocatable, intent(out) :: builder
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: commit, compiler, flags, c_flags
+    call reader%text_attribute('/provenance', 'commit', commit, error)
+    if (.not. allocated(error)) call reader%text_attribute('/provenance', 'compiler', compiler, error)
+    if (.not. allocated(error)) call reader%text_attribute('/provenance', 'flags', flags, error)
+    if (.not. allocated(error)) call reader%text_attribute('/provenance', 'c_flags', c_flags, error)
+    if (.not. allocated(error)) builder = 'commit '//commit//', compiler '//compiler//', flags '//flags//', '//c_flags
+  end subroutine read_builder
+
+  !> This program in words: commit, compiler, flags.
+  function builder_of(session) result(builder)
+    type(session_t), intent(in) :: session
+    character(len=:), allocatable :: builder
+    associate (record => session%provenance)
+      builder = 'commit '//record%commit//', compiler '//record%compiler//', flags '//record%flags//', '//record%c_flags
+    end associate
+  end function builder_of
 
   subroutine take_over(reader, schema, error)
     type(reader_t), intent(in) :: reader

@@ -9,12 +9,14 @@ module session
   use case_echo, only: case_identity
   use case_reader, only: load_case
   use case_type, only: case_t
+  use case_warnings, only: warn_about
   use command_line, only: command_t
   use errors, only: error_t
+  use files, only: give_lock, take_lock
   use journal, only: journal_t
   use launcher, only: launched_ranks
   use map_schema, only: schema_t
-  use output_check, only: check_create, check_result, check_resume, check_table
+  use output_check, only: check_create, check_result, check_resume, check_table, working_path
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
   use serial_team, only: serial_team_t
@@ -26,7 +28,7 @@ module session
   implicit none
   private
 
-  public :: open_session, describe_file
+  public :: open_session, describe_file, identity_of
 
   !> A signal to all ranks reaches them within this time, in microseconds.
   integer, parameter :: signal_spread_us = 20000
@@ -43,6 +45,9 @@ module session
     logical :: alone = .true.
     !> Files are being written.
     logical :: writing = .false.
+    !> On rank 0 of a run with a working file: its lock, and what holds it.
+    character(len=:), allocatable, private :: lock_path
+    integer, private :: lock = -1
   contains
     procedure :: begin
     procedure :: end_with
@@ -82,7 +87,11 @@ contains
     character(len=*), intent(in) :: path
     logical, intent(in) :: tiled
     type(error_t), allocatable :: error
-    if (self%team%is_root()) call check_outputs(self%command, path, tiled, error)
+    if (self%team%is_root()) then
+      call check_outputs(self%command, path, tiled, error)
+      self%lock_path = working_path(path)//'.lock'
+      if (tiled .and. .not. allocated(error)) call take_lock(self%lock_path, self%lock, error)
+    end if
     call self%stop_if(error)
     if (self%alone) call start_team(self%team)
     self%writing = .true.
@@ -96,7 +105,14 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
+    call warn_about(self%the_case, self%journal)
   end subroutine begin
+
+  subroutine unlock(session)
+    type(session_t), intent(inout) :: session
+    if (session%lock >= 0) call give_lock(session%lock_path, session%lock)
+    session%lock = -1
+  end subroutine unlock
 
   subroutine check_outputs(command, path, tiled, error)
     type(command_t), intent(in) :: command
@@ -128,12 +144,20 @@ contains
     call schema%add_attribute('', 'kind', kind)
     call schema%add_attribute('', 'title', session%the_case%title)
     call schema%add_attribute('', 'references', 'docs/theory.md of Separatrix lists equations and sources')
-    identity = kind//' '//case_identity(session%the_case, kind)
+    identity = identity_of(session%the_case, kind)
     if (present(inputs)) identity = identity//' '//inputs
     call schema%add_attribute('provenance', 'case_identity', identity)
     call schema%add_text('provenance', 'case_text', session%the_case%raw_text)
     call schema%add_text('provenance', 'resolved_case', session%the_case%resolved_text)
   end subroutine describe_file
+
+  !> What decides the results of the command `kind` for a case.
+  function identity_of(the_case, kind) result(identity)
+    type(case_t), intent(in) :: the_case
+    character(len=*), intent(in) :: kind
+    character(len=:), allocatable :: identity
+    identity = kind//' '//case_identity(the_case, kind)
+  end function identity_of
 
   !> Ends the program on all ranks. Rank 0 returns the code, and as the last: mpirun ends the other processes by force as soon
   !> as one has returned another code than 0.
@@ -143,6 +167,7 @@ contains
     logical :: first, others
     first = self%team%is_root()
     others = self%team%size() > 1
+    call unlock(self)
     call self%team%close()
     if (.not. first) call exit_program(exit_done)
     if (others .and. code /= exit_done) call sleep_microseconds(farewell_us)
@@ -159,6 +184,7 @@ contains
     if (self%writing .and. (error%code == exit_io .or. error%code == exit_cannot_create)) then
       ! HDF5 cannot be shut down after a write of its own has failed. The barrier lets rank 0 speak first.
       call self%team%barrier()
+      call unlock(self)
       call self%team%abort(error%code)
     end if
     call self%end_with(error%code)
@@ -188,6 +214,7 @@ contains
     if (.not. allocated(error)) return
     self%journal%active = .true.
     call self%journal%error(error%message)
+    call unlock(self)
     call self%team%abort(error%code)
   end subroutine abort_if
 

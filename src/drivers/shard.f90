@@ -1,10 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A share of the tiles of a map, computed by a job of its own into a working file of its own.
+!> A share of the tiles of a map or of a list of starts, computed by a job of its own into a working file of its own.
 module shard
-  use basin, only: catalogue_t
-  use catalogue_search, only: pack_catalogues
   use errors, only: error_t
   use kinds, only: int64, wp
   use map_file, only: map_file_t, working_path
@@ -38,15 +36,15 @@ contains
     name = path//'.shard-'//to_text(number)//'-of-'//to_text(shares)
   end function shard_path
 
-  !> What merge needs besides the tiles: which share it is, and the catalogues, so that they are not searched again.
-  subroutine describe_shard(catalogues, number, shares, schema)
-    type(catalogue_t), intent(in) :: catalogues(:)
+  !> What merge needs besides the tiles: which share it is, and for maps the catalogues of all slices as `pack_catalogues`
+  !> makes them, so that they are not searched again.
+  subroutine describe_shard(number, shares, schema, packed)
     integer, intent(in) :: number, shares
     type(schema_t), intent(inout) :: schema
-    real(wp), allocatable :: packed(:)
-    packed = pack_catalogues(catalogues, spread(.true., 1, size(catalogues)))
+    real(wp), intent(in), optional :: packed(:)
     call schema%add_attribute('shard', 'number', number)
     call schema%add_attribute('shard', 'shares', shares)
+    if (.not. present(packed)) return
     call schema%add_dimension('packed', size(packed, kind=int64))
     call schema%add_variable('catalogue', type_float64, ['packed'], data=packed, group='shard', &
                              long_name='catalogues of all slices')

@@ -1,16 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The two chains of a sweep, run up and run down, each by one rank, and the limits between which impacts occur.
+!> The two chains of a sweep, run up and run down, each by one rank, and the limits between which impacts occur, or a regime
+!> of two bodies.
 module sweep_chain
   use attractors, only: features_t
   use errors, only: error_t
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
-  use motion_state, only: state_t
   use status, only: reason_time_over
   use stop_check, only: check_stop
+  use strobe, only: strobe_t
   use sweep, only: bracket_limit, hold_parameter, hold_t
   use team, only: team_t
   use trajectory, only: span_t
@@ -24,12 +25,13 @@ module sweep_chain
   !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
   !> not a number there.
   integer, parameter :: hold_numbers = 10, hold_codes = 4
-  !> Most changes between impacting and not impacting that are kept of one chain.
+  !> Most limits that are kept of one chain.
   integer, parameter :: most_limits = 64
 
   type, public :: limit_t
-    !> Impacts start (or stop) while the parameter goes up (or down).
-    logical :: start = .true., up = .true.
+    !> Marks of the holds (see `hold_t`) before and behind it, and whether the parameter goes up.
+    integer :: from = 0, to = 0
+    logical :: up = .true.
     !> Values between which the change lies.
     real(wp) :: bracket(2) = 0
   end type limit_t
@@ -78,7 +80,7 @@ contains
     call unpack_chains(all_values, samples, size(values), chains)
   end subroutine run_chains
 
-  !> One chain as plain numbers: holds, samples, number of limits, and start, lower, upper of each.
+  !> One chain as plain numbers: holds, samples, number of limits, and marks before and behind, lower, upper of each.
   subroutine run_chain(journal, time_limit, grid, span, path, values, up, samples, tolerance, packed, error)
     type(journal_t), intent(inout) :: journal
     real(wp), intent(in) :: time_limit
@@ -91,16 +93,15 @@ contains
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), bracket(2)
-    real(wp) :: limits(3, most_limits)
+    real(wp) :: limits(4, most_limits)
     type(hold_t) :: held
-    type(state_t) :: state
-    integer :: i, k, found, before
-    logical :: impacting, impacted
-    state%x = grid%start(1)
-    state%v = grid%start(2)
+    type(strobe_t) :: state
+    integer :: i, k, found, before, mark, next
+    state%state%x = grid%start(1)
+    state%state%v = grid%start(2)
     found = 0
     before = 0
-    impacted = .false.
+    mark = 0
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
       call hold_parameter(grid, span, path, values(k), state, merge(grid%start(3), 0.0_wp, i == 1), samples, held, error)
@@ -109,14 +110,14 @@ contains
       points(:, :, k) = held%samples
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == reason_time_over) then
-        impacting = held%features%impacts_per_period > 0
-        if (before > 0 .and. (impacting .neqv. impacted) .and. found < most_limits) then
-          call bracket_limit(grid, span, path, values(before), values(k), state, impacted, tolerance, bracket, error)
+        if (before > 0 .and. held%mark /= mark .and. found < most_limits) then
+          next = held%mark
+          call bracket_limit(grid, span, path, values(before), values(k), state, mark, tolerance, next, bracket, error)
           if (allocated(error)) return
           found = found + 1
-          limits(:, found) = [merge(1.0_wp, 0.0_wp, impacting), bracket]
+          limits(:, found) = [real([mark, next], wp), bracket]
         end if
-        impacted = impacting
+        mark = held%mark
         before = k
         state = held%state
       end if
@@ -127,7 +128,7 @@ contains
       if (held%reason == 0) state = held%state
     end do
     packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(found, wp), &
-              reshape(limits(:, :found), [3*found])]
+              reshape(limits(:, :found), [4*found])]
   end subroutine run_chain
 
   pure function numbers_of(held) result(numbers)
@@ -156,10 +157,11 @@ contains
       position = position + 2*samples*values
       count = nint(all_values(position))
       do i = 1, count
-        chains%limits = [chains%limits, limit_t(all_values(position + 3*i - 2) > 0, direction == 1, &
-                                                all_values(position + 3*i - 1:position + 3*i))]
+        associate (numbers => all_values(position + 4*i - 3:position + 4*i))
+          chains%limits = [chains%limits, limit_t(nint(numbers(1)), nint(numbers(2)), direction == 1, numbers(3:))]
+        end associate
       end do
-      position = position + 3*count + 1
+      position = position + 4*count + 1
     end do
   end subroutine unpack_chains
 

@@ -3,6 +3,7 @@
 
 !> `separatrix sweep`: run up, run down, and many starts at every value of the parameter.
 module sweep_driver
+  use attractors, only: regime_impact, regime_names
   use axis, only: axis_t, linear_values
   use basin_driver, only: bytes_per_point
   use basin, only: basin_points, basin_variables, catalogue_t, points_at_a_time, slice_cache_t
@@ -20,10 +21,11 @@ module sweep_driver
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int64, type_string
+  use pair, only: is_pair
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done
   use sweep_chain, only: chains_t, limit_t, run_chains
-  use text, only: to_text
+  use text, only: replace_all, to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
   implicit none
@@ -87,7 +89,7 @@ contains
                       trim(sweep%swept%name), sweep%swept%values, [sweep%directions /= 'down', &
                       sweep%directions /= 'up'], sweep%samples, sweep%limit_tolerance, chains, error)
       call session%stop_if(error)
-      call report_limits(session, chains)
+      call report_limits(session, chains%limits)
       call describe_file(session, 'sweep', schema)
       call describe_chains(session, chains, schema)
     end associate
@@ -215,7 +217,7 @@ contains
     call schema%add_variable('strobe_v', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
       units='m/s', long_name='velocity at crank angle 0', data=reshape(chains%samples(2, :, :, :), &
       [size(chains%samples)/2]))
-    if (size(chains%limits) > 0) call add_limits(schema, session%the_case%sweep%swept%unit, chains%limits)
+    if (size(chains%limits) > 0) call add_limits(session, schema, chains%limits)
     barriers = barriers_of(session)
     ! A barrier that is swept has no one position.
     if (session%the_case%sweep%swept%name == 'contact.upper') barriers(1) = huge(1.0_wp)
@@ -253,43 +255,58 @@ contains
     barriers = barrier_positions(contact)
   end function barriers_of
 
-  subroutine add_limits(schema, unit, limits)
+  subroutine add_limits(session, schema, limits)
+    type(session_t), intent(in) :: session
     type(schema_t), intent(inout) :: schema
-    character(len=*), intent(in) :: unit
     type(limit_t), intent(in) :: limits(:)
-    character(len=24) :: names(size(limits))
+    character(len=40) :: names(size(limits))
+    character(len=:), allocatable :: unit
     integer :: i
+    unit = trim(session%the_case%sweep%swept%unit)
     do i = 1, size(limits)
-      names(i) = limit_name(limits(i))
+      names(i) = limit_name(session, limits(i))
     end do
     call schema%add_dimension('limit', size(limits, kind=int64))
-    call schema%add_variable('name', type_string, ['limit'], long_name='where impacts start or stop', strings=names, &
-                             group='limits')
+    call schema%add_variable('name', type_string, ['limit'], strings=names, group='limits', &
+                             long_name='where impacts start or stop, or a regime of two bodies gives way')
     call schema%add_variable('lower', type_float64, ['limit'], units=unit, long_name='lower end of the bracket', &
                              data=limits%bracket(1), group='limits')
     call schema%add_variable('upper', type_float64, ['limit'], units=unit, long_name='upper end of the bracket', &
                              data=limits%bracket(2), group='limits')
   end subroutine add_limits
 
-  pure function limit_name(limit) result(name)
+  !> What happens at a limit: impacts start or stop, or one regime of two bodies gives way to another.
+  pure function limit_name(session, limit) result(name)
+    type(session_t), intent(in) :: session
     type(limit_t), intent(in) :: limit
     character(len=:), allocatable :: name
-    name = 'impacts_'//trim(merge('start', 'stop ', limit%start))//'_'//trim(merge('up  ', 'down', limit%up))
+    if (is_pair(session%the_case%laws)) then
+      name = trim(regime_names(limit%from))//'_to_'//trim(regime_names(limit%to))
+    else
+      name = 'impacts_'//trim(merge('start', 'stop ', limit%to == regime_impact))
+    end if
+    name = name//'_'//trim(merge('up  ', 'down', limit%up))
   end function limit_name
 
-  subroutine report_limits(session, chains)
+  subroutine report_limits(session, limits)
     type(session_t), intent(inout) :: session
-    type(chains_t), intent(in) :: chains
+    type(limit_t), intent(in) :: limits(:)
+    character(len=:), allocatable :: name
     integer :: i
-    do i = 1, size(chains%limits)
-      associate (limit => chains%limits(i))
-        call session%journal%line('limit', '  run '//trim(merge('up  ', 'down', limit%up))//': impacts '// &
-          trim(merge('start', 'stop ', limit%start))//' between '//to_text(limit%bracket(1), 6)//' and '// &
-          to_text(limit%bracket(2), 6), '"name": "'//limit_name(limit)//'", "lower": '// &
-          to_text(limit%bracket(1))//', "upper": '//to_text(limit%bracket(2)))
+    do i = 1, size(limits)
+      name = limit_name(session, limits(i))
+      associate (bracket => limits(i)%bracket)
+        call session%journal%line('limit', '  run '//trim(merge('up  ', 'down', limits(i)%up))//': '// &
+          replace_all(name(:index(name, '_', back=.true.) - 1), '_', ' ')//' between '//to_text(bracket(1), 6)//' and '// &
+          to_text(bracket(2), 6), '"name": "'//name//'", "lower": '//to_text(bracket(1))//', "upper": '//to_text(bracket(2)))
       end associate
     end do
-    if (size(chains%limits) == 0) call session%journal%line('limit', '  impacts neither start nor stop')
+    if (size(limits) > 0) return
+    if (is_pair(session%the_case%laws)) then
+      call session%journal%line('limit', '  one regime throughout')
+    else
+      call session%journal%line('limit', '  impacts neither start nor stop')
+    end if
   end subroutine report_limits
 
   !> Ranges of the parameter where starts lead to motions with impacts, without, and both.

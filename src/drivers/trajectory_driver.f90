@@ -8,9 +8,9 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use contact_law, only: barrier_positions, force_on_body
+  use contact_law, only: barrier_positions, contact_at_speed, force_on_body
   use drive_law, only: foot_motion
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
   use journal, only: duration_text
@@ -19,10 +19,11 @@ module trajectory_driver
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
+  use pair, only: driven_by_motion
   use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
-  use status, only: exit_done, reason_name, reason_time_over
+  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
   use text, only: to_text
   use text_table, only: table_t
   use trajectory, only: outcome_t, run_trajectory, span_t
@@ -30,6 +31,9 @@ module trajectory_driver
   private
 
   public :: run_trajectory_command
+
+  !> Most samples of a trajectory: some hundred bytes each.
+  real(wp), parameter :: most_samples = 2e7_wp
 
 contains
 
@@ -55,6 +59,7 @@ contains
     span%stop_when_captured = .false.
     call slice_motion(grid, 0_int64, moving, error)
     if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
+    if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate .or. command%dry_run) then
@@ -70,12 +75,15 @@ contains
     call describe_motion(moving, span, outcome, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
-    if (allocated(moving%pair)) call add_pair(log, schema)
-    call add_book(log%book, schema)
+    if (allocated(moving%pair)) call add_driver_events(log, schema)
+    call add_energy(moving, log, schema)
+    call add_book(log%book, outcome%reason == reason_time_over, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
-      if (.not. allocated(error) .and. len(command%csv) > 0) call write_events(command%csv, log, error)
+      if (.not. allocated(error) .and. len(command%csv) > 0) then
+        call write_events(command%csv, log, allocated(moving%pair), error)
+      end if
       if (.not. allocated(error) .and. len(command%record) > 0) then
         call write_record(command%record, session%the_case, moving, grid%start, error)
       end if
@@ -84,6 +92,17 @@ contains
     call report(session, moving, outcome, log, path)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
+
+  !> Code 65 if the samples of so many drive periods are more than fit into memory.
+  subroutine check_samples(the_case, periods, error)
+    type(case_t), intent(in) :: the_case
+    real(wp), intent(in) :: periods
+    type(error_t), allocatable, intent(out) :: error
+    if (periods*the_case%trajectory%samples_per_period <= most_samples) return
+    call fail(error, exit_bad_case, "key 'trajectory.samples_per_period': found "// &
+              to_text(the_case%trajectory%samples_per_period)//' over '//to_text(periods, 6)//' drive periods, allowed '// &
+              'at most '//to_text(nint(most_samples))//' samples in all')
+  end subroutine check_samples
 
   !> Attributes: the drive, the barriers, and the steady values over the window.
   subroutine describe_motion(moving, span, outcome, log, schema)
@@ -140,13 +159,24 @@ contains
     end if
     if (moving%machine%contact%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
-        long_name='force of the barriers on the body', &
-        data=force_on_body(moving%machine%contact, log%sample_data(2, :log%samples), log%sample_data(3, :log%samples)))
+        long_name='force of the barriers on the body', data=contact_forces(moving, log))
     end if
     call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5, 6], &
       flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
       data=real(log%sample_mode(:log%samples), wp))
   end subroutine add_history
+
+  !> Forces of soft barriers at the samples.
+  function contact_forces(moving, log) result(forces)
+    type(motion_t), intent(in) :: moving
+    type(log_t), intent(in) :: log
+    real(wp) :: forces(log%samples), place(2, log%samples)
+    place = log%sample_data(2:3, :log%samples)
+    if (allocated(moving%pair)) then
+      if (moving%pair%machine%carried) place = place - log%sample_driver(:, :log%samples)
+    end if
+    forces = force_on_body(contact_at_speed(moving%machine%contact, log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
+  end function contact_forces
 
   subroutine add_foot(moving, crank_angle, log, schema)
     type(motion_t), intent(in) :: moving
@@ -162,59 +192,81 @@ contains
                              data=foot)
   end subroutine add_foot
 
-  !> Where the energy went by the end.
-  subroutine add_book(book, schema)
+  !> Where the energy went by the end, or until the motion was given up.
+  subroutine add_book(book, complete, schema)
     type(book_t), intent(in) :: book
+    logical, intent(in) :: complete
     type(schema_t), intent(inout) :: schema
     call schema%add_attribute('', 'energy_start', book%at_start)
-    call schema%add_attribute('', 'energy_end', book%at_end)
     call schema%add_attribute('', 'energy_lost_to_friction', book%friction)
     call schema%add_attribute('', 'energy_lost_to_damping', book%damping)
     call schema%add_attribute('', 'energy_lost_to_contacts', book%contact)
     call schema%add_attribute('', 'energy_put_in', book%work)
+    if (.not. complete) return
+    call schema%add_attribute('', 'energy_end', book%at_end)
     call schema%add_attribute('', 'energy_closing_error', closing_error(book))
   end subroutine add_book
 
-  !> What only two bodies have: the driving one at the events, and where the energy went over time.
-  subroutine add_pair(log, schema)
+  !> The driving body of two at the events.
+  subroutine add_driver_events(log, schema)
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: driver(2, log%events)
-    driver = 0
-    if (log%events > 0) driver = log%event_driver(:, :log%events)
     call schema%add_variable('event_driver_x', type_float64, ['event'], units='m', &
-                             long_name='position of the driving body', data=driver(1, :))
+                             long_name='position of the driving body', data=log%event_driver(1, :log%events))
     call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
-                             long_name='velocity of the driving body', data=driver(2, :))
-    call add('energy', 5, 'energy of spring and bodies')
-    call add('friction_loss', 1, 'energy lost to dry friction since the start')
-    call add('damping_loss', 2, 'energy lost to viscous damping since the start')
-    call add('contact_loss', 3, 'energy lost to impacts since the start')
-    call add('drive_work', 4, 'work of drive and blows since the start')
+                             long_name='velocity of the driving body', data=log%event_driver(2, :log%events))
+  end subroutine add_driver_events
+
+  !> Where the energy went over time.
+  subroutine add_energy(moving, log, schema)
+    type(motion_t), intent(in) :: moving
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    real(wp) :: kinetic(log%samples)
+    kinetic = 0.5_wp*moving%machine%mass*log%sample_data(3, :log%samples)**2
+    if (allocated(moving%pair)) then
+      if (moving%pair%machine%drive /= driven_by_motion) then
+        kinetic = kinetic + 0.5_wp*moving%pair%machine%mass*log%sample_driver(2, :log%samples)**2
+      end if
+    end if
+    associate (book => log%sample_book(:, :log%samples))
+      call add('energy', book(5, :), 'energy of spring and bodies')
+      call add('kinetic_energy', kinetic, 'kinetic energy')
+      call add('potential_energy', book(5, :) - kinetic, 'energy of the spring')
+      call add('friction_loss', book(1, :), 'energy lost to dry friction since the start')
+      call add('damping_loss', book(2, :), 'energy lost to viscous damping since the start')
+      call add('contact_loss', book(3, :), 'energy put into barriers since the start; of a pressed soft one, part comes back')
+      call add('drive_work', book(4, :), 'work of drive and blows since the start')
+    end associate
 
   contains
 
-    subroutine add(name, row, long_name)
+    subroutine add(name, values, long_name)
       character(len=*), intent(in) :: name, long_name
-      integer, intent(in) :: row
-      call schema%add_variable(name, type_float64, ['time'], units='J', long_name=long_name, &
-                               data=log%sample_book(row, :log%samples))
+      real(wp), intent(in) :: values(:)
+      call schema%add_variable(name, type_float64, ['time'], units='J', long_name=long_name, data=values)
     end subroutine add
 
-  end subroutine add_pair
+  end subroutine add_energy
 
-  !> The events as a table at full precision.
-  subroutine write_events(path, log, error)
+  !> The events as a table at full precision, of two bodies with the driving one.
+  subroutine write_events(path, log, pair, error)
     character(len=*), intent(in) :: path
+    logical, intent(in) :: pair
     type(log_t), intent(in) :: log
     type(error_t), allocatable, intent(out) :: error
     type(table_t) :: table
+    character(len=:), allocatable :: driver
     integer :: i
     call table%create(path)
-    call table%line('kind,time,x,v_before,v_after')
+    driver = ''
+    if (pair) driver = ',driver_x,driver_v'
+    call table%line('kind,time,x,v_before,v_after'//driver)
     do i = 1, log%events
+      if (pair) driver = ','//to_text(log%event_driver(1, i))//','//to_text(log%event_driver(2, i))
       call table%line(trim(event_names(log%event_kind(i)))//','//to_text(log%event_data(1, i))//','// &
-                      to_text(log%event_data(2, i))//','//to_text(log%event_data(3, i))//','//to_text(log%event_data(4, i)))
+                      to_text(log%event_data(2, i))//','//to_text(log%event_data(3, i))//','// &
+                      to_text(log%event_data(4, i))//driver)
     end do
     call table%close(error)
   end subroutine write_events
@@ -227,8 +279,8 @@ contains
     character(len=*), intent(in) :: path
     associate (f => outcome%window, journal => session%journal)
       if (outcome%reason /= reason_time_over) then
-        call journal%line('end', 'given up before the end: '//reason_name(outcome%reason)//'; '//to_text(log%events)// &
-          ' events until then')
+        call journal%line('end', 'given up before the end: '//explained(outcome%reason)//'; '//to_text(log%events)// &
+          ' events recorded until then')
         call journal%line('written', 'wrote '//path)
         return
       end if
@@ -243,5 +295,13 @@ contains
       call journal%line('written', 'wrote '//path)
     end associate
   end subroutine report
+
+  !> The reason, and what counts where that is not plain.
+  pure function explained(reason) result(text)
+    integer, intent(in) :: reason
+    character(len=:), allocatable :: text
+    text = reason_name(reason)
+    if (reason == reason_event_budget) text = text//' (flights count, those between samples of a controller, too)'
+  end function explained
 
 end module trajectory_driver

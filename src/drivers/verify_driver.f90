@@ -316,7 +316,7 @@ contains
     end if
     write (output_unit, '(a)') command%path//': '//kind, &
       '  checksums of '//to_text(datasets)//' datasets agree', &
-      '  invariants hold at '//to_text(points)//' points'
+      '  invariants hold at '//to_text(points)//merge(' events', ' points', kind == 'trajectory')
     if (audit%points == 0) return
     if (audit%inferred > 0) write (output_unit, '(a)') &
       '  '//to_text(audit%inferred)//' inferred points computed: '//to_text(audit%inferred_differing)// &

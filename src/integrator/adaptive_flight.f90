@@ -9,13 +9,12 @@ module adaptive_flight
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
-  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
+  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight, record_with_book
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     flight_time_over
   use friction_law, only: sliding_friction
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_plus, options_t, record_sample, sample_due, sample_time, state_t, &
-    tally_t
+  use motion_state, only: book_t, log_t, mode_slip_plus, options_t, sample_due, sample_time, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
   use polynomial, only: degree, first_fall, maximum_until, value_at
   use restoring_law, only: restoring_force
@@ -41,8 +40,8 @@ module adaptive_flight
 contains
 
   !> Flies from `state` (mode slip_plus or slip_minus) up to `time_end` [s after the section], `barrier` [m]
-  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, or at
-  !> the time. The state returned is that just before the event.
+  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, at
+  !> the time, or before it outside of the domain. The state returned is that just before the event.
   pure subroutine fly_adaptive(machine, options, state, time_end, exit_speed, barrier, tally, outcome, log)
     type(oscillator_t), intent(in) :: machine
     type(options_t), intent(in) :: options
@@ -66,6 +65,8 @@ contains
       last = h >= remaining
       h = min(h, remaining)
       outcome = flight_failed
+      tally%steps = tally%steps + 1
+      if (tally%steps > options%step_budget) exit
       if (.not. h > 2*spacing(state%time + tiny(h))) exit
       call try_step(machine, slip, options%tolerance, state%time, y, h, slopes, next, error)
       if (.not. error <= 1) then
@@ -81,6 +82,9 @@ contains
         y = next
         slopes(:, 1) = slopes(:, 13)
         h = h*min(5.0_wp, 0.9_wp/eighth_root(max(error, 1e-10_wp)))
+        outcome = flight_time_over
+        ! An unstable spring drives a body to infinity within a finite time.
+        if (abs(y(1)) > options%domain) exit
         cycle
       end if
       call land(machine, slip, options%tolerance, outcome, state%time, y, h, fraction, slopes, next)
@@ -291,26 +295,44 @@ contains
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
-    real(wp) :: t
-    integer :: k
+    real(wp) :: t, done
     if (tally%wants_v_max .and. slip%direction > 0) then
       tally%v_max = max(tally%v_max, y(2), maximum_until(path(:, 2), fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, merge(gauss_points, 0, log%book%kept)
-      t = fraction*gauss_place(k)
-      call book_instant(machine, slip%memory, state%time + t*h, value_at(path(:, 1), t), value_at(path(:, 2), t), &
-                        fraction*h*gauss_weight(k), log%book)
-    end do
-    if (log%sample_interval <= 0) return
-    do
-      sample = state
-      sample%time = sample_time(log)
-      if (.not. sample_due(log, state%time + fraction*h)) exit
-      sample%x = value_at(path(:, 1), (sample%time - state%time)/h)
-      sample%v = value_at(path(:, 2), (sample%time - state%time)/h)
-      call record_sample(log, sample)
-    end do
+    done = 0
+    if (log%sample_interval > 0) then
+      do
+        sample = state
+        sample%time = sample_time(log)
+        if (.not. sample_due(log, state%time + fraction*h)) exit
+        t = (sample%time - state%time)/h
+        sample%x = value_at(path(:, 1), t)
+        sample%v = value_at(path(:, 2), t)
+        if (t > done) then
+          call book_piece(machine, slip%memory, state%time, path, h, done, t, log%book)
+          done = t
+        end if
+        call record_with_book(machine, sample, log)
+      end do
+    end if
+    call book_piece(machine, slip%memory, state%time, path, h, done, fraction, log%book)
   end subroutine look_along
+
+  !> Where the energy went between two fractions of a step from `time`.
+  pure subroutine book_piece(machine, memory, time, path, h, from, until, book)
+    type(oscillator_t), intent(in) :: machine
+    type(slip_memory_t), intent(in) :: memory
+    real(wp), intent(in) :: time, path(0:degree, 2), h, from, until
+    type(book_t), intent(inout) :: book
+    real(wp) :: t
+    integer :: k
+    if (.not. book%kept) return
+    do k = 1, gauss_points
+      t = from + (until - from)*gauss_place(k)
+      call book_instant(machine, memory, time + t*h, value_at(path(:, 1), t), value_at(path(:, 2), t), &
+                        (until - from)*h*gauss_weight(k), book)
+    end do
+  end subroutine book_piece
 
 end module adaptive_flight

@@ -49,6 +49,10 @@ contains
           longer = 2*rate/(sqrt(discriminant) - curvature/2)
         end if
         step = max(step, longer)
+      else if (third_bound <= 0 .and. curvature > 0) then
+        ! A parabola that rises from zero.
+        step = huge(1.0_wp)
+        return
       end if
     end if
     step = 0.99_wp*step

@@ -5,24 +5,24 @@
 !> stiffness: until the velocity falls to zero, the body leaves the barrier, or the time is over. Where the force
 !> formula would pull and may not, the force is nil; the surface counts as recovered as soon as it would push again.
 module contact_flight
-  use contact_law, only: contact_force, contact_margin, contact_t
+  use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
-  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
+  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight, record_with_book
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: power, sliding_friction
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
     take_step
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, record_sample, sample_due, &
+  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, sample_due, &
     sample_time, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
-  use polynomial, only: maximum_until, value_at
+  use polynomial, only: degree, maximum_until, value_at
   use restoring_law, only: restoring_force
   implicit none
   private
 
-  public :: contact_side, fly_contact
+  public :: contact_side, fly_contact, raise_peak_force
 
   !> Guards: velocity zero, end of contact, change between pushing and not.
   integer, parameter :: turning = 1, leaving = 2, cut = 3
@@ -72,13 +72,14 @@ contains
     real(wp) :: y(3), scale(3), duration, time, until
     integer :: fallen
     pressed%machine = machine
+    pressed%machine%contact = contact_at_speed(machine%contact, state%touch_speed)
     pressed%side = side
     pressed%start = state%time
     pressed%surface = merge(machine%contact%soft_upper, machine%contact%soft_lower, side > 0)
     pressed%direction = merge(1, -1, state%mode == mode_slip_plus)
     pressed%memory = slip_memory_t(real(pressed%direction, wp), state%x, state%z)
     y = [side*(state%x - pressed%surface), side*state%v, 0.0_wp]
-    pressed%pushing = machine%contact%tension .or. margin_at(machine%contact, y) >= 0
+    pressed%pushing = pressed%machine%contact%tension .or. margin_at(pressed%machine%contact, y) >= 0
     call sizes_of(pressed, y, scale, duration)
     guards = guards_of(pressed)
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
@@ -86,7 +87,9 @@ contains
       until = next_sample(machine%drive, pressed%start + march%time, time_end)
       call take_step(march, pressed, guards, until - pressed%start, fallen)
       if (fallen == march_time_over .and. until < time_end) fallen = march_goes_on
-      call look_along(march, pressed, tally, log)
+      tally%steps = tally%steps + 1
+      if (tally%steps > options%step_budget) fallen = march_failed
+      call look_along(march, pressed, state%touch_speed, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing
         guards = guards_of(pressed)
@@ -97,10 +100,6 @@ contains
         exit
       end if
     end do
-    if (present(log)) then
-      log%contact_work = log%contact_work + march%y(3)
-      log%book%contact = log%book%contact + march%y(3)
-    end if
     state%time = merge(time_end, min(pressed%start + march%time, time_end), fallen == march_time_over)
     state%x = pressed%surface + side*march%y(1)
     state%v = side*march%y(2)
@@ -187,51 +186,72 @@ contains
   end subroutine sizes_of
 
   !> Samples and extremes of the step behind.
-  pure subroutine look_along(march, pressed, tally, log)
+  pure subroutine look_along(march, pressed, touch_speed, tally, log)
     type(march_t), intent(in) :: march
     type(pressed_t), intent(in) :: pressed
+    real(wp), intent(in) :: touch_speed
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
-    real(wp) :: t
-    integer :: k
+    real(wp) :: t, done
     if (.not. march%fraction > 0) return
     if (tally%wants_v_max .and. pressed%direction > 0) then
       tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
-    do k = 1, merge(gauss_points, 0, log%book%kept)
-      t = march%fraction*gauss_place(k)
-      call book_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
-                        pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
-                        pressed%side*value_at(march%path(:, 2), t), march%fraction*march%length*gauss_weight(k), log%book)
-    end do
     log%peak_penetration = max(log%peak_penetration, march%y(1))
-    if (pressed%pushing) call raise_peak_force(march, pressed%machine%contact, log%peak_force)
-    if (log%sample_interval <= 0) return
+    if (pressed%pushing) call raise_peak_force(march%path(:, 1), march%path(:, 2), march%fraction, pressed%machine%contact, &
+                                               log%peak_force)
+    done = 0
     sample%mode = merge(mode_slip_plus, mode_slip_minus, pressed%direction > 0)
-    do
+    sample%touch_speed = touch_speed
+    do while (log%sample_interval > 0)
       sample%time = sample_time(log)
       t = max(0.0_wp, (sample%time - pressed%start - march%from)/march%length)
       if (t >= march%fraction .or. .not. sample_due(log, pressed%start + march%time)) exit
       sample%x = pressed%surface + pressed%side*value_at(march%path(:, 1), t)
       sample%v = pressed%side*value_at(march%path(:, 2), t)
-      call record_sample(log, sample)
+      call book_piece(pressed, march, done, t, log)
+      done = t
+      call record_with_book(pressed%machine, sample, log)
     end do
+    call book_piece(pressed, march, done, march%fraction, log)
   end subroutine look_along
 
-  !> Raises `peak` to the largest force within the step behind: a golden section around the largest of a few.
-  pure subroutine raise_peak_force(march, contact, peak)
+  !> Where the energy went between two fractions of the step behind. The barrier's part is that until the second one.
+  pure subroutine book_piece(pressed, march, from, until, log)
+    type(pressed_t), intent(in) :: pressed
     type(march_t), intent(in) :: march
+    real(wp), intent(in) :: from, until
+    type(log_t), intent(inout) :: log
+    real(wp) :: t, work
+    integer :: k
+    if (.not. log%book%kept) return
+    do k = 1, gauss_points
+      t = from + (until - from)*gauss_place(k)
+      call book_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
+                        pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
+                        pressed%side*value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), log%book)
+    end do
+    work = value_at(march%path(:, 3), until) - value_at(march%path(:, 3), from)
+    if (until >= march%fraction) work = march%y(3) - value_at(march%path(:, 3), from)
+    log%book%contact = log%book%contact + work
+    log%contact_work = log%contact_work + work
+  end subroutine book_piece
+
+  !> Raises `peak` to the largest force up to a `fraction` of a step, over which penetration and rate are polynomials: a
+  !> golden section around the largest of a few.
+  pure subroutine raise_peak_force(p, rate, fraction, contact, peak)
+    real(wp), intent(in) :: p(0:degree), rate(0:degree), fraction
     type(contact_t), intent(in) :: contact
     real(wp), intent(inout) :: peak
     integer, parameter :: parts = 8
     real(wp) :: force(0:parts), low, high, a, b
     integer :: i
-    force = [(force_at(i*march%fraction/parts), i=0, parts)]
+    force = [(force_at(i*fraction/parts), i=0, parts)]
     i = maxloc(force, dim=1) - 1
-    low = max(i - 1, 0)*march%fraction/parts
-    high = min(i + 1, parts)*march%fraction/parts
+    low = max(i - 1, 0)*fraction/parts
+    high = min(i + 1, parts)*fraction/parts
     if (2*maxval(force) < peak) return
     do i = 1, most_sections
       a = high - golden*(high - low)
@@ -248,7 +268,7 @@ contains
 
     pure real(wp) function force_at(t)
       real(wp), intent(in) :: t
-      force_at = contact_force(contact, value_at(march%path(:, 1), t), value_at(march%path(:, 2), t))
+      force_at = contact_force(contact, value_at(p, t), value_at(rate, t))
     end function force_at
 
   end subroutine raise_peak_force

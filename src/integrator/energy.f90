@@ -12,13 +12,13 @@ module energy
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: stribeck_excess
   use kinds, only: wp
-  use motion_state, only: book_t, state_t
+  use motion_state, only: book_t, log_t, put_sample_book, record_sample, state_t
   use oscillator, only: oscillator_t
   use restoring_law, only: restoring_energy, restoring_force
   implicit none
   private
 
-  public :: energy_of_body, book_instant, book_exact, book_rest
+  public :: energy_of_body, book_instant, book_exact, book_rest, record_with_book
 
   !> Gauss's rule with 8 points on [0, 1] (Abramowitz, Stegun, 25.4.30).
   integer, parameter, public :: gauss_points = 8
@@ -73,32 +73,75 @@ contains
     end if
   end subroutine book_instant
 
-  !> An exact flight from `start` to `time_end` [s after the section], slipping in `direction`.
-  pure subroutine book_exact(machine, flow, start, direction, time_end, book)
+  !> Writes a sample down with the energy then; the book of the log is that until the sample.
+  pure subroutine record_with_book(machine, sample, log)
+    type(oscillator_t), intent(in) :: machine
+    type(state_t), intent(in) :: sample
+    type(log_t), intent(inout) :: log
+    if (log%book%kept) then
+      log%book%at_end = energy_of_body(machine, sample)
+      call record_sample(log, sample, book=log%book)
+    else
+      call record_sample(log, sample)
+    end if
+  end subroutine record_with_book
+
+  !> An exact flight from `start` to `time_end` [s after the section], slipping in `direction`, and the books of the
+  !> samples from number `first` on, which it has written down.
+  pure subroutine book_exact(machine, flow, start, direction, time_end, first, log)
     type(oscillator_t), intent(in) :: machine
     type(flow_t), intent(in) :: flow
     type(state_t), intent(in) :: start
-    integer, intent(in) :: direction
+    integer, intent(in) :: direction, first
     real(wp), intent(in) :: time_end
-    type(book_t), intent(inout) :: book
+    type(log_t), intent(inout) :: log
     type(segment_t) :: segment
-    type(kinematics_t) :: now
     type(slip_memory_t) :: slip
-    real(wp) :: piece, elapsed
-    integer :: pieces, i, k
-    if (.not. book%kept) return
+    type(state_t) :: sample
+    real(wp) :: done
+    integer :: i
+    if (.not. log%book%kept) return
     slip = slip_memory_t(direction=direction, x=start%x)
     call begin_segment(flow, start%time, start%x, start%v, direction, segment)
-    pieces = ceiling((time_end - start%time)*max(flow%natural, flow%harmonics*flow%drive_frequency)/longest_piece)
-    piece = (time_end - start%time)/max(1, pieces)
+    done = 0
+    do i = first, log%samples
+      sample = start
+      sample%time = log%sample_data(1, i) - log%origin
+      sample%x = log%sample_data(2, i)
+      sample%v = log%sample_data(3, i)
+      if (sample%time > start%time + done) then
+        call book_piece(machine, flow, segment, slip, start%time, done, sample%time - start%time, log%book)
+        done = sample%time - start%time
+      end if
+      log%book%at_end = energy_of_body(machine, sample)
+      call put_sample_book(log, i, log%book)
+    end do
+    if (time_end > start%time + done) then
+      call book_piece(machine, flow, segment, slip, start%time, done, time_end - start%time, log%book)
+    end if
+  end subroutine book_exact
+
+  !> Part of an exact flight, between two times since its start.
+  pure subroutine book_piece(machine, flow, segment, slip, start, from, until, book)
+    type(oscillator_t), intent(in) :: machine
+    type(flow_t), intent(in) :: flow
+    type(segment_t), intent(in) :: segment
+    type(slip_memory_t), intent(in) :: slip
+    real(wp), intent(in) :: start, from, until
+    type(book_t), intent(inout) :: book
+    type(kinematics_t) :: now
+    real(wp) :: piece, elapsed
+    integer :: pieces, i, k
+    pieces = max(1, ceiling((until - from)*max(flow%natural, flow%harmonics*flow%drive_frequency)/longest_piece))
+    piece = (until - from)/pieces
     do i = 1, pieces
       do k = 1, gauss_points
-        elapsed = (i - 1 + gauss_place(k))*piece
+        elapsed = from + (i - 1 + gauss_place(k))*piece
         call evaluate(flow, segment, elapsed, now)
-        call book_instant(machine, slip, start%time + elapsed, now%x, now%v, gauss_weight(k)*piece, book)
+        call book_instant(machine, slip, start + elapsed, now%x, now%v, gauss_weight(k)*piece, book)
       end do
     end do
-  end subroutine book_exact
+  end subroutine book_piece
 
   !> A body at rest from `before` to `now`: what the drive does to the spring.
   pure subroutine book_rest(machine, before, now, book)

@@ -21,6 +21,8 @@ module exact_flow
 
   !> Largest damping ratio for which dividing by the damped frequency is harmless.
   real(wp), parameter :: largest_damping_ratio = 0.9_wp
+  !> Above it [rad/s] the fourth power of a frequency, which the bounds of a motion take, is not finite.
+  real(wp), parameter :: fastest = sqrt(sqrt(huge(1.0_wp)))
 
   !> Coefficients that depend on the machine and the drive frequency only.
   type, public :: flow_t
@@ -65,7 +67,8 @@ contains
     flow%natural = machine%natural_frequency
     flow%decay = machine%friction%damping/(2*machine%mass)
     flow%available = machine%restoring%is_linear .and. .not. machine%effects%nonlinear .and. .not. machine%drive%interval > 0 &
-      .and. flow%natural > 0 .and. flow%decay <= largest_damping_ratio*flow%natural
+      .and. flow%natural > 0 .and. flow%decay <= largest_damping_ratio*flow%natural &
+      .and. max(flow%natural, size(machine%drive%cosine)*machine%drive_frequency) < fastest
     if (.not. flow%available) return
     flow%damped = sqrt((flow%natural - flow%decay)*(flow%natural + flow%decay))
     flow%drive_frequency = machine%drive_frequency

@@ -2,12 +2,13 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A few ordinary differential equations, integrated step by step by the embedded Runge-Kutta pair of
-!> `dormand_prince_table` until a guard, a linear function of the state, falls to zero. Guards are isolated on the
-!> continuous extension of a step, which the caller may look at, then the step is taken again to the fall itself.
+!> `dormand_prince_table` until a guard falls to zero: a linear function of the state, or a margin of the system's own,
+!> interpolated over the step. Guards are isolated on the continuous extension of a step, which the caller may look at,
+!> then the step is taken again to the fall itself.
 module guarded_march
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use kinds, only: wp
-  use polynomial, only: degree, first_fall
+  use polynomial, only: degree, first_fall, interpolate, value_at
   implicit none
   private
 
@@ -25,6 +26,12 @@ module guarded_march
     procedure(slope_function), deferred :: slope
   end type system_t
 
+  !> With guards of its own that are not linear.
+  type, abstract, extends(system_t), public :: watched_system_t
+  contains
+    procedure(margin_function), deferred :: margin
+  end type watched_system_t
+
   abstract interface
     !> Time derivative of `y` [SI].
     pure function slope_function(self, time, y) result(slope)
@@ -33,12 +40,22 @@ module guarded_march
       real(wp), intent(in) :: time, y(:)
       real(wp) :: slope(size(y))
     end function slope_function
+
+    !> Margin `number` of a system: positive as long as the march may go on.
+    pure real(wp) function margin_function(self, number, time, y)
+      import :: watched_system_t, wp
+      class(watched_system_t), intent(in) :: self
+      integer, intent(in) :: number
+      real(wp), intent(in) :: time, y(:)
+    end function margin_function
   end interface
 
   !> constant + sum of coefficients times the state. Positive, or leaving zero upwards, at the start.
   type, public :: guard_t
     real(wp) :: constant = 0
     real(wp) :: coefficients(most_equations) = 0
+    !> Number of a margin of the system that is the guard instead; 0 = none.
+    integer :: margin = 0
   end type guard_t
 
   type, public :: march_t
@@ -49,6 +66,8 @@ module guarded_march
     !> The step behind: its start, length, the fraction of the length that was gone, and the state over the fraction of
     !> the length, by rising powers.
     real(wp) :: from = 0, length = 0, fraction = 0, path(0:degree, most_equations) = 0
+    !> The guard that fell, along that step.
+    real(wp) :: fall(0:degree) = 0
     real(wp) :: tolerance = 0
     !> Size of each unknown below which errors are absolute.
     real(wp) :: scale(most_equations) = 1
@@ -109,7 +128,7 @@ contains
     end do
     call extend(march, system, h, next)
     march%length = h
-    call find_fall(march, guards, fallen)
+    call find_fall(march, system, guards, fallen)
     if (fallen == march_goes_on) then
       march%time = merge(time_end, march%from + h, last)
       march%slopes(:, 1) = march%slopes(:, 13)
@@ -193,8 +212,9 @@ contains
   end subroutine extend
 
   !> The first guard that falls within the step; of several at one instant the first in the list.
-  pure subroutine find_fall(march, guards, fallen)
+  pure subroutine find_fall(march, system, guards, fallen)
     type(march_t), intent(inout) :: march
+    class(system_t), intent(in) :: system
     type(guard_t), intent(in) :: guards(:)
     integer, intent(out) :: fallen
     real(wp) :: p(0:degree), t, first
@@ -202,16 +222,47 @@ contains
     fallen = march_goes_on
     first = 1
     do i = 1, size(guards)
-      p = matmul(march%path(:, :march%n), guards(i)%coefficients(:march%n))
-      p(0) = p(0) + guards(i)%constant
+      if (guards(i)%margin > 0) then
+        p = margin_along(march, system, guards(i))
+      else
+        p = matmul(march%path(:, :march%n), guards(i)%coefficients(:march%n))
+        p(0) = p(0) + guards(i)%constant
+      end if
       t = first_fall(p)
       if (t < first .or. (fallen == march_goes_on .and. t <= first)) then
         first = t
         fallen = i
+        march%fall = p
       end if
     end do
     march%fraction = first
   end subroutine find_fall
+
+  !> A margin of the system over the step behind.
+  pure function margin_along(march, system, guard) result(p)
+    type(march_t), intent(in) :: march
+    class(system_t), intent(in) :: system
+    type(guard_t), intent(in) :: guard
+    real(wp) :: p(0:degree), place(0:degree), value(0:degree), y(march%n)
+    integer :: i, k
+    do i = 0, degree
+      place(i) = i/real(degree, wp)
+      y = [(value_at(march%path(:, k), place(i)), k=1, march%n)]
+      value(i) = margin_of(system, guard, march%from + place(i)*march%length, y)
+    end do
+    p = interpolate(place, value)
+  end function margin_along
+
+  pure real(wp) function margin_of(system, guard, time, y)
+    class(system_t), intent(in) :: system
+    type(guard_t), intent(in) :: guard
+    real(wp), intent(in) :: time, y(:)
+    margin_of = guard%constant
+    select type (system)
+    class is (watched_system_t)
+      margin_of = margin_of + system%margin(guard%margin, time, y)
+    end select
+  end function margin_of
 
   !> Takes the step again up to the fall of a guard, corrected by Newton.
   pure subroutine land(march, system, guard, next)
@@ -220,12 +271,17 @@ contains
     type(guard_t), intent(in) :: guard
     real(wp), intent(out) :: next(march%n)
     real(wp) :: error, miss, rate, correction
-    integer :: i, n
+    integer :: i, k, n
     n = march%n
     do i = 1, most_polish
       call try_step(march, system, march%fraction*march%length, next, error)
-      miss = -guard%constant - sum(guard%coefficients(:n)*next)
-      rate = sum(guard%coefficients(:n)*march%slopes(:n, 13))
+      if (guard%margin > 0) then
+        miss = -margin_of(system, guard, march%from + march%fraction*march%length, next)
+        rate = value_at([(k*march%fall(k), k=1, degree), 0.0_wp], march%fraction)/march%length
+      else
+        miss = -guard%constant - sum(guard%coefficients(:n)*next)
+        rate = sum(guard%coefficients(:n)*march%slopes(:n, 13))
+      end if
       correction = 0
       if (abs(miss) < 0.01_wp*abs(rate)*march%length) correction = miss/(rate*march%length)
       if (march%fraction + correction <= 0 .or. march%fraction + correction > 1) exit

@@ -16,13 +16,15 @@ module layer_transit
   implicit none
   private
 
-  public :: prepare_transit, cross_layer
+  public :: prepare_transit, cross_layer, gauss
 
-  integer, parameter :: points = 14, pieces = 3, order = 10, most_rounds = 30
+  integer, parameter :: points = 16, pieces = 3, order = 16, most_rounds = 30
   !> Ends of the pieces in units of v_s, for delta = 1 and 2; the last end is the edge of the layer.
   real(wp), parameter :: inner_ends(2, 2) = reshape([2.0_wp, 6.0_wp, 1.0_wp, 2.5_wp], [2, 2])
   !> Gauss points are too few for more than double precision: the reference library goes without.
   logical, parameter :: precise_enough = epsilon(1.0_wp) > 1e-17_wp
+  !> A crossing is expected to last no longer than this multiple of its duration at the acceleration at its start.
+  real(wp), parameter :: longest = 2
   !> The acceleration may not fall below this share of that at the start.
   real(wp), parameter :: smallest_share = 0.25_wp
 
@@ -36,8 +38,8 @@ module layer_transit
     real(wp) :: speed(points, pieces, 2) = 0, excess(points, pieces, 2) = 0
     !> On [-1, 1]: weights, and integrals from -1 to each point.
     real(wp) :: weight(points) = 0, integral(points, points) = 0
-    !> Sum over harmonics of the size of the (order + 1)th derivative of the forcing.
-    real(wp) :: remainder = 0
+    !> Sum over harmonics of the size of the (n + 1)th derivative of the forcing, over (n + 1)!.
+    real(wp) :: remainder(order) = 0
   end type transit_t
 
 contains
@@ -48,8 +50,8 @@ contains
     type(flow_t), intent(in) :: flow
     real(wp), intent(in) :: exit
     type(transit_t), intent(out) :: transit
-    real(wp) :: node(points)
-    integer :: which, k, n, delta
+    real(wp) :: node(points), w, size_of_next
+    integer :: which, k, n, i, delta
     associate (law => machine%friction)
       delta = nint(law%stribeck_exponent)
       transit%available = precise_enough .and. flow%available .and. law%layer_speed > 0 &
@@ -71,8 +73,12 @@ contains
       end do
     end associate
     do n = 1, flow%harmonics
-      transit%remainder = transit%remainder + sqrt(flow%f_cos(n)**2 + flow%f_sin(n)**2) &
-                          *(n*flow%drive_frequency)**(order + 1)
+      w = n*flow%drive_frequency
+      size_of_next = sqrt(flow%f_cos(n)**2 + flow%f_sin(n)**2)*w
+      do i = 1, order
+        size_of_next = size_of_next*w/(i + 1)
+        transit%remainder(i) = transit%remainder(i) + size_of_next
+      end do
     end do
   end subroutine prepare_transit
 
@@ -86,8 +92,8 @@ contains
     real(wp), intent(in) :: time_end
     real(wp), intent(inout) :: time, x
     logical, intent(out) :: ok
-    real(wp) :: taylor(0:order), elapsed, y, start_rate, factorial
-    integer :: k, i, which
+    real(wp) :: taylor(0:order), elapsed, y, start_rate
+    integer :: k, i, which, degree
     call expand_forcing(flow, time, taylor)
     which = merge(1, 2, inward)
     elapsed = 0
@@ -95,37 +101,47 @@ contains
     start_rate = direction*(taylor(0) - flow%natural**2*y)
     ok = (start_rate < 0) .eqv. inward
     if (.not. ok) return
+    degree = min(order, enough_terms(transit, abs(start_rate), longest*transit%ends(pieces, which)/abs(start_rate)))
     do i = 1, pieces
       k = merge(pieces + 1 - i, i, inward)
-      call cross_piece(transit, flow, taylor, real(direction, wp), which, k, inward, start_rate, elapsed, y, ok)
+      call cross_piece(transit, flow, taylor(:degree), real(direction, wp), which, k, inward, start_rate, elapsed, y, ok)
       if (.not. ok) return
     end do
-    factorial = 1
-    do i = 2, order + 1
-      factorial = factorial*i
-    end do
-    ok = time + elapsed <= time_end .and. transit%remainder*elapsed**(order + 1) &
-         <= epsilon(1.0_wp)*factorial*abs(start_rate)
+    ok = time + elapsed <= time_end .and. enough_terms(transit, abs(start_rate), elapsed) <= degree
     if (.not. ok) return
     time = time + elapsed
     x = y + flow%equilibrium(direction)
   end subroutine cross_layer
 
+  !> Degree up to which the forcing must be expanded for its error over `elapsed` [s] to be rounding beside `rate` [m/s^2];
+  !> `order` + 1 if that is not enough.
+  pure integer function enough_terms(transit, rate, elapsed) result(degree)
+    type(transit_t), intent(in) :: transit
+    real(wp), intent(in) :: rate, elapsed
+    real(wp) :: power
+    power = elapsed
+    do degree = 1, order
+      power = power*elapsed
+      if (transit%remainder(degree)*power <= epsilon(1.0_wp)*rate) return
+    end do
+  end function enough_terms
+
   !> One piece: fixed-point iteration for time and place at the Gauss points.
   pure subroutine cross_piece(transit, flow, taylor, direction, which, k, inward, start_rate, elapsed, y, ok)
     type(transit_t), intent(in) :: transit
     type(flow_t), intent(in) :: flow
-    real(wp), intent(in) :: taylor(0:order), direction, start_rate
+    real(wp), intent(in) :: taylor(0:), direction, start_rate
     integer, intent(in) :: which, k
     logical, intent(in) :: inward
     real(wp), intent(inout) :: elapsed, y
     logical, intent(out) :: ok
-    real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half
+    real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half, change, last_change
     integer :: round, i
     half = 0.5_wp*(transit%ends(k, which) - transit%ends(k - 1, which))
     time = elapsed
     place = y
     ok = .false.
+    change = 0
     do round = 1, most_rounds
       rate = direction*(polynomial(taylor, time) - flow%natural**2*place) &
              - 2*flow%decay*transit%speed(:, k, which) - transit%excess(:, k, which)
@@ -150,7 +166,10 @@ contains
           place = place + transit%integral(:, i)*run(i)
         end do
       end if
-      if (maxval(abs(time - before)) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
+      last_change = change
+      change = maxval(abs(time - before))
+      ! What the next round would change.
+      if (change*min(1.0_wp, change/max(last_change, tiny(change))) <= 4*epsilon(1.0_wp)*(elapsed + half/minval(rate))) then
         elapsed = elapsed + dot_product(transit%weight, inverse)
         y = y + dot_product(transit%weight, run)
         ok = .true.
@@ -188,52 +207,55 @@ contains
 
   !> Values at `t` of a polynomial, coefficients by rising power.
   pure function polynomial(coefficients, t) result(total)
-    real(wp), intent(in) :: coefficients(0:order), t(points)
+    real(wp), intent(in) :: coefficients(0:), t(points)
     real(wp) :: total(points)
     integer :: i
-    total = coefficients(order)
-    do i = order - 1, 0, -1
+    total = coefficients(ubound(coefficients, 1))
+    do i = ubound(coefficients, 1) - 1, 0, -1
       total = total*t + coefficients(i)
     end do
   end function polynomial
 
-  !> Gauss-Legendre points on [-1, 1], weights, and the integrals of the Lagrange polynomials from -1 to each point.
+  !> Gauss-Legendre points on [-1, 1], as many as `node` has room for, weights, and the integrals of the Lagrange polynomials
+  !> from -1 to each point (first index).
   pure subroutine gauss(node, weight, integral)
-    real(wp), intent(out) :: node(points), weight(points), integral(points, points)
-    real(wp) :: p(-1:points), table(-1:points, points), slope, sine, cosine
-    integer :: j, k, m, i
-    do j = 1, points
-      call sine_cosine(pi*(j - 0.25_wp)/(points + 0.5_wp), sine, cosine)
+    real(wp), intent(out) :: node(:), weight(:), integral(:, :)
+    real(wp) :: p(-1:size(node)), table(-1:size(node), size(node)), slope, sine, cosine
+    integer :: j, k, m, i, n
+    n = size(node)
+    do j = 1, n
+      call sine_cosine(pi*(j - 0.25_wp)/(n + 0.5_wp), sine, cosine)
       node(j) = -cosine
       do i = 1, 20
-        p = legendre(node(j))
-        slope = points*(node(j)*p(points) - p(points - 1))/(node(j)**2 - 1)
-        node(j) = node(j) - p(points)/slope
+        p = legendre(n, node(j))
+        slope = n*(node(j)*p(n) - p(n - 1))/(node(j)**2 - 1)
+        node(j) = node(j) - p(n)/slope
       end do
-      p = legendre(node(j))
+      p = legendre(n, node(j))
       table(:, j) = p
-      slope = points*(node(j)*p(points) - p(points - 1))/(node(j)**2 - 1)
+      slope = n*(node(j)*p(n) - p(n - 1))/(node(j)**2 - 1)
       weight(j) = 2/((1 - node(j)**2)*slope**2)
     end do
-    do j = 1, points
-      do k = 1, points
+    do j = 1, n
+      do k = 1, n
         integral(j, k) = (node(j) + 1)*weight(k)/2
-        do m = 1, points - 1
+        do m = 1, n - 1
           integral(j, k) = integral(j, k) + weight(k)/2*table(m, k)*(table(m + 1, j) - table(m - 1, j))
         end do
       end do
     end do
   end subroutine gauss
 
-  !> Legendre polynomials of degree 0 to `points`; index -1 is unused.
-  pure function legendre(t) result(p)
+  !> Legendre polynomials of degree 0 to `n`; index -1 is unused.
+  pure function legendre(n, t) result(p)
+    integer, intent(in) :: n
     real(wp), intent(in) :: t
-    real(wp) :: p(-1:points)
+    real(wp) :: p(-1:n)
     integer :: m
     p(-1) = 0
     p(0) = 1
     p(1) = t
-    do m = 1, points - 1
+    do m = 1, n - 1
       p(m + 1) = ((2*m + 1)*t*p(m) - m*p(m - 1))/(m + 1)
     end do
   end function legendre

@@ -10,7 +10,7 @@ module linear_flow
   implicit none
   private
 
-  public :: prepare_linear, expand, state_at, series_of, series_value, first_zero, product_integral
+  public :: prepare_linear, expand, state_at, series_of, series_value, first_zero, product_integral, drop_rounding
 
   integer, parameter, public :: most_unknowns = 10
   !> 1/21! is below the rounding of doubles by far; quadruple precision takes more terms.
@@ -18,6 +18,9 @@ module linear_flow
 
   integer, parameter :: most_polish = 60
   integer, parameter :: squarings = 4
+  !> Rounding of a sum, as a share of the sum of the absolute values; how many terms of a series are looked at.
+  real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+  integer, parameter :: last_of_rounding = 3
 
   type, public :: linear_t
     real(wp) :: matrix(most_unknowns, most_unknowns) = 0
@@ -114,9 +117,25 @@ contains
     if (present(curvature)) curvature = 2*half_second
   end subroutine series_value
 
+  !> Drops the leading terms of the series of `row` from the state `y` that are no more than the rounding of what they
+  !> are sums of, so that the first that is more tells which way a function goes on from zero.
+  pure subroutine drop_rounding(linear, row, y, length, p)
+    type(linear_t), intent(in) :: linear
+    real(wp), intent(in) :: row(most_unknowns), y(most_unknowns), length
+    real(wp), intent(inout) :: p(0:order)
+    real(wp) :: term(most_unknowns)
+    integer :: k
+    term = abs(y)
+    do k = 0, last_of_rounding
+      if (k > 0) term = matmul(abs(linear%matrix), term)*(length/k)
+      if (abs(p(k)) > rounding*sum(abs(row)*term)) return
+      p(k) = 0
+    end do
+  end subroutine drop_rounding
+
   !> First fraction in (0, 1] at which a series that is positive at 0, or leaves zero upwards there, has fallen to zero;
-  !> 2 if it stays positive, 0 if it falls at once. Nothing can hide: the steps are certified by bounds on the second
-  !> and third derivative over the stretch.
+  !> 2 if it stays positive or is zero throughout, 0 if it falls at once. Nothing can hide: the steps are certified by
+  !> bounds on the second and third derivative over the stretch, and from zero also by the first term of the series.
   pure real(wp) function first_zero(p) result(t)
     real(wp), intent(in) :: p(0:order)
     real(wp) :: value, rate, curvature, second_bound, third_bound, step, limit
@@ -128,13 +147,15 @@ contains
       second_bound = second_bound + k*(k - 1)*abs(p(k))
       third_bound = third_bound + k*(k - 1)*(k - 2)*abs(p(k))
     end do
+    t = 2
+    if (.not. any(abs(p) > 0)) return
     t = 0
     call series_value(p, t, value, rate, curvature)
     if (value > 0) then
       step = positive_step(value, rate, second_bound)
     else
-      step = departure_step(rate, curvature, second_bound, third_bound)
-      if (value < 0 .or. .not. (rate > 0 .or. curvature > 0 .or. second_bound <= 0)) step = 0
+      step = leading_step(p)
+      if (step > 0) step = max(step, departure_step(rate, curvature, second_bound, third_bound))
     end if
     do
       if (step <= smallest) return
@@ -153,6 +174,20 @@ contains
     end do
     t = 2
   end function first_zero
+
+  !> A fraction up to which a series that is zero at 0 stays positive, as one of its terms before the first negative one
+  !> outweighs all negative ones; 0 if there is none.
+  pure real(wp) function leading_step(p) result(step)
+    real(wp), intent(in) :: p(0:order)
+    real(wp) :: against
+    integer :: k
+    step = 0
+    against = sum(max(-p, 0.0_wp))
+    do k = 0, order
+      if (p(k) < 0) return
+      if (p(k) > 0) step = max(step, min(1.0_wp, 0.99_wp*p(k)/max(against, tiny(against))))
+    end do
+  end function leading_step
 
   !> The one root between `t`, where the series is positive, and `last`.
   pure subroutine polish(p, t, last)

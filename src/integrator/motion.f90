@@ -9,7 +9,7 @@ module motion
   use contact_flight, only: contact_side, fly_contact
   use contact_law, only: velocity_after_impact
   use effect_law, only: dahl_level
-  use energy, only: book_exact, book_rest
+  use energy, only: book_exact, book_rest, record_with_book
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
@@ -20,13 +20,13 @@ module motion
     event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_separation, event_stick, &
     event_touch_lower, event_touch_upper, event_turning_point, flight_adaptive, flight_exact, log_t, &
     mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
-    record_sample, sample_due, sample_time, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+    sample_due, sample_time, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
   use pair_modes, only: pair_motion_t
   use rest, only: chatter_time, hold, mode_from_rest
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
-    reason_step_failed
+    reason_step_budget, reason_step_failed
   implicit none
   private
 
@@ -81,7 +81,7 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, crank_angle
     type(state_t) :: state
-    state = state_t(x=x, v=v, mode=mode_slip_plus)
+    state = state_t(x=x, v=v, mode=mode_slip_plus, touch_speed=abs(v))
     state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
     ! Dahl's friction is taken to have slipped this way for long.
@@ -90,18 +90,21 @@ contains
   end function start_state
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
-  !> trajectory had to be given up (codes of module `status`).
-  pure subroutine advance(moving, state, time_end, tally, reason, log)
+  !> trajectory had to be given up (codes of module `status`). With `slip_speed` no further than to a slip in the other
+  !> direction that is so fast [m/s].
+  pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
+    real(wp), intent(in), optional :: slip_speed
     real(wp) :: before
-    integer :: stalls
+    integer :: stalls, other
     reason = 0
     stalls = 0
+    other = merge(mode_slip_minus, mode_slip_plus, state%mode == mode_slip_plus)
     do while (state%time < time_end)
       tally%events = tally%events + 1
       if (tally%events > moving%options%event_budget) reason = reason_event_budget
@@ -113,10 +116,13 @@ contains
       case default
         call rest_on(moving, state, time_end, tally, log)
       end select
+      if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (.not. (abs(state%x) <= moving%options%domain)) reason = reason_left_domain
       if (state%x /= state%x .or. state%v /= state%v .or. state%time /= state%time) reason = reason_not_finite
       stalls = merge(0, stalls + 1, state%time > before)
       if (stalls >= most_stalls) call break_tie(moving, state, time_end)
+      if (.not. present(slip_speed) .or. reason /= 0) cycle
+      if (state%mode == other .and. abs(state%v) >= slip_speed) exit
     end do
   end subroutine advance
 
@@ -147,7 +153,7 @@ contains
     type(log_t), intent(inout), optional :: log
     type(state_t) :: start
     real(wp) :: barrier, before
-    integer :: outcome, direction
+    integer :: outcome, direction, first_sample
     logical :: inside
     direction = merge(1, -1, state%mode == mode_slip_plus)
     barrier = merge(moving%machine%contact%upper, moving%machine%contact%lower, direction > 0)
@@ -164,8 +170,9 @@ contains
     if (direction*(state%x - barrier) < 0) then
       if (moving%exact .and. .not. inside) then
         start = state
+        if (present(log)) first_sample = log%samples + 1
         call fly_exact(moving%flow, state, time_end, moving%layer, barrier, tally, outcome, log)
-        if (present(log)) call book_exact(moving%machine, moving%flow, start, direction, state%time, log%book)
+        if (present(log)) call book_exact(moving%machine, moving%flow, start, direction, state%time, first_sample, log)
         if (outcome == flight_speed_reached .and. moving%layer > 0) outcome = flight_layer_left
       else
         call cross(moving, state, direction, time_end, barrier, tally, outcome, log)
@@ -193,11 +200,12 @@ contains
 
   !> A soft barrier is reached: nothing changes but the forces from here on.
   pure subroutine touch(state, direction, tally, log)
-    type(state_t), intent(in) :: state
+    type(state_t), intent(inout) :: state
     integer, intent(in) :: direction
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     call count_impact(tally, state, direction)
+    state%touch_speed = abs(state%v)
     if (present(log)) call record_event(log, merge(event_touch_upper, event_touch_lower, direction > 0), state, state%v)
   end subroutine touch
 
@@ -346,22 +354,25 @@ contains
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
-    type(state_t) :: start, sample
+    type(state_t) :: start, sample, before
     integer :: kind
     start = state
     call note_position(tally, state)
     tally%v_max = max(tally%v_max, 0.0_wp)
     call hold(moving%machine, state, time_end)
     if (.not. present(log)) return
-    call book_rest(moving%machine, start, state, log%book)
     if (log%sample_interval > 0) then
       sample = start
       do
+        before = sample
         sample%time = sample_time(log)
         if (.not. sample_due(log, state%time)) exit
-        call record_sample(log, sample)
+        call book_rest(moving%machine, before, sample, log%book)
+        call record_with_book(moving%machine, sample, log)
       end do
+      start = before
     end if
+    call book_rest(moving%machine, start, state, log%book)
     if (state%mode == start%mode) return
     kind = merge(event_release, event_barrier_release, start%mode == mode_stick)
     call record_event(log, kind, state, 0.0_wp)

@@ -9,7 +9,7 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, note_position, append_word, open_log, &
-    record_event, record_sample
+    record_event, record_sample, put_sample_book
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -40,6 +40,8 @@ module motion_state
     integer :: mode = 0
     !> Force of Dahl's friction against the body [N], where that is.
     real(wp) :: z = 0
+    !> Speed at which the last contact with a soft barrier began [m/s].
+    real(wp) :: touch_speed = 0
   end type state_t
 
   type, public :: options_t
@@ -48,6 +50,8 @@ module motion_state
     real(wp) :: tolerance = 1e-13_wp
     !> Events after which a trajectory is given up.
     integer(int64) :: event_budget = 1000000_int64
+    !> Steps of adaptive flights after which a trajectory is given up.
+    integer(int64) :: step_budget = 5000000_int64
     !> |x| beyond which the body has left the domain [m].
     real(wp) :: domain = 1e6_wp
     !> Doubles per vector where many bodies fly together; 0 = one by one.
@@ -56,7 +60,8 @@ module motion_state
 
   !> Counts and extremes since the last reset.
   type, public :: tally_t
-    integer(int64) :: events = 0
+    !> Flights, and steps of adaptive ones.
+    integer(int64) :: events = 0, steps = 0
     integer(int64) :: impacts = 0, chatters = 0, sticks = 0, slips = 0
     real(wp) :: impact_speed_sum = 0, last_impact_speed = 0
     real(wp) :: x_max = -huge(1.0_wp), x_min = huge(1.0_wp), v_max = -huge(1.0_wp)
@@ -100,6 +105,8 @@ module motion_state
     !> Where the energy went until now, and until each sample: rows as in `book_t`, `at_end` being the energy then.
     type(book_t) :: book
     real(wp), allocatable :: sample_book(:, :)
+    !> Speed at which the last contact with a soft barrier began, at samples; one row.
+    real(wp), allocatable :: sample_touch(:, :)
   end type log_t
 
 contains
@@ -148,12 +155,14 @@ contains
     type(tally_t), intent(inout) :: tally
     type(state_t), intent(in) :: state
     logical :: wants_v_max
-    integer(int64) :: events
+    integer(int64) :: events, steps
     wants_v_max = tally%wants_v_max
     events = tally%events
+    steps = tally%steps
     tally = tally_t()
     tally%wants_v_max = wants_v_max
     tally%events = events
+    tally%steps = steps
     call note_position(tally, state)
     tally%v_max = state%v
     select case (state%mode)
@@ -191,6 +200,7 @@ contains
     real(wp), intent(in) :: interval
     log%sample_interval = interval
     allocate (log%event_kind(256), log%event_data(4, 256), log%sample_mode(4096), log%sample_data(3, 4096))
+    allocate (log%event_driver(2, 256), log%sample_driver(2, 256), log%sample_book(5, 256), log%sample_touch(1, 256))
   end subroutine open_log
 
   !> Writes an event down: state just before it and the velocity just after; `driver` is x, v of the driving body of two.
@@ -227,9 +237,9 @@ contains
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
     log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
+    if (log%book%kept) call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
-    if (present(book)) call put_column(log%sample_book, log%samples, &
-                                       [book%friction, book%damping, book%contact, book%work, book%at_end])
+    if (present(book)) call put_sample_book(log, log%samples, book)
   end subroutine record_sample
 
   !> Room for `count` samples.
@@ -246,6 +256,14 @@ contains
     call move_alloc(modes_grown, log%sample_mode)
     call move_alloc(data_grown, log%sample_data)
   end subroutine make_room
+
+  !> Writes down where the energy went until sample number `sample`, in order.
+  pure subroutine put_sample_book(log, sample, book)
+    type(log_t), intent(inout) :: log
+    integer, intent(in) :: sample
+    type(book_t), intent(in) :: book
+    call put_column(log%sample_book, sample, [book%friction, book%damping, book%contact, book%work, book%at_end])
+  end subroutine put_sample_book
 
   !> Puts values into column `column`, the one after the last.
   pure subroutine put_column(columns, column, values)

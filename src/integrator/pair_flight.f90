@@ -5,12 +5,13 @@
 !> stop, the break-away of the interface, or the release from the stop.
 module pair_flight
   use kinds, only: wp
-  use linear_flow, only: expand, first_zero, most_unknowns, order, product_integral, series_of, series_value, state_at, &
-    stretch_t
+  use linear_flow, only: drop_rounding, expand, first_zero, most_unknowns, order, product_integral, series_of, series_value, &
+    state_at, stretch_t
   use motion_state, only: book_t, log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
     sample_due, sample_time, state_t, tally_t
   use pair, only: driven_by_motion
-  use pair_modes, only: at_one, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of
+  use pair_modes, only: at_cosine, at_one, at_sine, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of, &
+    speed_size
   implicit none
   private
 
@@ -20,6 +21,8 @@ module pair_flight
   integer, parameter, public :: guard_none = 0, guard_upper = 1, guard_lower = 2, guard_slip = 3, guard_plus = 4, &
     guard_minus = 5, guard_press = 6, guard_leave = 7
   integer, parameter :: guards = 7
+  !> Of a contact with a soft stop: its end; no step is short enough.
+  integer, parameter, public :: guard_separate = 8, guard_failed = 9
   !> Twice what `mode_together` takes for a tie, which it decides by the rate.
   real(wp), parameter :: tie_allowance = 64*epsilon(1.0_wp)
 
@@ -47,11 +50,16 @@ contains
     type(log_t), intent(inout), optional :: log
     type(watch_t) :: watches(guards)
     type(stretch_t) :: stretch
-    real(wp) :: p(0:order), t, first
+    real(wp) :: p(0:order), t, first, sizes(most_unknowns)
     integer :: i
     logical :: begins
     call refresh(moving, state)
     watches = watches_of(moving, state, hold)
+    ! The ties that choose a mode are taken in units of the amplitudes.
+    sizes = state%y
+    sizes([at_cosine, at_sine]) = 1
+    sizes(at_v1) = speed_size(moving, state)
+    sizes(at_x1) = max(abs(sizes(at_x1)), moving%swing*sizes(at_v1))
     begins = .true.
     do
       call expand(moving%modes(state%mode), state%y, time_end - state%time, stretch)
@@ -65,6 +73,7 @@ contains
           if (p(1) >= -moving%negligible_speed*stretch%length) p(1) = max(p(1), 0.0_wp)
         end if
         p(0) = p(0) + watches(i)%allowance
+        if (begins) call drop_rounding(moving%modes(state%mode), watches(i)%row, sizes, stretch%length, p)
         t = first_zero(p)
         if (t < first .or. (t <= first .and. fallen == guard_none)) then
           first = t
@@ -81,6 +90,7 @@ contains
       if (fallen /= guard_none) exit
       begins = .false.
     end do
+    call refresh(moving, state)
     call note_position(tally, body_state(state))
   end subroutine fly_pair
 
@@ -103,7 +113,7 @@ contains
         if (.not. machine%carried) call watch_stops(moving, state%touch, watches)
         call watch_interface(moving, watches(guard_plus), 1)
         call watch_interface(moving, watches(guard_minus), -1)
-        if (machine%carried) then
+        if (machine%carried .and. .not. machine%contact%soft) then
           watches(guard_plus)%active = state%touch /= -1 .and. .not. moving%clamped
           watches(guard_minus)%active = state%touch /= 1 .and. .not. moving%clamped
         end if
@@ -132,10 +142,6 @@ contains
     associate (machine => moving%machine, upper => watches(guard_upper), lower => watches(guard_lower))
       upper%active = machine%upper < unreachable
       lower%active = machine%lower > -unreachable
-      if (machine%contact%soft) then
-        upper%active = .false.
-        lower%active = .false.
-      end if
       upper%row(at_x2) = -1
       lower%row(at_x2) = 1
       if (machine%carried) then
@@ -256,7 +262,7 @@ contains
   !> The driven body as a single one, for tally and log.
   pure type(state_t) function body_state(state)
     type(pair_state_t), intent(in) :: state
-    body_state = state_t(x=state%y(at_x2), v=state%y(at_v2), time=state%time, mode=state%mode)
+    body_state = state_t(x=state%y(at_x2), v=state%y(at_v2), time=state%time, mode=state%mode, touch_speed=state%touch_speed)
   end function body_state
 
   !> Position and velocity of the driving body.

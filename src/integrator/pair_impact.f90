@@ -8,28 +8,18 @@ module pair_impact
   use motion_state, only: append_word, event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, &
     log_t, mode_lower_barrier, mode_stick, mode_upper_barrier, record_event, tally_t, word_chatter_lower, &
     word_chatter_upper, word_lower, word_upper
-  use pair, only: driven_by_motion
+  use pair, only: driven_by_motion, impact_mass
   use pair_flight, only: body_state, driver_of, fly_pair, guard_none
-  use pair_modes, only: at_v1, at_v2, at_x1, at_x2, mode_of_slip, mode_together, pair_motion_t, pair_state_t
+  use pair_modes, only: at_v1, at_v2, at_x1, at_x2, mode_of_slip, mode_together, pair_motion_t, pair_state_t, stands
   implicit none
   private
 
-  public :: collide_pair, rest_on_stop, reduced_mass
+  public :: collide_pair, rest_on_stop
 
   !> Share of the driving speed, or relative change of the acceleration, at which a chatter sequence is completed.
   real(wp), parameter :: chatter_share = 1e-6_wp
 
 contains
-
-  !> The mass that an impact between the two bodies sees, or of m2 with the ground or with a given motion [kg].
-  pure real(wp) function reduced_mass(moving)
-    type(pair_motion_t), intent(in) :: moving
-    associate (machine => moving%machine)
-      reduced_mass = machine%driven_mass
-      if (machine%carried .and. machine%drive /= driven_by_motion) reduced_mass = &
-        machine%mass*machine%driven_mass/(machine%mass + machine%driven_mass)
-    end associate
-  end function reduced_mass
 
   !> m2 meets its stop on `side` +1 (upper) or -1: Newton's law for the velocity relative to the stop.
   pure subroutine collide_pair(moving, state, side, tally, log)
@@ -40,29 +30,28 @@ contains
     type(log_t), intent(inout), optional :: log
     type(pair_state_t) :: before
     real(wp) :: speed, k, mass, driving_speed
+    logical :: rounding
     before = state
     state%touch = side
     state%y(at_x2) = merge(moving%machine%upper, moving%machine%lower, side > 0)
     if (moving%machine%carried) state%y(at_x2) = state%y(at_x2) + state%y(at_x1)
-    mass = reduced_mass(moving)
+    mass = impact_mass(moving%machine)
     driving_speed = state%y(at_v1)
     speed = side*state%y(at_v2)
     if (moving%machine%carried) speed = side*(state%y(at_v2) - state%y(at_v1))
     if (speed > 0) then
       k = restitution_at(moving%machine%contact, speed)
-      if (moving%clamped .or. speed <= moving%negligible_speed) k = 0
+      rounding = stands(moving, state, speed)
+      if (moving%clamped .or. speed <= moving%negligible_speed .or. rounding) k = 0
       call set_relative_velocity(moving, state, -side*k*speed)
-      tally%impacts = tally%impacts + 1
-      tally%last_impact_speed = speed
-      tally%impact_speed_sum = tally%impact_speed_sum + speed
-      call append_word(tally, merge(word_upper, word_lower, side > 0))
+      if (.not. rounding) call count_impact(tally, speed, merge(word_upper, word_lower, side > 0))
       if (present(log)) then
         log%book%contact = log%book%contact + 0.5_wp*mass*speed**2*(1 - k**2)
         if (moving%machine%carried .and. moving%machine%drive == driven_by_motion) then
           log%book%work = log%book%work - side*mass*(1 + k)*speed*driving_speed
         end if
-        call record_event(log, merge(event_impact_upper, event_impact_lower, side > 0), body_state(before), &
-                          state%y(at_v2), driver_of(before))
+        if (.not. rounding) call record_event(log, merge(event_impact_upper, event_impact_lower, side > 0), &
+                                              body_state(before), state%y(at_v2), driver_of(before))
       end if
       if (k*speed > 0) then
         call leave_stop(moving, state, side)
@@ -75,6 +64,16 @@ contains
     end if
     call rest_on_stop(moving, state)
   end subroutine collide_pair
+
+  pure subroutine count_impact(tally, speed, word)
+    type(tally_t), intent(inout) :: tally
+    real(wp), intent(in) :: speed
+    integer, intent(in) :: word
+    tally%impacts = tally%impacts + 1
+    tally%last_impact_speed = speed
+    tally%impact_speed_sum = tally%impact_speed_sum + speed
+    call append_word(tally, word)
+  end subroutine count_impact
 
   !> Gives m2 the velocity `relative` [m/s] against its stop; two bodies keep their momentum.
   pure subroutine set_relative_velocity(moving, state, relative)
@@ -122,7 +121,8 @@ contains
       return
     end if
     state%y(at_v2) = 0
-    if (.not. abs(state%y(at_v1)) > 0) then
+    if (stands(moving, state, state%y(at_v1))) then
+      if (moving%machine%drive /= driven_by_motion) state%y(at_v1) = 0
       call mode_together(moving, state)
       return
     end if
@@ -174,9 +174,9 @@ contains
     tally%sticks = tally%sticks + 1
     call append_word(tally, merge(word_chatter_upper, word_chatter_lower, side > 0))
     if (.not. present(log)) return
-    log%book%contact = log%book%contact + 0.5_wp*reduced_mass(moving)*speed**2
+    log%book%contact = log%book%contact + 0.5_wp*impact_mass(moving%machine)*speed**2
     if (moving%machine%carried .and. moving%machine%drive == driven_by_motion) then
-      log%book%work = log%book%work + side*reduced_mass(moving)*speed*state%y(at_v1)
+      log%book%work = log%book%work + side*impact_mass(moving%machine)*speed*state%y(at_v1)
     end if
     ! The log has the instant of accumulation even where the clock stops before it.
     call record_event(log, merge(event_chatter_upper, event_chatter_lower, side > 0), body_state(later), &
@@ -202,8 +202,8 @@ contains
       end if
       push = -side*sum(moving%push*state%y)
       if (machine%drive /= driven_by_motion) push = push/machine%mass
-      out = push + machine%friction/reduced_mass(moving)
-      back = push - machine%friction/reduced_mass(moving)
+      out = push + machine%friction/impact_mass(moving%machine)
+      back = push - machine%friction/impact_mass(moving%machine)
     end associate
   end subroutine pressing
 

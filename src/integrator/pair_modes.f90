@@ -14,7 +14,7 @@ module pair_modes
   implicit none
   private
 
-  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now
+  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now, speed_size, stands
 
   !> Unknowns: both bodies, cosine and sine of the drive, one, integral of the control error, velocity of the drive
   !> times time, control held between samples.
@@ -31,6 +31,9 @@ module pair_modes
     integer :: mode = 0
     !> The stop that m2 rests on, or has just left: +1 upper, -1 lower, 0 none.
     integer :: touch = 0
+    !> The soft stop that m2 presses, how deep [m], and the speed at which it met it [m/s].
+    integer :: pressed = 0
+    real(wp) :: penetration = 0, touch_speed = 0
     !> The blow has fallen; the next sample of the controller [s], both in time since the start.
     logical :: struck = .false.
     real(wp) :: clock = 0
@@ -52,10 +55,12 @@ module pair_modes
     real(wp), dimension(most_unknowns) :: push_rate = 0, interface_rate = 0
     !> What friction holds of `push` on the stop [as push]: b, or nothing where the motion of m1 is given.
     real(wp) :: threshold = 0
-    !> Sizes of force and push, for the rounding of ties.
-    real(wp) :: force_scale = 0, push_scale = 0
+    !> Sizes of force and push, for the rounding of ties; force of the spring per velocity [N s/m], displacement [s].
+    real(wp) :: force_scale = 0, push_scale = 0, impedance = 0, swing = 0
     !> Speed at which m2 meets a stop without rebound [m/s]: rounding.
     real(wp) :: negligible_speed = 0
+    !> Size of the velocity of a given motion [m/s], for its rounding.
+    real(wp) :: driving_speed = 0
     !> The stops leave no room.
     logical :: clamped = .false.
   end type pair_motion_t
@@ -71,7 +76,7 @@ contains
     integer :: s
     moving%machine = machine
     moving%options = options
-    moving%clamped = machine%lower >= machine%upper
+    moving%clamped = machine%lower >= machine%upper .and. .not. machine%contact%soft
     call set_rows(machine, moving)
     moving%negligible_speed = briefest_bounce*machine%period*moving%push_scale
     if (machine%drive /= driven_by_motion) moving%negligible_speed = moving%negligible_speed/(machine%mass + machine%driven_mass)
@@ -121,6 +126,7 @@ contains
         push(at_sine) = -w**2*machine%quadrature
         moving%together = push
         moving%push_scale = sum(abs(push))
+        moving%driving_speed = sum(abs(rate))
         moving%force_scale = machine%driven_mass*moving%push_scale + machine%friction
       else
         push(at_x1) = -machine%stiffness
@@ -132,6 +138,8 @@ contains
         moving%threshold = machine%friction
         moving%push_scale = machine%friction + sum(abs(push(at_cosine:at_one)))
         moving%force_scale = moving%push_scale
+        moving%impedance = sqrt((machine%mass + machine%driven_mass)*max(0.0_wp, -push(at_x1)))
+        if (moving%impedance > 0) moving%swing = (machine%mass + machine%driven_mass)/moving%impedance
       end if
     end associate
     moving%interface = machine%driven_mass*moving%together
@@ -198,6 +206,22 @@ contains
     control_now = sum(moving%control*state%y)
   end function control_now
 
+  !> Size of the velocity of m1 [m/s], for its rounding: of the given motion, or of the swing that it is part of.
+  pure real(wp) function speed_size(moving, state)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    speed_size = max(moving%driving_speed, abs(state%y(at_v1)))
+    if (moving%swing > 0) speed_size = max(speed_size, abs(state%y(at_x1))/moving%swing)
+  end function speed_size
+
+  !> Whether a velocity [m/s] is zero to the rounding of that of m1.
+  pure logical function stands(moving, state, velocity)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    real(wp), intent(in) :: velocity
+    stands = abs(velocity) <= 64*epsilon(1.0_wp)*speed_size(moving, state)
+  end function stands
+
   !> Slip mode of the relative velocity v1 - v2 with sign `s`.
   pure elemental integer function mode_of_slip(s)
     integer, intent(in) :: s
@@ -212,23 +236,24 @@ contains
     if (mode == mode_slip_minus .or. mode == mode_lower_barrier) sense_of = -1
   end function sense_of
 
-  !> Sets the mode that follows where v1 = v2, and clears `touch` where m2 leaves its stop.
+  !> Sets the mode that follows where v1 = v2, m2 being at rest on its stop where `state%touch` says so.
   pure subroutine mode_together(moving, state)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
-    real(wp) :: push, rate
+    real(wp) :: push, rate, spring
     integer :: s
+    spring = moving%impedance*abs(state%y(at_v1))
     if (state%touch /= 0 .and. .not. moving%machine%carried) then
       push = state%touch*sum(moving%push*state%y)
       rate = state%touch*sum(moving%push_rate*state%y)
-      if (exceeds(push - moving%threshold, rate, moving%push_scale + abs(push))) then
+      if (exceeds(push - moving%threshold, rate, moving%push_scale + spring + abs(push))) then
         state%mode = merge(mode_upper_barrier, mode_lower_barrier, state%touch > 0)
         return
-      else if (moving%clamped .and. exceeds(-push - moving%threshold, -rate, moving%push_scale + abs(push))) then
+      else if (moving%clamped .and. exceeds(-push - moving%threshold, -rate, moving%push_scale + spring + abs(push))) then
         state%touch = -state%touch
         state%mode = merge(mode_upper_barrier, mode_lower_barrier, state%touch > 0)
         return
-      else if (moving%clamped .or. .not. exceeds(-push, -rate, moving%push_scale + abs(push))) then
+      else if (moving%clamped .or. .not. exceeds(-push, -rate, moving%push_scale + spring + abs(push))) then
         state%mode = mode_held
         return
       end if
@@ -237,7 +262,7 @@ contains
     push = sum(moving%interface*state%y)
     rate = sum(moving%interface_rate*state%y)
     do s = -1, 1, 2
-      if (.not. exceeds(s*push - moving%machine%friction, s*rate, moving%force_scale + abs(push))) cycle
+      if (.not. exceeds(s*push - moving%machine%friction, s*rate, moving%force_scale + spring + abs(push))) cycle
       ! A stop carried by m1 keeps m2 from running ahead of it.
       if (moving%machine%carried .and. state%touch == -s) cycle
       if (moving%machine%carried .and. moving%clamped) cycle

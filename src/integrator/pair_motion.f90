@@ -7,15 +7,16 @@ module pair_motion
   use constants, only: two_pi
   use kinds, only: wp
   use motion_state, only: append_word, event_barrier_release, event_blow, event_release, event_stick, &
-    event_turning_point, log_t, mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
+    event_separation, event_turning_point, log_t, mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
     mode_upper_barrier, record_event, tally_t, word_period, word_stick
   use pair, only: driven_by_controller, driven_by_motion
-  use pair_flight, only: body_state, driver_of, fly_pair, guard_leave, guard_lower, guard_minus, guard_plus, &
-    guard_press, guard_slip, guard_upper
+  use pair_contact, only: fly_pressed, mode_pressed, touch_stop
+  use pair_flight, only: body_state, driver_of, fly_pair, guard_failed, guard_leave, guard_lower, guard_minus, guard_plus, &
+    guard_press, guard_separate, guard_slip, guard_upper
   use pair_impact, only: collide_pair, rest_on_stop
   use pair_modes, only: at_control, at_integral, at_v1, at_v2, at_x1, at_x2, control_now, mode_of_slip, &
-    mode_together, pair_motion_t, pair_state_t, refresh
-  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_failed
+    mode_together, pair_motion_t, pair_state_t, refresh, stands
+  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed
   implicit none
   private
 
@@ -28,10 +29,12 @@ module pair_motion
 contains
 
   !> State of m2 at `x` [m], `v` [m/s] and m1 at `driver` (position, velocity), with the drive at `angle` [rad]. Where
-  !> the motion of m1 is given, `driver` is not looked at.
-  pure function start_pair(moving, x, v, driver, angle) result(state)
+  !> the motion of m1 is given, `driver` is not looked at. `integral` [ms] is that of the error which a controller has
+  !> added up.
+  pure function start_pair(moving, x, v, driver, angle, integral) result(state)
     type(pair_motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, driver(2), angle
+    real(wp), intent(in), optional :: integral
     type(pair_state_t) :: state
     real(wp) :: place, w
     associate (machine => moving%machine)
@@ -41,14 +44,19 @@ contains
       state%y(at_v1) = driver(2)
       state%y(at_x2) = x
       state%y(at_v2) = v
+      if (present(integral)) state%y(at_integral) = integral
       call refresh(moving, state)
       place = x
       if (machine%carried) place = x - state%y(at_x1)
       if (place >= machine%upper) state%touch = 1
       if (place <= machine%lower) state%touch = -1
-      if (machine%contact%soft) state%touch = 0
+      if (machine%contact%soft .and. (place > machine%upper .or. place < machine%lower)) then
+        state%pressed = state%touch
+        state%penetration = max(place - machine%upper, machine%lower - place)
+        state%touch_speed = abs(v - merge(state%y(at_v1), 0.0_wp, machine%carried))
+      end if
       w = state%y(at_v1) - state%y(at_v2)
-      if (state%touch /= 0 .and. .not. machine%carried .and. .not. abs(v) > 0) then
+      if (state%touch /= 0 .and. .not. machine%carried .and. .not. abs(v) > 0 .and. .not. machine%contact%soft) then
         call rest_on_stop(moving, state)
       else if (abs(w) > 0) then
         state%mode = mode_of_slip(nint(sign(1.0_wp, w)))
@@ -58,15 +66,21 @@ contains
     end associate
   end function start_pair
 
-  !> Mode of bodies with equal velocities; a stop on the ground only counts once they meet it.
+  !> Mode of bodies with equal velocities; a rigid stop on the ground only counts where they rest on it.
   pure subroutine start_together(moving, state)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
     integer :: touch
+    logical :: rests
+    if (state%pressed /= 0) then
+      call mode_pressed(moving, state)
+      return
+    end if
     touch = state%touch
-    if (.not. moving%machine%carried) state%touch = 0
+    rests = .not. moving%machine%contact%soft .and. (moving%machine%carried .or. stands(moving, state, state%y(at_v2)))
+    if (.not. rests) state%touch = 0
     call mode_together(moving, state)
-    state%touch = touch
+    if (.not. rests) state%touch = touch
   end subroutine start_together
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
@@ -88,7 +102,8 @@ contains
       if (stalls >= last_stall) reason = reason_step_failed
       if (reason /= 0) return
       before = state%time
-      call move_once(moving, state, time_end, stalls >= most_stalls, tally, log)
+      call move_once(moving, state, time_end, stalls >= most_stalls, tally, reason, log)
+      if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (any(state%y /= state%y)) reason = reason_not_finite
       if (.not. abs(state%y(at_x2)) <= moving%options%domain) reason = reason_left_domain
       stalls = merge(0, stalls + 1, state%time > before)
@@ -114,16 +129,17 @@ contains
   end subroutine advance_pair_period
 
   !> One flight and the event at its end. `stalled`: the bodies are held together for an instant.
-  pure subroutine move_once(moving, state, time_end, stalled, tally, log)
+  pure subroutine move_once(moving, state, time_end, stalled, tally, reason, log)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     logical, intent(in) :: stalled
     type(tally_t), intent(inout) :: tally
+    integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
     real(wp) :: stop_time, blow, sample, before
     integer :: fallen, mode
-    logical :: slips, held
+    logical :: slips, held, presses
     call take_sample(moving, state, sample)
     blow = huge(blow)
     if (abs(moving%machine%blow) > 0 .and. .not. state%struck) blow = moving%machine%blow_time - state%clock
@@ -133,25 +149,32 @@ contains
     end if
     stop_time = min(time_end, blow, sample)
     held = stalled .and. abs(state%y(at_v1) - state%y(at_v2)) <= moving%negligible_speed
-    if (held) then
-      stop_time = min(stop_time, state%time + 1e-9_wp*moving%machine%period)
-      if (state%mode /= mode_held) then
-        state%y(at_v2) = state%y(at_v1)
-        state%mode = mode_stick
-      end if
-    end if
+    if (held) call hold_for_an_instant(moving, state, stop_time)
     before = state%time
     mode = state%mode
     slips = mode /= mode_stick .and. mode /= mode_held
-    call fly_pair(moving, state, stop_time, held, fallen, tally, log)
+    presses = state%pressed /= 0
+    if (presses) then
+      call fly_pressed(moving, state, stop_time, held, fallen, tally, log)
+    else
+      call fly_pair(moving, state, stop_time, held, fallen, tally, log)
+    end if
     if (state%time > before) then
       if (slips) tally%slips = tally%slips + 1
-      if (mode == mode_slip_plus .or. mode == mode_slip_minus .or. &
-          (mode == mode_stick .and. .not. moving%machine%carried)) state%touch = 0
+      if (.not. presses .and. (mode == mode_slip_plus .or. mode == mode_slip_minus .or. &
+                               (mode == mode_stick .and. .not. moving%machine%carried))) state%touch = 0
     end if
     select case (fallen)
     case (guard_upper, guard_lower)
-      call collide_pair(moving, state, merge(1, -1, fallen == guard_upper), tally, log)
+      if (moving%machine%contact%soft) then
+        call touch_stop(moving, state, merge(1, -1, fallen == guard_upper), tally, log)
+      else
+        call collide_pair(moving, state, merge(1, -1, fallen == guard_upper), tally, log)
+      end if
+    case (guard_separate)
+      if (present(log)) call record_event(log, event_separation, body_state(state), state%y(at_v2), driver_of(state))
+    case (guard_failed)
+      reason = reason_step_failed
     case (guard_slip)
       call come_together(moving, state, tally, log)
     case (guard_plus, guard_minus)
@@ -165,6 +188,21 @@ contains
       if (present(log)) call record_event(log, event_barrier_release, body_state(state), state%y(at_v2), driver_of(state))
     end select
   end subroutine move_once
+
+  !> A tie of forces to the last bit: the bodies move together, or m2 stays on its stop, for an instant.
+  pure subroutine hold_for_an_instant(moving, state, stop_time)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp), intent(inout) :: stop_time
+    stop_time = min(stop_time, state%time + 1e-9_wp*moving%machine%period)
+    if (state%touch /= 0 .and. .not. moving%machine%carried) then
+      state%y(at_v2) = 0
+      state%mode = mode_held
+    else
+      state%y(at_v2) = state%y(at_v1)
+      state%mode = mode_stick
+    end if
+  end subroutine hold_for_an_instant
 
   !> The relative velocity is zero: the forces choose the next mode.
   pure subroutine come_together(moving, state, tally, log)
@@ -232,7 +270,8 @@ contains
       state%y(at_control) = control_now(moving, state)
       state%y(at_integral) = state%y(at_integral) &
         + machine%sample_time*(sum(moving%reference*state%y) - state%y(at_x1))
-      if (state%mode == mode_stick .or. state%mode == mode_held) call mode_together(moving, state)
+      if (state%mode == mode_stick) call start_together(moving, state)
+      if (state%mode == mode_held) call mode_together(moving, state)
     end associate
   end subroutine take_sample
 

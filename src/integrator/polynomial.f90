@@ -9,7 +9,7 @@ module polynomial
   implicit none
   private
 
-  public :: first_fall, maximum_until, value_at
+  public :: first_fall, interpolate, maximum_until, value_at
 
   integer, parameter, public :: degree = 7
   !> Halvings until an interval is a point to rounding.
@@ -105,6 +105,24 @@ contains
       top = top + 1
     end do
   end function maximum_until
+
+  !> The polynomial with given values at given places (Newton's divided differences).
+  pure function interpolate(place, value) result(p)
+    real(wp), intent(in) :: place(0:degree), value(0:degree)
+    real(wp) :: p(0:degree), difference(0:degree)
+    integer :: i, k
+    difference = value
+    do k = 1, degree
+      do i = degree, k, -1
+        difference(i) = (difference(i) - difference(i - 1))/(place(i) - place(i - k))
+      end do
+    end do
+    p = 0
+    do k = degree, 0, -1
+      p = eoshift(p, -1) - place(k)*p
+      p(0) = p(0) + difference(k)
+    end do
+  end function interpolate
 
   !> Bernstein coefficients on [0, 1].
   pure function bernstein(p) result(b)

@@ -34,6 +34,7 @@ module map_file
     integer, allocatable, private :: tiled(:)
     type(h5_dataset_t), allocatable, private :: datasets(:)
     type(h5_dataset_t), private :: states, checksums
+    logical, private :: writable = .true.
     logical, allocatable, private :: done(:)
     !> Opened by one process: data must be flushed to be safe.
     logical, private :: alone = .true.
@@ -81,8 +82,8 @@ contains
 
   !> Opens the working file of an interrupted run. Collective. Tiles whose data does not match their
   !> checksum count as not done. Code 76 if the file has another layout, or another `case_identity`
-  !> in the group `provenance` than the schema.
-  subroutine open_working(path, schema, grid, tile_shape, team, file, error)
+  !> in the group `provenance` than the schema. `only_read`: the file stays as it is.
+  subroutine open_working(path, schema, grid, tile_shape, team, file, error, only_read)
     character(len=*), intent(in) :: path
     type(schema_t), intent(in) :: schema
     character(len=*), intent(in) :: grid(:)
@@ -90,11 +91,13 @@ contains
     class(team_t), intent(in) :: team
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: only_read
     integer :: mismatches
     call prepare(path, schema, grid, tile_shape, file, error)
     if (allocated(error)) return
+    if (present(only_read)) file%writable = .not. only_read
     if (team%is_root()) then
-      call check_resume(path, error)
+      if (file%writable) call check_resume(path, error)
       if (.not. allocated(error)) call check_layout(working_path(path), file%schema, file%tiling%shape, error)
     end if
     call team%agree(error)
@@ -202,7 +205,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: i
     self%alone = team%size() == 1
-    call h5_open(working_path(self%path), self%part, error, writable=.true., team=team)
+    call h5_open(working_path(self%path), self%part, error, writable=self%writable, team=team)
     if (allocated(self%datasets)) deallocate (self%datasets)
     allocate (self%datasets(size(self%tiled)))
     do i = 1, size(self%tiled)
@@ -352,7 +355,7 @@ contains
       if (found == nint(expected(tile), int64)) then
         done(tile) = 1
       else
-        call mark(self, tile, 0, 0_int64, error)
+        if (self%writable) call mark(self, tile, 0, 0_int64, error)
         if (allocated(error)) exit
       end if
     end do

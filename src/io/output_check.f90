@@ -32,15 +32,20 @@ contains
     character(len=*), intent(in) :: path
     logical, intent(in) :: replace
     type(error_t), allocatable, intent(out) :: error
-    logical :: special
-    special = is_special(path)
-    if (special) special = .not. is_folder(path)
-    if (special) then
-      call fail(error, exit_cannot_create, "cannot create '"//path//"': it is not a regular file")
-    else
-      call check_output(path, replace, error)
-    end if
+    call check_regular(path, error)
+    if (.not. allocated(error)) call check_output(path, replace, error)
   end subroutine check_result
+
+  !> Code 73 if there is something else than a regular file.
+  subroutine check_regular(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    if (is_folder(path)) then
+      call fail(error, exit_cannot_create, "cannot create '"//path//"': it is a folder")
+    else if (is_special(path)) then
+      call fail(error, exit_cannot_create, "cannot create '"//path//"': it is not a regular file")
+    end if
+  end subroutine check_regular
 
   !> The same for a table, which is written in place.
   subroutine check_table(path, replace, error)
@@ -56,7 +61,7 @@ contains
     if (status == 0) then
       close (unit)
     else
-      call fail(error, exit_cannot_create, "cannot replace '"//path//"': "//trim(message))
+      call fail(error, exit_cannot_create, "cannot write '"//path//"': "//trim(message))
     end if
   end subroutine check_table
 
@@ -66,16 +71,24 @@ contains
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     call check_result(path, force, error)
+    if (allocated(error)) return
+    call check_regular(working_path(path), error)
     if (allocated(error) .or. force) return
     if (file_exists(working_path(path))) call fail(error, exit_cannot_create, ''''//working_path(path)// &
       ''' of an interrupted run exists; --resume continues it, --force begins again')
   end subroutine check_create
 
-  !> Without a working file to go on with a run begins anew: then code 73 unless `path` can be created.
+  !> Code 73 unless the working file of `path` can be written, and then `path`. Without a working file to go on with a run
+  !> begins anew.
   subroutine check_resume(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    if (.not. file_exists(working_path(path))) call check_result(path, .false., error)
+    if (.not. file_exists(working_path(path))) then
+      call check_result(path, .false., error)
+      return
+    end if
+    call check_regular(working_path(path), error)
+    if (.not. allocated(error)) call check_table(working_path(path), .true., error)
   end subroutine check_resume
 
   !> The name of the working file of the final file `path`.

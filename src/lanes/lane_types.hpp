@@ -1,11 +1,28 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// What the kernel and its caller share. `lanes.f90` mirrors both structures member by member.
+// What the kernel and its caller share. `lanes.f90` mirrors these structures member by member.
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64 };
+enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_sections = 32 };
+
+// A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
+struct lane_layer {
+  double excess, thickness;
+  // The edge, and a speed a little below: between both the excess friction is nil, too [m/s].
+  double edge, level;
+  // Error of the speed that is none [m/s], and the largest share of the excess friction in the acceleration.
+  double precision, steepest;
+  // Nodes over the speed, from rest to the edge: speed, excess friction, weight [m/s].
+  double speed[layer_nodes], force[layer_nodes], weight[layer_nodes];
+  // Integrals from rest, and from the edge, to a node (second index) of what has values at the nodes (first
+  // index) [m/s].
+  double from_rest[layer_nodes][layer_nodes], from_edge[layer_nodes][layer_nodes];
+  // Those of e, and half of those of e^2, e = exp(-(w/v_s)^delta).
+  double first_from_rest[layer_nodes], second_from_rest[layer_nodes];
+  double first_from_edge[layer_nodes], second_from_edge[layer_nodes];
+};
 
 // The machine, per unit of mass where forces are meant, SI.
 struct lane_machine {
@@ -27,6 +44,7 @@ struct lane_machine {
   // Periodic response x = sum cosine(n) cos(n phi) + sine(n) sin(n phi), n = 1 ... [m].
   int harmonics;
   double cosine[most_harmonics], sine[most_harmonics];
+  lane_layer layer;
 };
 
 // What a lane is doing.
@@ -50,7 +68,19 @@ template <class T> struct lane_fields {
   T found, span, hits, end_x, end_v, end_a, end_j, end_re, end_im;
   // Counts and extremes since the caller last took them away.
   T flights, impacts, speed_sum, last_speed, margin;
+  // From here on with a Stribeck layer only. Sections that the lane passes over before it stops at one, and
+  // that it has passed.
+  T sections, passed;
+  // The time since the start of the flight at which the body leaves the layer (`start_v`, ... are those
+  // then), and at which it enters it again or hits, with its motion. Fourth derivative at the end of the
+  // flight.
+  T skip, reach, reach_v, reach_a, reach_j, end_s;
 };
-typedef lane_fields<double[lanes]> lane_batch;
+
+struct lane_batch {
+  lane_fields<double[lanes]> fields;
+  // The motion on the sections passed.
+  double section_x[most_sections][lanes], section_v[most_sections][lanes];
+};
 
 #endif

@@ -6,8 +6,10 @@
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
   use contact_law, only: contact_constant
+  use elementary, only: exponential, logarithm
   use exact_flow, only: flow_t
   use kinds, only: wp
+  use layer_transit, only: gauss
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use rest, only: chatter_speed
@@ -15,16 +17,32 @@ module lanes
   implicit none
   private
 
-  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, take_counts, fly_lanes
+  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, section_state, take_counts, fly_lanes
 
   integer, parameter, public :: lane_count = 16
-  integer, parameter :: most_harmonics = 64
+  !> Sections that a lane can pass over in one go.
+  integer, parameter, public :: most_sections = 32
+  integer, parameter :: most_harmonics = 64, points = 10
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
 
   !> A harmonic is too near resonance for the periodic response if that grows to more than this multiple of the forcing.
   real(wp), parameter :: largest_amplification = 500
+
+  !> Of a Stribeck layer with exponent 1 and 2, in units of v_s: the edge, where the excess friction is below 1e-11 of that at
+  !> rest, a speed a little below, and the length of the variable of the nodes.
+  real(wp), parameter :: edges(2) = [26.0_wp, 5.1_wp], levels(2) = [25.0_wp, 5.0_wp], lengths(2) = [4.0_wp, 2.0_wp]
+  !> The nodes are enough up to this share of the excess friction in the acceleration.
+  real(wp), parameter :: steepest = 0.35_wp
+
+  !> Mirrors `lane_layer` of lane_types.hpp.
+  type, bind(c) :: layer_t
+    real(c_double) :: excess = 0, thickness = 0, edge = 0, level = 0, precision = 0, steepest = 0
+    real(c_double), dimension(points) :: speed = 0, force = 0, weight = 0
+    real(c_double), dimension(points, points) :: from_rest = 0, from_edge = 0
+    real(c_double), dimension(points) :: first_from_rest = 0, second_from_rest = 0, first_from_edge = 0, second_from_edge = 0
+  end type layer_t
 
   !> Mirrors `lane_machine` of lane_types.hpp.
   type, bind(c) :: machine_t
@@ -34,6 +52,7 @@ module lanes
     real(c_double) :: bound_periodic = 0, bound_free = 0, close = 0, stride = 0
     integer(c_int) :: harmonics = 0
     real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
+    type(layer_t) :: layer
   end type machine_t
 
   !> Mirrors `lane_batch` of lane_types.hpp.
@@ -41,7 +60,9 @@ module lanes
     real(c_double), dimension(lane_count) :: status = lane_idle, until = 0, time = 0, x = 0, v = 0, start = 0, &
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
-      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double)
+      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, passed = 0, &
+      skip = 0, reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
+    real(c_double), dimension(lane_count, most_sections) :: section_x = 0, section_v = 0
   end type lane_batch_t
 
   !> A machine ready to fly in lanes.
@@ -51,6 +72,11 @@ module lanes
     !> Doubles per vector.
     integer :: width = 2
     type(machine_t) :: machine
+    !> A body must be so fast [m/s] to be put into a lane: out of its Stribeck layer.
+    real(wp) :: slowest = 0
+    !> All lanes stop at every section, so that those set off together, whose first flights take longer to find, stay
+    !> together. With a Stribeck layer, whose passages are dear, none waits for another.
+    logical :: in_step = .true.
   end type lane_flow_t
 
   interface
@@ -81,7 +107,7 @@ contains
     type(lane_flow_t), intent(out) :: flow
     real(wp) :: fastest
     flow%width = moving%options%lane_width
-    flow%available = flow%width > 0 .and. moving%exact .and. moving%layer <= 0 .and. moving%flow%harmonics <= most_harmonics
+    flow%available = flow%width > 0 .and. moving%exact .and. moving%flow%harmonics <= most_harmonics
     flow%available = flow%available .and. .not. allocated(moving%pair) .and. .not. moving%machine%contact%soft .and. &
       moving%machine%contact%kind == contact_constant
     if (.not. flow%available) return
@@ -108,7 +134,51 @@ contains
       m%stride = 0.15_wp*law%period
     end associate
     call set_response(moving%flow, flow)
+    if (moving%layer > 0) call set_layer(moving, flow)
   end subroutine prepare_lanes
+
+  !> Nodes for the passage through a Stribeck layer, exponent 1 or 2: Gauss's in q = exp(-u/length), u = w/v_s.
+  pure subroutine set_layer(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(inout) :: flow
+    real(wp) :: node(points), weight(points), integral(points, points), q(points), share(points), last, speeds
+    integer :: delta, n, j
+    flow%available = flow%available .and. moving%transit%available .and. moving%flow%decay <= 0
+    if (.not. flow%available) return
+    associate (law => moving%machine%friction, layer => flow%machine%layer)
+      delta = nint(law%stribeck_exponent)
+      call gauss(node, weight, integral)
+      layer%excess = law%excess/moving%machine%mass
+      layer%thickness = law%stribeck_velocity
+      layer%edge = law%stribeck_velocity*edges(delta)
+      layer%level = law%stribeck_velocity*levels(delta)
+      layer%steepest = steepest
+      speeds = sum([(n*flow%machine%drive_frequency*sqrt(flow%machine%cosine(n)**2 + flow%machine%sine(n)**2), &
+                     n=1, flow%machine%harmonics)])
+      layer%precision = 16*epsilon(1.0_wp)*speeds
+      ! The speed rises while q falls from 1 to its last.
+      last = exponential(-edges(delta)/lengths(delta))
+      q = 0.5_wp*(1 + last) - 0.5_wp*(1 - last)*node
+      layer%speed = -law%stribeck_velocity*lengths(delta)*logarithm(q)
+      share = exponential(-(layer%speed/law%stribeck_velocity)**delta)
+      layer%force = layer%excess*share
+      associate (stretch => law%stribeck_velocity*lengths(delta)*0.5_wp*(1 - last)/q)
+        layer%weight = stretch*weight
+        do j = 1, points
+          layer%from_rest(:, j) = stretch(j)*integral(:, j)
+          layer%from_edge(:, j) = layer%weight(j) - layer%from_rest(:, j)
+        end do
+      end associate
+      layer%first_from_rest = matmul(layer%from_rest, share)
+      layer%first_from_edge = matmul(layer%from_edge, share)
+      layer%second_from_rest = 0.5_wp*matmul(layer%from_rest, share**2)
+      layer%second_from_edge = 0.5_wp*matmul(layer%from_edge, share**2)
+      ! A body that leaves a barrier within the layer is left to the event loop.
+      flow%slowest = layer%edge
+      flow%in_step = .false.
+      flow%machine%slow = max(flow%machine%slow, layer%edge)
+    end associate
+  end subroutine set_layer
 
   !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin; not available at resonance.
   pure subroutine set_response(from, flow)
@@ -135,17 +205,15 @@ contains
     end do
   end subroutine set_response
 
-  !> Puts a slipping body into a lane, which will fly it until `until` [s after the section]. `new`: without memory of
-  !> flights before.
-  pure subroutine occupy_lane(flow, lane, state, until, new, batch)
+  !> Puts a slipping body into a lane, which will fly it to the section. `new`: without memory of flights before.
+  pure subroutine occupy_lane(flow, lane, state, new, batch)
     type(lane_flow_t), intent(in) :: flow
     integer, intent(in) :: lane
     type(state_t), intent(in) :: state
-    real(wp), intent(in) :: until
     logical, intent(in) :: new
     type(lane_batch_t), intent(inout) :: batch
     batch%status(lane) = lane_fresh
-    batch%until(lane) = until
+    batch%until(lane) = flow%machine%period
     batch%time(lane) = state%time
     batch%x(lane) = state%x
     batch%v(lane) = state%v
@@ -165,6 +233,15 @@ contains
     state = state_t(x=batch%x(lane), v=batch%v(lane), time=batch%time(lane), mode=mode_slip_plus)
     if (batch%direction(lane) < 0) state%mode = mode_slip_minus
   end function lane_state
+
+  !> The body in a lane on the section number `section` that the lane passed over.
+  pure function section_state(batch, lane, section) result(state)
+    type(lane_batch_t), intent(in) :: batch
+    integer, intent(in) :: lane, section
+    type(state_t) :: state
+    state = state_t(x=batch%section_x(lane, section), v=batch%section_v(lane, section), mode=mode_slip_plus)
+    if (state%v < 0) state%mode = mode_slip_minus
+  end function section_state
 
   !> Moves what a lane has counted to a tally.
   pure subroutine take_counts(batch, lane, tally)

@@ -14,8 +14,8 @@ module contact_law
   implicit none
   private
 
-  public :: contact_of, add_to_contact, compliant_contact, barrier_positions, velocity_after_impact, restitution_at, &
-    contact_force, contact_margin, force_on_body
+  public :: contact_of, add_to_contact, compliant_contact, contact_at_speed, barrier_positions, velocity_after_impact, &
+    restitution_at, contact_force, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
     contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5
@@ -37,6 +37,8 @@ module contact_law
     real(wp) :: stiffness = 0, exponent = 1, damping = 0
     !> The force may pull.
     logical :: tension = .false.
+    !> `damping` is d, to be divided by the speed of each impact.
+    logical :: by_impact = .false.
   end type contact_t
 
 contains
@@ -126,12 +128,25 @@ contains
       law%kind = contact_hunt_crossley
       law%exponent = value_of(choice, 'exponent')
       if (any(restitution_formulas == choice%name)) then
-        law%damping = formula_damping(choice%name, value_of(choice, 'restitution'))/value_of(choice, 'speed')
+        law%damping = formula_damping(choice%name, value_of(choice, 'restitution'))
+        law%by_impact = .not. value_of(choice, 'speed') > 0
+        if (.not. law%by_impact) law%damping = law%damping/value_of(choice, 'speed')
       else
         law%damping = value_of(choice, 'damping')
       end if
     end select
   end function soft_of
+
+  !> The law of a contact that began with an impact at `speed` [m/s]; one that began without has no damping where each
+  !> impact sets its own.
+  pure elemental type(contact_t) function contact_at_speed(law, speed) result(now)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: speed
+    now = law
+    if (.not. law%by_impact) return
+    now%damping = 0
+    if (speed > 0) now%damping = law%damping/speed
+  end function contact_at_speed
 
   !> Upper and lower barrier, rigid or soft [m]; huge means none.
   pure function barrier_positions(law) result(positions)

@@ -79,8 +79,9 @@ module contact_rows
                     'e of a free body, released as `tension` says'), &
     (parameter_row_t('contact', restitution_formulas(i), 'restitution', '1', 0.0_wp, 1.0_wp, .true., .false., 0.0_wp, .false., &
                      'e that the formula is asked for'), i=1, size(restitution_formulas)), &
-    (parameter_row_t('contact', restitution_formulas(i), 'speed', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'impact speed at which it is asked for: a = d/speed'), i=1, size(restitution_formulas)), &
+    (parameter_row_t('contact', restitution_formulas(i), 'speed', 'm/s', 0.0_wp, none_above, .false., .true., &
+                     0.0_wp, .false., 'impact speed at which it is asked for: a = d/speed; 0 = that of each impact'), &
+                     i=1, size(restitution_formulas)), &
     (parameter_row_t('contact', soft_laws(i), 'tension', '1', 0.0_wp, 1.0_wp, .false., .true., 1.0_wp, .false., &
                      '1: pulls until p = 0; 0: the force is cut off at zero'), i=1, 2), &
     (parameter_row_t('contact', barrier_laws(i), 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &

@@ -59,7 +59,8 @@ module law_table
               'calibrated stand-in for the drive of Lemes et al.'), &
     law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
               'geometry derived from '//lemes), &
-    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats after the last', '')]
+    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats after the last', &
+              'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)')]
 
   type(parameter_row_t), parameter :: other_parameters(36) = [ &
     parameter_row_t('body', 'point_mass', 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &

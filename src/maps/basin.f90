@@ -11,6 +11,7 @@ module basin
   use match, only: carry_labels, number_new, remember
   use lanes, only: prepare_lanes
   use motion, only: motion_t
+  use pair, only: is_pair
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
@@ -95,9 +96,11 @@ contains
       return
     end if
     allocate (starts(3, 0))
+    ! A start has no place for the driving body of two.
+    if (is_pair(grid%laws)) return
     do i = 1, size(neighbours)
       if (neighbours(i)%rests) cycle
-      starts = reshape([starts, neighbours(i)%points(:, 1), 0.0_wp], [3, size(starts, 2) + 1])
+      starts = reshape([starts, neighbours(i)%points(:2, 1), 0.0_wp], [3, size(starts, 2) + 1])
     end do
   end function search_starts
 

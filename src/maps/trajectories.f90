@@ -7,12 +7,12 @@ module trajectories
   use attractors, only: attractor_t
   use kinds, only: wp
   use lanes, only: fly_lanes, lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_state, lane_stopped, &
-    occupy_lane, take_counts
+    most_sections, occupy_lane, section_state, take_counts
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus
   use status, only: reason_event_budget
-  use trajectory, only: begin_course, conclude, course_t, go_to_stop, outcome_t, pass_stop, phase_over, phase_window, &
-    run_trajectory, span_t
+  use trajectory, only: begin_course, conclude, course_t, go_past_turn, go_to_stop, outcome_t, pass_stop, phase_over, &
+    phase_window, run_trajectory, sections_ahead, span_t
   implicit none
   private
 
@@ -61,7 +61,7 @@ contains
     do while (any(passengers%start > 0))
       call fly_lanes(journey%flow, batch)
       do lane = 1, lane_count
-        if (passengers(lane)%start == 0) cycle
+        if (passengers(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
         call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, &
                     outcomes(passengers(lane)%start))
         if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, &
@@ -95,7 +95,8 @@ contains
         call go_on(journey, catalogue, start, passenger, outcome)
       end associate
       if (passenger%course%phase /= phase_over) then
-        call occupy_lane(journey%flow, lane, passenger%course%state, passenger%course%until, .true., batch)
+        call occupy_lane(journey%flow, lane, passenger%course%state, .true., batch)
+        call send_on(journey, passenger%course, lane, batch)
         return
       end if
     end do
@@ -103,7 +104,19 @@ contains
     batch%status(lane) = lane_idle
   end subroutine board
 
-  !> A lane that has stopped, or is left to the event loop up to its stop.
+  !> Tells a lane where to stop.
+  pure subroutine send_on(journey, course, lane, batch)
+    type(journey_t), intent(in) :: journey
+    type(course_t), intent(in) :: course
+    integer, intent(in) :: lane
+    type(lane_batch_t), intent(inout) :: batch
+    batch%until(lane) = course%until
+    if (journey%flow%in_step) return
+    batch%sections(lane) = min(most_sections, sections_ahead(journey%moving, journey%span, course))
+    batch%passed(lane) = 0
+  end subroutine send_on
+
+  !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
   pure subroutine attend(journey, catalogue, start, lane, passenger, batch, outcome)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
@@ -112,23 +125,35 @@ contains
     type(passenger_t), intent(inout) :: passenger
     type(lane_batch_t), intent(inout) :: batch
     type(outcome_t), intent(inout) :: outcome
-    logical :: slipped, left
+    logical :: slipped, left, taken
+    integer :: section
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
-    slipped = .true.
     associate (course => passenger%course)
+      do section = 1, int(batch%passed(lane))
+        course%state = section_state(batch, lane, section)
+        call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
+      end do
       course%state = lane_state(batch, lane)
       call take_counts(batch, lane, course%tally)
-      if (left) call go_to_stop(journey%moving, course, slipped)
       if (course%tally%events > journey%moving%options%event_budget) course%reason = reason_event_budget
-      call pass_stop(journey%moving, catalogue, journey%span, slipped, course, outcome)
-      if (.not. left .and. flies(journey, course)) then
-        passenger%unseen = passenger%unseen .or. course%phase == phase_window
-        batch%status(lane) = lane_flying
-        batch%until(lane) = course%until
-        return
+      taken = .false.
+      if (left .and. course%reason == 0) then
+        if (.not. journey%flow%in_step) then
+          call go_past_turn(journey%moving, journey%flow%slowest, course)
+          taken = course%reason == 0 .and. course%state%time < course%until .and. flies(journey, course)
+        end if
+        if (course%reason == 0 .and. .not. taken) call go_to_stop(journey%moving, course, slipped)
       end if
-      call go_on(journey, catalogue, start, passenger, outcome)
-      if (course%phase /= phase_over) call occupy_lane(journey%flow, lane, course%state, course%until, .false., batch)
+      if (.not. taken) call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
+      if (.not. taken .and. (left .or. .not. flies(journey, course))) then
+        call go_on(journey, catalogue, start, passenger, outcome)
+        taken = course%phase /= phase_over
+        if (.not. taken) return
+      end if
+      passenger%unseen = passenger%unseen .or. course%phase == phase_window
+      batch%status(lane) = lane_flying
+      if (taken) call occupy_lane(journey%flow, lane, course%state, .false., batch)
+      call send_on(journey, course, lane, batch)
     end associate
   end subroutine attend
 
@@ -151,18 +176,18 @@ contains
         ! It was captured when its window began, and lost: once more, in the event loop.
         call run_trajectory(journey%moving, catalogue, journey%span, start(1), start(2), start(3), outcome)
       else
-        call conclude(catalogue, course, outcome)
+        call conclude(journey%moving, catalogue, course, outcome)
       end if
     end associate
   end subroutine go_on
 
-  !> Whether a lane can take a course: it slips, and nobody needs the extremes of its window.
+  !> Whether a lane can take a course: it slips fast enough, and nobody needs the extremes of its window.
   pure logical function flies(journey, course)
     type(journey_t), intent(in) :: journey
     type(course_t), intent(in) :: course
     flies = (course%state%mode == mode_slip_plus .or. course%state%mode == mode_slip_minus) .and. &
-      course%phase /= phase_over .and. (course%phase /= phase_window .or. course%captured > 0 .or. &
-                                        journey%describe == describe_regime)
+      abs(course%state%v) >= journey%flow%slowest .and. course%phase /= phase_over .and. &
+      (course%phase /= phase_window .or. course%captured > 0 .or. journey%describe == describe_regime)
   end function flies
 
 end module trajectories

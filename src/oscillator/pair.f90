@@ -15,7 +15,7 @@ module pair
   implicit none
   private
 
-  public :: build_pair, is_pair
+  public :: build_pair, is_pair, impact_mass
 
   !> How m1 is driven: by a force, by its motion being given, by a controller that follows a reference.
   integer, parameter, public :: driven_by_force = 0, driven_by_motion = 1, driven_by_controller = 2
@@ -81,13 +81,6 @@ contains
                     'none, viscous: it acts between the ground and the driving body')
           return
         end if
-      case ('contact')
-        machine%contact = contact_of(choices(i), machine%driven_mass)
-        if (machine%contact%soft) then
-          call fail(error, exit_bad_case, 'contact.law: found "'//trim(choices(i)%name)//'", allowed with two bodies none, '// &
-                    'newton, newton_linear, newton_power, newton_viscoelastic')
-          return
-        end if
       case ('drive')
         call take_drive(choices(i), machine, error)
         if (allocated(error)) return
@@ -96,6 +89,9 @@ contains
                   'body.law = "point_mass"')
         return
       end select
+    end do
+    do i = 1, size(choices)
+      if (choices(i)%family == 'contact') machine%contact = contact_of(choices(i), impact_mass(machine))
     end do
     positions = barrier_positions(machine%contact)
     machine%upper = positions(1)
@@ -106,6 +102,14 @@ contains
       machine%period = two_pi*sqrt((machine%mass + machine%driven_mass)/machine%stiffness)
     end if
   end subroutine build_pair
+
+  !> The mass that an impact between the two bodies sees, or of m2 with the ground or with a given motion [kg].
+  pure real(wp) function impact_mass(machine)
+    type(pair_t), intent(in) :: machine
+    impact_mass = machine%driven_mass
+    if (machine%carried .and. machine%drive /= driven_by_motion) impact_mass = &
+      machine%mass*machine%driven_mass/(machine%mass + machine%driven_mass)
+  end function impact_mass
 
   pure subroutine take_bodies(choice, machine)
     type(law_choice_t), intent(in) :: choice

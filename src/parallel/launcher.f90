@@ -6,7 +6,7 @@ module launcher
   implicit none
   private
 
-  public :: launched_ranks, launched_rank
+  public :: launched_ranks, launched_rank, with_component
 
 contains
 
@@ -22,6 +22,24 @@ contains
     if (launched_ranks() > 1) launched_rank = number_in([character(len=20) :: 'OMPI_COMM_WORLD_RANK', 'PMI_RANK', &
                                                          'SLURM_PROCID'], 0)
   end function launched_rank
+
+  !> OpenMPI's list of `components` of a framework such that `needed` may be chosen; the others keep their precedence. A
+  !> list that begins with ^ names those that may not; '' = the default, all of them.
+  pure function with_component(components, needed) result(list)
+    character(len=*), intent(in) :: components, needed
+    character(len=:), allocatable :: list
+    integer :: comma
+    logical :: excludes
+    list = ''
+    if (components == '') return
+    excludes = components(1:1) == '^'
+    list = ','//components(merge(2, 1, excludes):)//','
+    comma = index(list, ','//needed//',')
+    if (excludes .and. comma > 0) list = list(:comma)//list(comma + len(needed) + 2:)
+    if (.not. excludes .and. comma == 0) list = list//needed//','
+    list = list(2:len(list) - 1)
+    if (excludes .and. len(list) > 0) list = '^'//list
+  end function with_component
 
   !> The first of the environment variables that holds a number.
   integer function number_in(names, default)

@@ -56,6 +56,8 @@ contains
     end do
     options%flight = flight
     options%event_budget = event_budget
+    ! Its tolerance asks for more steps than the results that it judges took.
+    options%step_budget = huge(options%step_budget)
     options%tolerance = numbers(1)
     options%domain = numbers(2)
     span = span_t(real(numbers(3), wp), real(numbers(4), wp), real(numbers(5), wp), numbers(6) > 0)

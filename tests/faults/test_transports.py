@@ -7,6 +7,21 @@ import re
 import subprocess
 
 import pytest
+from life import run, write_case
+
+SMALL = ["--set", "axis[1].count=8", "--set", "axis[2].count=8", "--set", "attractors.sample=4"]
+
+
+@pytest.mark.parametrize("chosen", ["pt2pt", "ucx", "^sm,ucx"])
+def test_a_choice_without_shared_memory(mpi_separatrix, tmp_path, long_if, monkeypatch, chosen):
+    """What the user chose stays chosen, and the run has what it needs besides."""
+    long_if(chosen == "ucx")
+    monkeypatch.setenv("OMPI_MCA_osc", chosen)
+    write_case(tmp_path)
+    outcome = run(mpi_separatrix, "basin", "case.toml", *SMALL, "-o", "map.h5", folder=tmp_path, ranks=2)
+    assert outcome.code == 0, outcome
+    used = {"pt2pt": "pt2pt,sm", "ucx": "ucx,sm", "^sm,ucx": "^ucx"}[chosen]
+    assert f"OMPI_MCA_osc={used}" in run(mpi_separatrix, "info", "map.h5", folder=tmp_path).out
 
 
 @pytest.mark.parametrize("transport", ["sm", "pt2pt,sm", "ucx,sm"])

@@ -51,6 +51,7 @@ BAD_CASES = {
         ["friction.kinetic", "-0.2", "0.0"],
     ),
     "missing": ("mass = 1.0", "", ["body.mass", "missing"]),
+    "nul": ('title = "Coulomb', 'title = "Cou\\u0000lomb', ["title", "control character"]),
     "nan": ("mass = 1.0", "mass = nan", ["body.mass", "nan", "finite number"]),
     "infinity": ("ratio = 1.2", "ratio = inf", ["drive.ratio", "inf", "finite number"]),
     "barrier": (

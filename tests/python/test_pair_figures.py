@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from program import succeed
-from separatrix import cli, contact, pair, style, trajectory
+from separatrix import cli, contact, energy, pair, pair_sweep, style, trajectory
 from separatrix.open import open_result
 
 
@@ -33,7 +33,7 @@ def test_energy_adds_up(separatrix, source_dir, tmp_path):
     """The top of what is stacked is the line of what was put in."""
     path = file_of(separatrix, source_dir, tmp_path, "pair_free")
     with open_result(path) as result, style.context():
-        figure = pair.energy(result, "free pair")
+        figure = energy.decomposition(result, "free pair", [])
         top = max(
             (piece.get_paths()[0].vertices[:, 1].max() for piece in figure.axes[0].collections), default=0
         )
@@ -68,11 +68,33 @@ def test_linear_damping_jumps_and_pulls(separatrix, source_dir, tmp_path):
     assert force[-1] < -0.02 * force.max()
 
 
+def test_books_of_one_body_close_at_every_sample(separatrix, source_dir, tmp_path):
+    examples = ("contact_hunt_crossley", "trajectory_coulomb_1.05", "trajectory_stribeck_1.2_impact")
+    for example in examples:
+        with open_result(file_of(separatrix, source_dir, tmp_path, example)) as result:
+            spent = result["friction_loss"] + result["damping_loss"] + result["contact_loss"]
+            missing = result.attrs["energy_start"] + result["drive_work"] - spent - result["energy"]
+            assert np.abs(missing).max() < 1e-10 * float(result.attrs["energy_start"] + spent[-1])
+            np.testing.assert_allclose(result["kinetic_energy"], 0.5 * result["v"] ** 2, rtol=1e-14)
+
+
+def test_regimes_along_a_sweep(separatrix, source_dir, tmp_path):
+    """Stick and slip begins at kappa = 2/sqrt(4 + pi^2), stick for ever at 1, to four digits and more."""
+    path = tmp_path / "kappa.h5"
+    succeed(separatrix, "sweep", source_dir / "examples/sweep_pair_kappa.toml", "-o", path, folder=tmp_path)
+    with open_result(path) as result, style.context():
+        spans = pair_sweep.spans(result, "body_friction")
+        pair_sweep.regimes(result, "body_friction", "kappa")
+    assert [regime for _, _, regime in spans] == ["non_impact", "sticking", "stuck"]
+    assert spans[0][1] == pytest.approx(2 / np.sqrt(4 + np.pi**2), abs=2e-6)
+    assert spans[1][1] == pytest.approx(1, abs=2e-6)
+
+
 @pytest.mark.parametrize(
     ("example", "names"),
     [
         ("pair_free", ["history", "energy", "phase"]),
-        ("contact_hunt_crossley", ["history", "contact", "phase"]),
+        ("contact_hunt_crossley", ["history", "energy", "contact", "phase"]),
     ],
 )
 def test_figures_are_written(separatrix, source_dir, tmp_path, example, names):

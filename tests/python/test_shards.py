@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map in shares, merged, is the map; what is no set of shares is refused."""
+"""A map or a list in shares, merged, is the map or the list; what is no set of shares is refused."""
 
 import shutil
 from pathlib import Path
@@ -12,6 +12,7 @@ from program import STACK, differences, listing, run, succeed, write_case
 
 SMALL = ["--set", "grid.tile=[4, 5]"]
 COMMAND = ["basin", "case.toml", *SMALL, "-o", "map.h5"]
+LIST = ["points", "case.toml", "--list", "starts.csv"]
 
 
 def part(number: int, count: int) -> str:
@@ -78,6 +79,97 @@ def test_a_cut_share_is_mended_by_resume(mpi_separatrix, folder):
     outcome = succeed(mpi_separatrix, *COMMAND, "--shard", "2/3", "--resume", folder=folder, ranks=2)
     succeed(mpi_separatrix, *merging, folder=folder)
     assert differences(folder / "whole.h5", folder / "map.h5") == []
+
+
+@pytest.fixture(scope="module")
+def lists(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a list of starts, its results and its two shares. Not to be changed."""
+    folder = tmp_path_factory.mktemp("lists")
+    write_case(folder)
+    rows = [f"{i / 600},{i % 13 - 6},{0.8 + 0.5 * (i // 100) / 6}" for i in range(600)]
+    (folder / "starts.csv").write_text("x0,v0,ratio\n" + "\n".join(rows) + "\n")
+    succeed(separatrix, *LIST, "-o", "whole.h5", "--csv", "whole.csv", folder=folder)
+    for number in (1, 2):
+        succeed(separatrix, *LIST, "-o", "map.h5", "--shard", f"{number}/2", folder=folder)
+    return folder
+
+
+def test_a_list_in_shares(mpi_separatrix, lists, tmp_path):
+    folder = shutil.copytree(lists, tmp_path / "copy")
+    # A share of several ranks that is begun again is the same share.
+    share = folder / part(2, 2)
+    share.unlink()
+    succeed(mpi_separatrix, *LIST, "-o", "map.h5", "--shard", "2/2", folder=folder, ranks=2)
+    merging = ["merge", "map.h5", part(2, 2), part(1, 2), "--csv", "map.csv"]
+    succeed(mpi_separatrix, *merging, folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+    assert (folder / "map.csv").read_bytes() == (folder / "whole.csv").read_bytes()
+
+
+def test_shares_of_lists_and_of_maps_do_not_mix(separatrix, lists, shares, tmp_path):
+    names = [lists / part(1, 2), shares / part(2, 3)]
+    for first, second in (names, names[::-1]):
+        outcome = run(separatrix, "merge", "map.h5", first, second, folder=tmp_path)
+        assert outcome.code in (65, 76), outcome
+    with h5py.File(lists / part(1, 2)) as file:
+        changed = file["v0"][()]
+    copy = shutil.copytree(lists, tmp_path / "copy")
+    with h5py.File(copy / part(1, 2), "r+") as file:
+        file["v0"][...] = changed + 1
+    outcome = run(separatrix, "merge", "map.h5", part(1, 2), part(2, 2), folder=copy)
+    assert outcome.code == 76 and "another case" in outcome.err
+
+
+def test_a_share_takes_the_attractors_of_another(separatrix, folder):
+    """As bits of a made-up catalogue show, which is neither searched again nor compared with anything."""
+    with h5py.File(folder / part(1, 3)) as file:
+        searched = file["shard/catalogue"][()]
+    (folder / part(2, 3)).unlink()
+    taking = [*COMMAND, "--shard", "2/3", "--catalogue", part(1, 3)]
+    succeed(separatrix, *taking, "--set", "attractors.sample=32", folder=folder)
+    with h5py.File(folder / part(2, 3)) as file:
+        assert np.array_equal(file["shard/catalogue"][()], searched)
+    succeed(separatrix, "merge", "map.h5", *(part(i, 3) for i in (1, 2, 3)), folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+    with h5py.File(folder / part(1, 3), "r+") as file:
+        # The second attractor's label; slice, number and the first one are before it.
+        size = (len(searched) - 2) // 2
+        file["shard/catalogue"][2 + size] = 7
+    succeed(separatrix, *taking, "--force", folder=folder)
+    with h5py.File(folder / part(2, 3)) as file:
+        assert set(np.unique(file["attractor"][()])) <= {0, 1, 7}
+
+
+@pytest.mark.parametrize(
+    ("source", "change", "code"),
+    [
+        ("whole.h5", [], 65),
+        ("nowhere.part", [], 66),
+        ("case.toml", [], 74),
+        (part(1, 3), ["--set", "drive.ratio=1.21"], 76),
+        (part(1, 3), ["--set", "attractors.sample=31"], 76),
+    ],
+)
+def test_what_has_no_attractors_for_this_map(separatrix, folder, source, change, code):
+    before = listing(folder)
+    outcome = run(
+        separatrix, "basin", "case.toml", *change, "-o", "new.h5", "--catalogue", source, folder=folder
+    )
+    assert (outcome.code, outcome.out) == (code, "")
+    assert source in outcome.err
+    assert listing(folder) == before
+
+
+@pytest.mark.parametrize(("at", "value"), [(0, 2.0), (0, -1.0), (0, np.nan), (1, 3.0), (1, -1.0), (1, 1e300)])
+def test_a_damaged_catalogue_is_refused(separatrix, folder, at, value):
+    """Not read beyond its end, nor into a slice that there is not."""
+    for number in (1, 2, 3):
+        with h5py.File(folder / part(number, 3), "r+") as file:
+            file["shard/catalogue"][at] = value
+    outcome = run(separatrix, "merge", "map.h5", *(part(i, 3) for i in (1, 2, 3)), folder=folder)
+    assert outcome.code == 74 and "catalogue" in outcome.err, outcome
+    taking = ["basin", "case.toml", "-o", "new.h5", "--catalogue", part(1, 3)]
+    assert run(separatrix, *taking, folder=folder).code == 74
 
 
 def test_more_shares_than_tiles(separatrix, tmp_path):

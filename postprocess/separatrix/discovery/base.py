@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The base machine fitted honestly: noise measured on the way, phases found, several starts if one is not enough."""
+"""The base machine fitted honestly: noise measured, phases found, several starts."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.fit import Fit, again
 from separatrix.discovery.machine import Free, base_parameters, drive_nuisances
 from separatrix.discovery.noise import noise_of
 from separatrix.discovery.problem import Problem
@@ -14,6 +15,10 @@ from separatrix.discovery.refit import Fitted
 
 _PHASES = 12
 _DISAGREEMENT = 1.3
+_RENEWED = 0.03
+_RENEWED_MEMORY = 0.06
+# reduced chi^2 above which correlated residuals say more about the model than about the noise
+_MISFIT = 1.5
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
@@ -22,11 +27,11 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     free = base_parameters(model, force) + drive_nuisances(model, [one.phase_known for one in data.prepared])
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
-    for _ in range(2):
-        problem, fit = fit_stages(data, model, free, values, stages=[0])
-        measure_noise(data, problem, fit, mass)
-        values = fit.values
-    problem, fit = fit_stages(data, model, free, values, stages=[0, *range(1, data.last + 1)])
+    problem, fit = fit_stages(data, model, free, values, stages=[0, 1])
+    measure_noise(data, problem, fit, mass)
+    problem, fit = fit_stages(
+        data, model, free, fit.values, stages=list(range(1, data.last + 1)), begin=(1, fit)
+    )
     best = Fitted((), model, problem, fit, ())
     if not fit.converged or fit.reduced_chi2 > 2:
         # from the case as it stands, at the full length at once, and on from where the first try ended
@@ -40,24 +45,48 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     return best
 
 
-def measure_noise(data: Data, problem: Problem, fit, mass: float) -> None:
-    """Set what the records do not state, and doubt what they state if the samples scatter more."""
+def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
+    """Set what the records do not state, and doubt what they state if the samples scatter more.
+
+    The fit must have been made without memory.
+    """
+    factors, memory = noise_of(problem, fit, 0, mass)
+    before = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     for number, prepared in enumerate(data.prepared):
-        factor, memory = noise_of(problem, fit, number, 0, mass)
-        prepared.memory = memory
-        measured = prepared.sigma * factor
+        measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
         elif measured > _DISAGREEMENT * prepared.sigma:
             prepared.note(
                 f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
             )
-        if prepared.record.v is not None and not prepared.velocity_sigma_stated:
-            prepared.velocity_sigma *= noise_of(problem, fit, number, 1, mass)[0]
+    if any(one.record.v is not None for one in data.prepared):
+        factors, _ = noise_of(problem, fit, 1, mass)
+        for number, prepared in enumerate(data.prepared):
+            if prepared.record.v is not None and not prepared.velocity_sigma_stated:
+                prepared.velocity_sigma *= factors.get(number, 1.0)
+    scatter = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
+    misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
+    for prepared in data.prepared:
+        prepared.memory = memory if misfit < _MISFIT else 0.0
+
+
+def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
+    """Measure the noise anew by a better fit; whether it changed enough to matter."""
+    before = [(one.sigma, one.velocity_sigma, one.memory) for one in data.prepared]
+    for one in data.prepared:
+        one.memory = 0.0
+    measure_noise(data, problem, again(problem, fit), mass)
+    return any(
+        abs(np.log(one.sigma / sigma)) > _RENEWED
+        or (one.record.v is not None and abs(np.log(one.velocity_sigma / speed)) > _RENEWED)
+        or abs(one.memory - memory) > _RENEWED_MEMORY
+        for one, (sigma, speed, memory) in zip(data.prepared, before, strict=True)
+    )
 
 
 def find_phases(data: Data, model, free: list[Free]) -> None:
-    """Search the crank angle of the records that do not state it, on short segments with all else as in the case."""
+    """Search the crank angle of the records that do not state it, all else as in the case."""
     missing = [i for i, one in enumerate(data.prepared) if one.frequency is not None and not one.phase_stated]
     if not missing:
         return

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the most flexible machine could still explain: forces that depend smoothly on speed, place, phase and time.
+"""What the most flexible machine could still explain: forces that depend smoothly on speed, place, phase and
+time.
 
-A family of forces (and of kicks at impacts) is tried at once on what a fit left over, linearised. Under a right model the
-gain of a family is a chi^2 of its rank. The family of pieces gives each segment forces of its own and so
-sees what no function of the state can say.
+A family of forces (and of kicks at impacts) is tried at once on what a fit left over, linearised. Under a
+right model the gain of a family is a chi^2 of its rank. The family of pieces gives each segment forces of its
+own and so sees what no function of the state can say.
 """
 
 from dataclasses import dataclass
@@ -34,7 +35,7 @@ class Family:
 
 @dataclass
 class Ceiling:
-    """All families; `gain` is the largest excess of a gain over its rank, `p` is corrected for their number."""
+    """All families; `p` is corrected for their number."""
 
     families: list[Family]
 
@@ -83,7 +84,7 @@ def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
 
 
 def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int]:
-    """Forces of each segment by itself, constant over fifths of it; the common parameters stay where they are."""
+    """Forces of each segment by itself, constant over fifths of it; common parameters stay."""
     inside = problem.segments.inside
     lengths = inside.sum(axis=1)
     piece = np.minimum(np.arange(inside.shape[1])[None, :] * _PIECES // lengths[:, None], _PIECES - 1)
@@ -115,8 +116,13 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     }
     if phase is not None:
         waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
-        forces["phase"] = np.stack(waves + [f(4 * phase) for f in (np.sin, np.cos)], axis=2)
+        forces["phase"] = np.stack(
+            waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2
+        )
         forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
+    since = after_impacts(problem, fit)
+    if np.isfinite(since).sum() > 100:
+        forces["time since impact"] = _splines(since, 12)
     made = {name: force_columns(problem, fit, values, mass) for name, values in forces.items()}
     kicks = impact_kicks(problem, fit, state)
     if kicks is not None:
@@ -125,7 +131,7 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
 
 
 def motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
-    """Position, velocity, crank angle and time (in [-1, 1] over each record) at the samples, scaled to about 1."""
+    """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
     inside = problem.segments.inside
     x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
     good = inside & fit.good[:, None]
@@ -177,12 +183,14 @@ def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
 
 def _splines(values: np.ndarray, count: int) -> np.ndarray:
     """Cubic B-splines over the middle 98 % of the values, knots at their quantiles."""
-    flat = values[np.isfinite(values) & (values != 0)]
+    known = np.isfinite(values)
+    flat = values[known & (values != 0)]
     inner = np.quantile(flat, np.linspace(0.01, 0.99, count - 2))
     inner += np.arange(inner.size) * 1e-9
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    clipped = np.clip(values, knots[0], knots[-1])
-    return BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
+    clipped = np.clip(np.where(known, values, knots[0]), knots[0], knots[-1])
+    table = BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
+    return table * known[:, :, None]
 
 
 def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from pathlib import Path
 from separatrix.discovery.catalogue import BY_NAME
 from separatrix.discovery.extend import write_all
 from separatrix.discovery.options import Options
+from separatrix.discovery.report import write_report
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.version import __version__
@@ -45,6 +46,7 @@ def _run(chosen: argparse.Namespace) -> None:
     )
     verdict, findings = investigate(chosen.base, chosen.records, chosen.hold_out, options, chosen.rest)
     written = write_all(chosen.out, verdict, findings)
+    written += write_report(chosen.out, chosen.base, options)
     for line in summary(verdict):
         print(line)
     for path in written:
@@ -121,8 +123,8 @@ def _seed(text: str) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="separatrix-discover",
-        description="Find where measured records and a case disagree, name the missing effect, add it, and prove it.",
-        epilog="Exit codes: 0 done (whatever the verdict), 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
+        description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
+        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

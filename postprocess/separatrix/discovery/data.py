@@ -11,6 +11,7 @@ from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.machine import Free
 from separatrix.discovery.preflight import Prepared
 from separatrix.discovery.problem import Problem
+from separatrix.discovery.rescue import rescued
 from separatrix.discovery.segments import Segments, cut
 from separatrix.discovery.smoother import Smoothed, smooth
 
@@ -40,8 +41,18 @@ class Data:
             [self.smoothed[r].state[a, :2] for r, a in zip(segments.record, segments.first, strict=True)]
         ).reshape(-1, 2)
 
+    def smoothed_errors(self, stage: int) -> np.ndarray:
+        """Standard errors of those starts."""
+        segments = self.stages[stage]
+        return np.array(
+            [
+                np.sqrt(np.diag(self.smoothed[r].covariance[a])[:2])
+                for r, a in zip(segments.record, segments.first, strict=True)
+            ]
+        ).reshape(-1, 2)
+
     def carried_starts(self, stage: int, known: int, fit: Fit) -> np.ndarray:
-        """Starts of a stage from the motion fitted at stage `known`, and from the smoother where it failed."""
+        """Starts of a stage from the motion fitted at stage `known`; from the smoother where it failed."""
         starts = self.smoothed_starts(stage)
         old, new = self.stages[known], self.stages[stage]
         for r, record in enumerate(self.prepared):
@@ -113,7 +124,17 @@ def fit_stages(
             fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
             values = fit.values
         known = (stage, fit)
-    return problem, fit
+    return problem, polished(data, problem, fit, stages[-1], most, fixed)
+
+
+def polished(
+    data: Data, problem: Problem, fit: Fit, stage: int, most: int, fixed: np.ndarray | None = None
+) -> Fit:
+    """The fit after its suspicious segments were tried from other starts."""
+    starts, improved = rescued(problem, fit, data.smoothed_starts(stage), data.smoothed_errors(stage))
+    if not improved.any():
+        return fit
+    return minimise(problem, fit.values, starts, most=most, fixed=fixed)
 
 
 def scales_of(data: Data, model) -> Scales:

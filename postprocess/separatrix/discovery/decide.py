@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forward selection: which effects, if any, may be named; what cannot be told apart; what the catalogue lacks."""
+"""Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
 
 from dataclasses import dataclass, field
 
-from separatrix.discovery.catalogue import BY_NAME
+from separatrix.discovery.base import copy_noise, renew_noise
+from separatrix.discovery.catalogue import BY_NAME, candidate
 from separatrix.discovery.ceiling import Ceiling, ceiling
+from separatrix.discovery.data import fit_stages
 from separatrix.discovery.heldout import Prediction
 from separatrix.discovery.judge import (
     Judged,
@@ -16,8 +18,10 @@ from separatrix.discovery.judge import (
     judged,
     stable,
 )
+from separatrix.discovery.machine import with_values
 from separatrix.discovery.refit import Fitted, refit
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.screen import screen, signature
 
 _PAIRS = 6
 _INCLUSION = 0.9
@@ -46,7 +50,13 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     foretold = bench.foretell(base)
     bench.options.progress("looking for a gap", 0.15)
     gap = ceiling(base.problem, base.fit, bench.scales.mass)
-    first = run_round(bench, base, foretold, 0.2, 0.75)
+    first = run_round(bench, base, foretold, 0.2, 0.6)
+    again = remeasured(bench, first)
+    if again is not None:
+        base = again
+        foretold = bench.foretell(base)
+        gap = ceiling(base.problem, base.fit, bench.scales.mass)
+        first = run_round(bench, base, foretold, 0.6, 0.75)
     decision = Decision("none", [], [], [], [first], gap, foretold)
     if not first.judged:
         return _without_name(bench, decision)
@@ -61,9 +71,28 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     return _with_more(bench, decision, base, best, rivals)
 
 
+def remeasured(bench: Bench, first: Round) -> Fitted | None:
+    """The base fitted again where the best candidate shows that the noise is another."""
+    leaders = [one for one in first.judged if one.fitted.fit.converged]
+    if not leaders:
+        return None
+    best = leaders[0].fitted
+    if not renew_noise(bench.training, best.problem, best.fit, bench.scales.mass):
+        return None
+    if bench.held_out is not None and leaders[0].prediction is not None:
+        held = leaders[0].prediction
+        renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
+        copy_noise(bench.training, bench.held_out)
+    base = first.base
+    free = with_values(base.problem.free, base.fit.values)
+    stages = [bench.training.last]
+    problem, fit = fit_stages(bench.training, base.model, free, base.fit.values, stages=stages, most=30)
+    return Fitted(base.names, base.model, problem, fit, base.added)
+
+
 def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one)[0]]
+    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
     pool = converged or found.judged
     best = pool[0]
     scale = max(1.0, best.fitted.fit.reduced_chi2)
@@ -81,7 +110,7 @@ def _pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], 
         helps = any(low > 0 for low, _ in bounds)
         best.gates["hold-out"] = bool(helps and all(high > _HARM for _, high in bounds))
     best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best)[0]
+    best.gates["admissible"] = admissible(best, base)[0]
     best.gates["stable"] = stable(best, base, options) >= _INCLUSION
 
 
@@ -120,7 +149,7 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     if decision.base_ceiling.p < 0.3 * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
-            f"forces that depend on {decision.base_ceiling.best.name} would explain more than chance, no effect does"
+            f"forces that depend on {decision.base_ceiling.best.name} would explain more, no effect does"
         )
     return decision
 
@@ -141,7 +170,7 @@ def _with_more(
             if made is not None:
                 pairs.append(_over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one)[0]]
+    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
     if not pairs:
         return _give_up(decision)
     pairs.sort(key=lambda one: -one.evidence)
@@ -183,10 +212,6 @@ def _fit_pair(bench: Bench, found: Round, one: str, other: str) -> Fitted | None
         one, other = other, one
     if one not in singles:
         return None
-    from separatrix.discovery.catalogue import candidate
-    from separatrix.discovery.machine import with_values
-    from separatrix.discovery.screen import screen, signature
-
     fitted = singles[one].fitted
     free = with_values(fitted.problem.free, fitted.fit.values)
     made = candidate(fitted.model, free, fitted.names, other, bench.scales)

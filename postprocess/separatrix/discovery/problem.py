@@ -17,7 +17,8 @@ _CLOCK_STEP = 1e-6
 
 @dataclass
 class Evaluation:
-    """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…, p).
+    """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…,
+    p).
 
     `used` is 0 where a segment was given up by the simulator or has no sample; `steady` is false where the
     sequence of impacts would change under a small step, so that the derivatives mean nothing.
@@ -210,6 +211,10 @@ class Problem:
                 return float(value)
         return absent
 
+    def crank_angle(self, number: int, values: np.ndarray, t: float) -> float:
+        """Angle of the crank at time `t` of a record [rad]."""
+        return float(self._crank(number, {"starts": np.array([t])}, values)[0])
+
     def _crank(self, number: int, part: dict, values: np.ndarray) -> np.ndarray:
         prepared = self.prepared[number]
         if prepared.frequency is None:
@@ -237,7 +242,7 @@ class Problem:
         return active, given, chain
 
     def _ratio_slope(self, one: Free, number: int, chosen: dict[str, float]) -> float:
-        """How drive.ratio follows a parameter, so that the frequency of the drive stays that of the record."""
+        """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
         ratio = chosen["drive.ratio"]
         if one.path == "nuisance:clock" and one.record == number:
             return ratio

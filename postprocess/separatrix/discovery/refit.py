@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.catalogue import Candidate
-from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.data import Data, fit_stages, polished
 from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.problem import Problem
 from separatrix.discovery.screen import Screened
@@ -15,6 +15,10 @@ from separatrix.discovery.screen import Screened
 # a fit this good needs no other start
 _FINE = 1.03
 _HOPELESS = 4.0
+# log-likelihood by which a candidate is out of the race
+_BEATEN = 15.0
+# usual sizes beyond which a linearised estimate is not believed
+_FARTHEST = 25.0
 
 
 @dataclass
@@ -52,38 +56,50 @@ def refit(
     base: Fitted,
     candidate: Candidate,
     screened: Screened | None,
+    rival: Fitted | None = None,
     quick: bool = False,
-    floor: float = 0.0,
 ) -> Fitted:
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
-    `floor`: the reduced chi^2 that is good enough, that of noise as far as it is known.
+    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
+    is not tried further.
     """
     best = None
-    tries = 0
     values = _base_values(base, candidate)
-    for kind, start in _starts(candidate, screened):
-        tries += 1
+    settled = rival is not None and rival.fit.converged and rival.fit.reduced_chi2 < _FINE
+    for tries, (kind, start) in enumerate(_starts(candidate, screened), start=1):
         tried = values.copy()
         tried[list(candidate.added)] = start
-        if kind == "linear":
-            problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-            fit = minimise(problem, tried, base.fit.starts, most=25)
-        else:
-            stages = list(range(data.last + 1)) if kind == "far" else [1, data.last]
-            if kind == "far":
-                nominal = np.array([one.value for one in candidate.free])
-                tried = np.where(np.isin(np.arange(tried.size), candidate.added), tried, nominal)
-            problem, fit = fit_stages(
-                data, candidate.model, candidate.free, tried, stages=stages, most=15, hopeless=_HOPELESS
-            )
-        found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, tries)
+        problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
+        found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None or gain_over(found, best)[0] > 0:
             best = found
-        if best.fit.converged and best.fit.reduced_chi2 < max(_FINE, floor) and (quick or kind != "far"):
+        best.tries = tries
+        if best.fit.converged and best.fit.reduced_chi2 < _FINE and (quick or kind != "far"):
             break
-    best.tries = tries
+        if settled and gain_over(best, rival)[0] < -_BEATEN:
+            break
+        if quick and tries == 2:
+            break
     return best
+
+
+def _try(
+    data: Data, base: Fitted, candidate: Candidate, kind: str, values: np.ndarray, most: int
+) -> tuple[Problem, Fit]:
+    """One start: at full length from the fitted base, or through the stages; far: from the case."""
+    if kind == "linear":
+        problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+        fit = minimise(problem, values, base.fit.starts, most=most)
+        return problem, polished(data, problem, fit, data.last, most)
+    stages = [1, data.last]
+    if kind == "far":
+        stages = list(range(data.last + 1))
+        nominal = np.array([one.value for one in candidate.free])
+        values = np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
+    return fit_stages(
+        data, candidate.model, candidate.free, values, stages=stages, most=min(most, 12), hopeless=_HOPELESS
+    )
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
@@ -104,14 +120,15 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
         if live.any():
             sizes = np.array([candidate.free[i].size for i in candidate.added])
             guess[live] += screened.step[name] * sizes[live]
-            guess = np.clip(guess, lower, upper)
+            far = _FARTHEST * np.where(candidate.linear, sizes, np.inf)
+            guess = np.clip(np.clip(guess, -far, far), lower, upper)
             # away from zero, where its other parameters could not move
             guess = np.where((guess == 0) & candidate.linear, 0.01 * sizes, guess)
             starts.append(("linear", guess))
         else:
             starts.append(("near", guess))
-    starts += [("near", start) for start in candidate.starts if not candidate.linear.all()]
-    starts += [("far", start) for start in candidate.starts]
+    starts += [("near", start) for start in candidate.starts[1:2] if not candidate.linear.all()]
+    starts += [("far", start) for start in candidate.starts[:2]]
     return [(kind, np.clip(start, lower, upper)) for kind, start in starts]
 
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from separatrix.discovery.catalogue import CATALOGUE, Candidate, Scales, candidate
 from separatrix.discovery.data import Data
+from separatrix.discovery.fit import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, refit
-from separatrix.discovery.screen import Screened, Signature, screen, signature
+from separatrix.discovery.refit import Fitted, gain_over, refit
+from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
 _RELATED = 0.7
@@ -76,10 +77,13 @@ def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: fl
         bench.absent.setdefault(name, "it changes nothing in these records")
     screened = screen(base.fit, signatures)
     chosen = choose(base, screened, options)
-    found = []
+    found: list[Judged] = []
+    rival = None
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, options.quick)
+        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick)
+        if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
+            rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted)))
     found.sort(key=lambda one: -one.evidence)
     return Round(base, foretold, candidates, signatures, screened, found)
@@ -93,18 +97,16 @@ def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     return [
         name
         for place, name in enumerate(order)
-        if place < _CERTAIN_REFITS
-        and (screened.gain[name] > _WORTH or place < _FEWEST)
-        or screened.gain[name] > _WORTH
-        and (not options.quick and any(screened.cosine(name, other) > _RELATED for other in order[:3]))
+        if (place < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or place < _FEWEST))
+        or (
+            screened.gain[name] > _WORTH
+            and (not options.quick and any(screened.cosine(name, other) > _RELATED for other in order[:3]))
+        )
     ]
 
 
 def pair_gains(screen_round: Round) -> list[tuple[float, str, str]]:
     """Linearised gain of every pair of effects, best first."""
-    from separatrix.discovery.fit import blocks_of, eliminate, solve_scaled
-    from separatrix.discovery.screen import project
-
     fit = screen_round.base.fit
     evaluation = fit.evaluation
     signatures = screen_round.signatures

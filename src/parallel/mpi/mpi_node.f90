@@ -5,10 +5,13 @@
 module mpi_node
   use, intrinsic :: iso_c_binding, only: c_ptr
   use atomics, only: atomic_bytes, atomic_fetch_add, atomic_load, atomic_store, atomic_try_lock, yield
+  use errors, only: error_t, fail
   use kinds, only: int64
   use mpi_f08, only: MPI_ADDRESS_KIND, MPI_Allgather, MPI_Barrier, MPI_Bcast, MPI_Comm, MPI_Comm_free, &
-    MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split, MPI_Comm_split_type, MPI_COMM_TYPE_SHARED, &
-    MPI_INFO_NULL, MPI_INTEGER, MPI_Win, MPI_Win_allocate_shared, MPI_Win_free, MPI_Win_shared_query
+    MPI_Comm_rank, MPI_Comm_set_errhandler, MPI_Comm_size, MPI_Comm_split, MPI_Comm_split_type, MPI_COMM_TYPE_SHARED, &
+    MPI_ERRORS_ARE_FATAL, MPI_ERRORS_RETURN, MPI_INFO_NULL, MPI_INTEGER, MPI_SUCCESS, MPI_Win, MPI_Win_allocate_shared, &
+    MPI_Win_free, MPI_Win_shared_query
+  use status, only: exit_internal
   implicit none
   private
 
@@ -44,11 +47,13 @@ module mpi_node
 contains
 
   !> Groups the ranks of `comm` that share memory, at most `ranks_per_node` of them if that is
-  !> positive. The pool of the first node begins with 1 to `length`. Collective.
-  subroutine new_node(comm, ranks_per_node, length, node)
+  !> positive. The pool of the first node begins with 1 to `length`. Code 70 if they
+  !> cannot share memory. Collective.
+  subroutine new_node(comm, ranks_per_node, length, node, error)
     type(MPI_Comm), intent(in) :: comm
     integer, intent(in) :: ranks_per_node, length
     type(node_t), intent(out) :: node
+    type(error_t), allocatable, intent(out) :: error
     type(MPI_Comm) :: host
     integer :: team_rank, host_rank
     call MPI_Comm_rank(comm, team_rank)
@@ -62,7 +67,7 @@ contains
     call MPI_Comm_rank(node%comm, node%rank)
     call MPI_Comm_size(node%comm, node%size)
     call find_leaders(comm, team_rank, node)
-    call share_words(node, length)
+    call share_words(node, length, error)
   end subroutine new_node
 
   subroutine find_leaders(comm, team_rank, node)
@@ -80,15 +85,23 @@ contains
     node%number = findloc(node%leaders, leader, dim=1)
   end subroutine find_leaders
 
-  subroutine share_words(node, length)
+  subroutine share_words(node, length, error)
     type(node_t), intent(inout) :: node
     integer, intent(in) :: length
+    type(error_t), allocatable, intent(out) :: error
     integer(MPI_ADDRESS_KIND) :: bytes
-    integer :: unit, i
+    integer :: unit, status, i
     type(c_ptr) :: mine
     bytes = 0
     if (node%rank == 0) bytes = atomic_bytes(word_count)
-    call MPI_Win_allocate_shared(bytes, 8, MPI_INFO_NULL, node%comm, mine, node%window)
+    call MPI_Comm_set_errhandler(node%comm, MPI_ERRORS_RETURN)
+    call MPI_Win_allocate_shared(bytes, 8, MPI_INFO_NULL, node%comm, mine, node%window, status)
+    call MPI_Comm_set_errhandler(node%comm, MPI_ERRORS_ARE_FATAL)
+    if (status /= MPI_SUCCESS) then
+      call fail(error, exit_internal, 'MPI cannot share memory among the ranks of a node; with OpenMPI the transport "sm" '// &
+                'has to be allowed (mpirun --mca osc sm)')
+      return
+    end if
     call MPI_Win_shared_query(node%window, 0, bytes, unit, node%words)
     if (node%rank == 0) then
       do i = 0, word_count - 1

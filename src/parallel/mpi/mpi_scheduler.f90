@@ -79,7 +79,8 @@ contains
       call fail(error, exit_internal, 'a work list has a negative length')
       return
     end if
-    call new_node(self%comm, self%options%ranks_per_node, n, self%node)
+    call new_node(self%comm, self%options%ranks_per_node, n, self%node, error)
+    if (allocated(error)) return
     self%order = new_spread_order(n)
     self%active = .true.
     self%busy = .false.

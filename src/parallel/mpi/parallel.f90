@@ -4,12 +4,13 @@
 !> Starts the program's team and makes schedulers: the build with MPI.
 module parallel
   use errors, only: error_t
+  use launcher, only: with_component
   use mpi_f08, only: MPI_Comm, MPI_COMM_WORLD, MPI_Init, MPI_Initialized
   use mpi_scheduler, only: mpi_scheduler_t, new_mpi_scheduler
   use mpi_team, only: mpi_team_t, new_mpi_team
   use scheduler, only: scheduler_options_t, scheduler_t
   use serial_scheduler, only: serial_scheduler_t
-  use system, only: default_environment
+  use system, only: default_environment, set_environment
   use team, only: team_t
   implicit none
   private
@@ -30,11 +31,24 @@ contains
     if (.not. running) then
       ! The default layer of OpenMPI 4.1 can lose data on a full disk without an error.
       call default_environment('OMPI_MCA_io', 'romio321')
+      call allow_shared_memory()
       call MPI_Init()
     end if
     call new_mpi_team(MPI_COMM_WORLD, ours, owns_mpi=.not. running)
     team = ours
   end subroutine start_team
+
+  !> Where the user has chosen OpenMPI's one-sided transports, adds the one that can share the memory of a node.
+  subroutine allow_shared_memory()
+    character(len=*), parameter :: name = 'OMPI_MCA_osc'
+    character(len=:), allocatable :: chosen
+    integer :: length, status
+    call get_environment_variable(name, length=length, status=status)
+    if (status /= 0 .or. length == 0) return
+    allocate (character(len=length) :: chosen)
+    call get_environment_variable(name, chosen)
+    call set_environment(name, with_component(chosen, 'sm'))
+  end subroutine allow_shared_memory
 
   !> The team of a caller's communicator, given by its Fortran handle. MPI is running.
   subroutine join_team(communicator, team)

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report of a discovery: report.html and report.pdf beside verdict.json, details.h5 and extended.toml."""
+
+import json
+import tempfile
+from pathlib import Path
+
+import h5py
+from matplotlib.figure import Figure
+
+from separatrix import style
+from separatrix.discovery import figures, where_figures
+from separatrix.discovery.motion import compare
+from separatrix.discovery.options import Options
+from separatrix.discovery.pages import Picture, Section, write_html, write_pdf
+from separatrix.discovery.story import names, sections
+from separatrix.errors import CANNOT_CREATE, SeparatrixError
+from separatrix.open import reading
+
+
+def write_report(folder: Path, base: Path, options: Options | None = None) -> list[Path]:
+    """Write both files from what separatrix-discover left in `folder`; `base` is the case that was compared.
+
+    Quick options run no maps.
+    """
+    options = options or Options()
+    options.progress("writing the report", 0.9)
+    with reading(folder / "verdict.json"):
+        verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+    with style.context(), h5py.File(folder / "details.h5", "r") as details:
+        story = illustrated(verdict, details)
+        if options.quick:
+            motion = Section(
+                "motion", "What it means for the motion", ["No maps before and after in a quick look."]
+            )
+        else:
+            motion = compare(Path(base), folder / "extended.toml", verdict, details, options.progress)
+        story = [motion if section.key == "motion" else section for section in story]
+        return _write(folder, f"Missing physics: {_title(verdict)}", story)
+
+
+def _title(verdict: dict) -> str:
+    return {
+        "named": names(verdict),
+        "ambiguous": f"{names(verdict)}, not beyond doubt",
+        "none": "none",
+        "not-in-catalogue": "not in the catalogue",
+    }[verdict["outcome"]]
+
+
+def _write(folder: Path, title: str, story: list[Section]) -> list[Path]:
+    try:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as name:
+            made = [Path(name) / "report.html", Path(name) / "report.pdf"]
+            write_html(made[0], title, story)
+            write_pdf(made[1], title, story)
+            for path in made:
+                path.replace(folder / path.name)
+    except OSError as error:
+        raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
+    return [folder / path.name for path in made]
+
+
+def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
+    """All sections with the figures that need no further run."""
+    story = sections(verdict)
+    by_key = {section.key: section for section in story}
+    visible = Options().visible
+    _show(
+        by_key["gap"],
+        "gap",
+        figures.gap(verdict),
+        "Reduced chi^2 of the base machine, all its uncertain numbers refitted, and of the machine of the "
+        "verdict; at the "
+        "dotted line nothing but noise is left.",
+    )
+    _show(
+        by_key["where"],
+        "where-lines",
+        where_figures.where_lines(details),
+        "The force that the base machine lacks in bins of equal numbers of samples; vertical bars are 95 % "
+        "intervals, "
+        "horizontal ones the bins. Filled: differs from zero by more than chance, given the number of bins.",
+    )
+    _show(
+        by_key["where"],
+        "where-plane",
+        where_figures.where_plane(details),
+        "The force that the base machine lacks (N) by position and velocity; a star marks what differs "
+        "from zero by more "
+        "than chance, given the number of bins.",
+    )
+    _show(
+        by_key["missing"],
+        "ranking",
+        figures.ranking(verdict),
+        f"a) Linearised size of each effect in standard errors, dark: in the verdict, dotted line: "
+        f"{visible:g}. b) "
+        "Log-likelihood gained over the base machine by the candidates that were fitted.",
+    )
+    _show(
+        by_key["confusable"],
+        "confusability",
+        figures.confusability(verdict),
+        "Cosine between what is left of the signatures of two effects when the base machine is refitted; "
+        "at 1 these "
+        "records cannot tell the two apart.",
+    )
+    _show(
+        by_key["residuals"],
+        "residual",
+        figures.residuals(details),
+        "Residuals in standard deviations of the noise over time, their root mean square by segment, and "
+        "how often each size occurs, beside the normal "
+        "distribution of noise alone. At most four records are shown. Large residuals are on a logarithmic "
+        "scale beyond 5.",
+    )
+    _show(
+        by_key["impacts"],
+        "impact-map",
+        figures.impact_map(details),
+        "Speed after each impact over the speed before it: from the smoothed records (bars: standard "
+        "errors) and of the "
+        "fitted segments of both machines.",
+        "There are no impacts in the records nor in the fitted motions.",
+    )
+    _show(
+        by_key["held-out"],
+        "overlay",
+        figures.held_out(details),
+        "A held-out record where the base machine misses it most, three segments: a) position, b) "
+        "residuals in standard "
+        "deviations of the noise; grey: 95 % of noise.",
+    )
+    return story
+
+
+def _show(section: Section, name: str, figure: Figure | None, caption: str, otherwise: str = "") -> None:
+    if figure is not None:
+        section.body.append(Picture(name, figure, caption))
+    elif otherwise:
+        section.body.append(otherwise)

@@ -1,0 +1,301 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The story of a verdict in words and tables; every number is one of verdict.json."""
+
+from separatrix.discovery.options import Options
+from separatrix.discovery.pages import Section, Table
+from separatrix.discovery.wording import digits_of, number, probability, with_unit, words
+
+GATES = {
+    "converged": "the fit converged",
+    "detect": "the gain is larger than chance gives the best of all candidates",
+    "hold-out": "records that the fit never saw are foretold better",
+    "separate": "no other effect does about as well",
+    "admissible": "sign and size make sense, and differ from zero",
+    "stable": "the effect pays in nearly every resampling of the record",
+    "adequate": "what is left is noise",
+    "drop": "each of the effects is needed beside the other",
+}
+
+
+def sections(verdict: dict) -> list[Section]:
+    """All sections, without figures."""
+    return [
+        _summary(verdict),
+        _compared(verdict),
+        _gap(verdict),
+        _where(verdict),
+        _missing(verdict),
+        Section("confusable", "What can be mistaken for what", [_confusable(verdict)]),
+        Section("residuals", "What is left over, before and after", []),
+        Section("impacts", "Impacts", []),
+        Section("held-out", "On records that the fit never saw", [_foretold(verdict)]),
+        _parameters(verdict),
+        _detectable(verdict),
+        _experiment(verdict),
+        Section("motion", "What it means for the motion", []),
+    ]
+
+
+def names(verdict: dict) -> str:
+    """The effects of the verdict as words."""
+    return " and ".join(words(name) for name in verdict["effects"]) or "none"
+
+
+def _summary(verdict: dict) -> Section:
+    others = ", ".join(_pair(name) for name in verdict["alternatives"])
+    said = {
+        "named": f"The base machine lacks: {names(verdict)}. All gates are passed.",
+        "ambiguous": f"Something is missing that looks like {names(verdict)}, "
+        + (f"but {others} would do about as well." if others else "but not every gate is passed."),
+        "none": "No effect is missing that these records could show.",
+        "not-in-catalogue": "Something is missing, and no effect of the catalogue explains it.",
+    }[verdict["outcome"]]
+    lines = [f"Verdict: {verdict['outcome']}. {said}"]
+    for path, one in verdict["parameters"].items():
+        if path.startswith("effect."):
+            digits = digits_of(one["value"], one["standard_error"])
+            low, high = (number(bound, digits) for bound in one["interval_95"])
+            lines.append(
+                f"{path} = {with_unit(one['value'], one['unit'], digits)}, 95 % interval {low} to {high}."
+            )
+    for use, one in verdict["gap"].items():
+        change = (
+            f"stays {number(one['before'])}"
+            if one["before"] == one["after"]
+            else f"goes from {number(one['before'])} to {number(one['after'])}"
+        )
+        lines.append(
+            f"The gap on {_records_of(use)}: reduced chi^2 {change}; noise alone gives "
+            f"{number(one['noise_floor'])}."
+        )
+    body: list = [lines[0], lines[1:]]
+    if verdict["reasons"]:
+        body += ["What kept the verdict from being firmer:", list(verdict["reasons"])]
+    if verdict["warnings"]:
+        body += ["Warnings:", list(verdict["warnings"])]
+    return Section("verdict", "Verdict", body)
+
+
+def _records_of(use: str) -> str:
+    return "the records that were fitted" if use == "training" else "the held-out records"
+
+
+def _pair(name: str) -> str:
+    return " with ".join(words(part) for part in name.split("+"))
+
+
+def _compared(verdict: dict) -> Section:
+    rows = [
+        [
+            one["name"],
+            one["use"],
+            str(one["samples"]),
+            number(one["sigma"], 3),
+            number(one["resolution"], 3),
+            "none" if one["drive_frequency"] is None else number(one["drive_frequency"], 5),
+            "known" if one["phase_known"] else "fitted",
+        ]
+        for one in verdict["records"]
+    ]
+    table = Table(
+        ["record", "use", "samples", "noise (m)", "resolution (m)", "drive (rad/s)", "crank angle"], rows
+    )
+    return Section(
+        "compared",
+        "What was compared",
+        [
+            "The records are cut into short segments. The start of each segment and all uncertain numbers "
+            "of the base "
+            "machine are fitted, so that neither chaos nor a wrong parameter counts as missing physics.",
+            table,
+            f"Held out: {verdict['held_out_chosen']}. Random choices follow from seed {verdict['seed']}; "
+            f"separatrix {verdict['version']}, {number(verdict['runtime_s'], 3)} s.",
+        ],
+    )
+
+
+def _gap(verdict: dict) -> Section:
+    rows = [
+        [
+            use.replace("_", " "),
+            number(one["before"]),
+            number(one["after"]),
+            number(one["noise_floor"]),
+            _removed(one),
+        ]
+        for use, one in verdict["gap"].items()
+    ]
+    explained = [
+        [name, number(one["gain"]), str(one["rank"]), probability(one["p"])]
+        for name, one in verdict["ceiling"].items()
+    ]
+    return Section(
+        "gap",
+        "Is there a gap?",
+        [
+            "Reduced chi^2: mean square of the residuals over that of the noise.",
+            Table(["records", "base machine", "extended machine", "noise", "excess removed"], rows),
+            "What a free force that depends on one thing would gain over the base machine; a small p says "
+            "that there is "
+            "something to be gained there, by whatever law:",
+            Table(["a force that depends on", "log-likelihood", "free numbers", "p"], explained),
+        ],
+    )
+
+
+def _removed(one: dict) -> str:
+    excess = one["before"] - one["noise_floor"]
+    if excess <= 0 or one["before"] == one["after"]:
+        return "-"
+    return f"{100 * (one['before'] - one['after']) / excess:.1f} %"
+
+
+def _where(verdict: dict) -> Section:
+    if not verdict["where"]:
+        said: list = ["No bin of any map differs from zero by more than chance."]
+    else:
+        said = [
+            "In each bin a constant force is fitted to what the base machine leaves over. These bins "
+            "differ from zero by "
+            "more than chance, given how many bins there are:",
+            [one["text"] + "." for one in verdict["where"]],
+        ]
+    return Section("where", "Where is it?", said)
+
+
+def _missing(verdict: dict) -> Section:
+    body: list = []
+    if verdict["gates"]:
+        rows = [
+            [gate, GATES.get(gate, ""), "passed" if passed else "failed"]
+            for gate, passed in verdict["gates"].items()
+        ]
+        body += [
+            f"Gates of {names(verdict)}, family-wise p: {probability(verdict['p_value'])}:",
+            Table(["gate", "meaning", ""], rows),
+        ]
+    else:
+        body.append("No effect gained enough to be put to the gates, or none passed them.")
+    if verdict["alternatives"]:
+        body.append(
+            "Not told apart from: " + ", ".join(_pair(name) for name in verdict["alternatives"]) + "."
+        )
+    if verdict["equivalences"]:
+        body += ["These are the same motion:", [f"{text}." for text in verdict["equivalences"]]]
+    if verdict["candidates"]:
+        body += [
+            "Candidates that were fitted together with all uncertain numbers of the machine, best first:",
+            Table(
+                ["effect", "d'", "training", "held out", "evidence", "chi^2", "converged", "values"],
+                [_candidate(one, verdict) for one in verdict["candidates"]],
+            ),
+            "d' is the linearised size of the effect over its standard error; training and held out are "
+            "log-likelihoods "
+            "gained over the base machine; the evidence counts their sum less one per parameter.",
+        ]
+    if verdict["not_tested"]:
+        body += ["Not tested:", [f"{words(name)}: {why}." for name, why in verdict["not_tested"].items()]]
+    return Section("missing", "What is missing?", body)
+
+
+def _candidate(one: dict, verdict: dict) -> list[str]:
+    values = ", ".join(f"{path.split('.')[-1]} {number(value, 3)}" for path, value in one["values"].items())
+    return [
+        words(one["effect"]),
+        number(verdict["d_prime"].get(one["effect"]), 3),
+        number(one["training"]),
+        number(one["held_out"]),
+        number(one["evidence"]),
+        number(one["reduced_chi2"]),
+        "yes" if one["converged"] else "no",
+        values,
+    ]
+
+
+def _confusable(verdict: dict) -> str:
+    table = verdict["confusability"]
+    pairs = sorted(
+        (
+            (abs(table["matrix"][i][j]), one, other)
+            for i, one in enumerate(table["names"])
+            for j, other in enumerate(table["names"][:i])
+        ),
+        reverse=True,
+    )
+    close = [
+        f"{words(one)} and {words(other)} ({number(size, 3)})" for size, one, other in pairs if size > 0.9
+    ]
+    if not close:
+        return "No two signatures have a cosine above 0.9 once the base machine is refitted."
+    return (
+        "Cosine of the signatures of two effects, the base machine refitted: at 1 these records cannot "
+        "tell them apart. "
+        "Above 0.9: " + ", ".join(close[:12]) + (f" and {len(close) - 12} more." if len(close) > 12 else ".")
+    )
+
+
+def _foretold(verdict: dict) -> str:
+    if "held_out" not in verdict["gap"]:
+        return "No record was held out."
+    one = verdict["gap"]["held_out"]
+    return (
+        f"Only the starts of its segments and the angle of its crank are fitted to a held-out record. "
+        "Reduced chi^2: "
+        f"{number(one['before'])} for the base machine, {number(one['after'])} for "
+        + (
+            "the machine of the verdict."
+            if verdict["effects"]
+            else "the machine of the verdict, which is the base machine."
+        )
+    )
+
+
+def _parameters(verdict: dict) -> Section:
+    rows = []
+    for path, one in verdict["parameters"].items():
+        digits = digits_of(one["value"], one["standard_error"])
+        low, high = (number(bound, digits) for bound in one["interval_95"])
+        rows.append(
+            [
+                path,
+                number(one["value"], digits),
+                number(one["standard_error"], 2),
+                f"{low} to {high}",
+                "" if one["unit"] == "1" else one["unit"],
+            ]
+        )
+    body: list = [Table(["parameter", "value", "standard error", "95 % interval", "unit"], rows)]
+    if not rows:
+        body = ["No parameter was fitted."]
+    return Section("parameters", "Parameters and their intervals", body)
+
+
+def _detectable(verdict: dict) -> Section:
+    rows = [
+        [words(name), one["path"], with_unit(one["size"], one["unit"], 3)]
+        for name, one in verdict["detectable"].items()
+    ]
+    said = (
+        f"The size that each effect would need to stand out by {Options().visible:g} standard errors in "
+        "these records. "
+        "What is smaller may be there and could not have been seen; unknown: no size of the effect would "
+        "have shown."
+    )
+    return Section(
+        "detectable",
+        "What could not have been seen",
+        [said, Table(["effect", "parameter", "smallest size"], rows)],
+    )
+
+
+def _experiment(verdict: dict) -> Section:
+    if verdict["separating_experiment"]:
+        said = f"To tell apart what remains: {verdict['separating_experiment']}."
+    elif verdict["outcome"] == "ambiguous":
+        said = "No experiment with this machine was found that would tell the candidates apart."
+    elif verdict["outcome"] == "not-in-catalogue":
+        said = "The maps above show where to look for a law that the catalogue lacks."
+    else:
+        said = "Nothing stays ambiguous."
+    return Section("next", "What to measure next", [said])

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What has to be shown, and what was found."""
+
+import math
+import statistics
+
+from rates import Rate, rate
+from scoring import PRECISE, Score
+
+
+def bars(found: list[Score]) -> list[list[str]]:
+    """Rows of the table of bars: figure, bar, found, met."""
+    strong = [one for one in found if one.strong]
+    decided = [one for one in strong if one.decided]
+    outside = [one for one in found if one.kind == "outside"]
+    asked = [one for one in strong if one.answer in ("named", "ambiguous")]
+    rows = [
+        at_least(
+            "right of the decided, d' >= 5, noise <= 1 %", 0.95, [o.right for o in decided if o.noise <= 0.01]
+        ),
+        at_least(
+            "right of the decided, d' >= 5, noise 3 %", 0.90, [o.right for o in decided if o.noise == 0.03]
+        ),
+        at_least(
+            "right of the decided, d' >= 5, noise 5 %", 0.80, [o.right for o in decided if o.noise == 0.05]
+        ),
+        at_least("decided, d' >= 5", 0.85, [o.decided for o in strong]),
+        at_least("truth in the set reported, d' >= 5", 0.98, [o.contains for o in asked]),
+        at_most("wrong name, all cases", 0.03, [o.wrong_name for o in found]),
+        at_most("a name where nothing is hidden", 0.05, [o.decided for o in found if o.kind == "none"]),
+        at_least("outside the catalogue, recognised", 0.80, [o.right for o in outside]),
+        at_most("outside the catalogue, wrongly named", 0.10, [o.wrong_name for o in outside]),
+    ]
+    precise = [one for one in found if one.right and one.in_catalogue and one.d_prime >= PRECISE]
+    errors = [error for one in precise for error in one.errors]
+    median = statistics.median(errors) if errors else math.nan
+    rows.append(
+        [
+            "parameter error, median, d' >= 10",
+            "<= 5 %",
+            f"{100 * median:.1f} % of {len(errors)}",
+            met(median <= 0.05),
+        ]
+    )
+    covered = rate([inside for one in found if one.right for inside in one.covered])
+    rows.append(
+        ["95 % intervals with the truth", "90 to 98 %", str(covered), met(0.90 <= covered.share <= 0.98)]
+    )
+    removed = [one.removed for one in found if one.right and one.in_catalogue and not math.isnan(one.removed)]
+    share = statistics.median(removed) if removed else math.nan
+    text = f"{100 * share:.1f} % (median of {len(removed)})"
+    rows.append(["held-out excess removed", ">= 80 %", text, met(share >= 0.8)])
+    return rows + [lead(strong, method) for method in ("STLSQ", "ensemble SINDy")]
+
+
+def lead(strong: list[Score], method: str) -> list[str]:
+    """Points by which more single effects are named rightly than by a baseline, of all asked."""
+    single = [one for one in strong if one.kind == "single" and method in one.baselines_right]
+    ours, theirs = rate([one.right for one in single]), rate([one.baselines_right[method] for one in single])
+    points = 100 * (ours.share - theirs.share)
+    return [f"lead over {method}, d' >= 5", ">= 20 points", f"{points:.1f} points", met(points >= 20)]
+
+
+def at_least(name: str, bar: float, flags: list[bool]) -> list[str]:
+    """A row of a rate that should be high."""
+    found = rate(flags)
+    return [name, f">= {bar:.0%}".replace("%", " %"), str(found), met(reached(found, bar, high=True))]
+
+
+def at_most(name: str, bar: float, flags: list[bool]) -> list[str]:
+    """A row of a rate that should be low."""
+    found = rate(flags)
+    return [name, f"<= {bar:.0%}".replace("%", " %"), str(found), met(reached(found, bar, high=False))]
+
+
+def reached(found: Rate, bar: float, *, high: bool) -> bool:
+    """Whether a rate reaches its bar; without cases it does not."""
+    return bool(found.cases) and (found.share >= bar if high else found.share <= bar)
+
+
+def met(yes: bool) -> str:
+    """As the table says it."""
+    return "yes" if yes else "**no**"

@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hides effects, asks the discovery workflow and the baselines what is missing, and writes the page.
+
+Each case is a file of its own in the folder of results, written under another name and renamed, so that
+a campaign can be killed at any time and goes on where it was. The truth lies sealed beside the cases:
+its hash is kept before anybody is asked, and it is opened only when the page is written.
+"""
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(SOURCE / "tests" / "generator"), str(SOURCE / "scripts")]
+
+import records  # noqa: E402
+from design import Unreachable, draw  # noqa: E402
+
+CI_SEED, CI_CASES = 1, (0, 4, 6, 8, 11, 14)
+"""Nothing hidden, one effect, an effect that is one of a set; quick ones."""
+KEPT = (
+    "outcome effects alternatives equivalent parameters gap gates p_value reasons detectable d_prime warnings"
+    " records seed version runtime_s"
+).split()
+UNREACHABLE = "unreachable"
+
+
+@cache
+def commit() -> str:
+    """The commit of the source, as far as that is known."""
+    words = ["git", "-C", str(SOURCE), "rev-parse", "--short", "HEAD"]
+    result = subprocess.run(words, capture_output=True, text=True)
+    return result.stdout.strip() or "unknown"
+
+
+class Late(Exception):
+    """A case has used up its time."""
+
+
+class Folders:
+    """Where a campaign keeps what."""
+
+    def __init__(self, out: Path) -> None:
+        self.cases, self.sealed, self.results = out / "cases", out / "sealed", out / "results"
+        self.seals = out / "seals"
+
+    def make(self) -> None:
+        """Make them all."""
+        for folder in vars(self).values():
+            folder.mkdir(parents=True, exist_ok=True)
+
+    def result(self, number: int) -> Path:
+        """The result of a case."""
+        return self.results / f"{number:04}.json"
+
+
+def write_whole(path: Path, text: str) -> None:
+    """A file that is there whole or not at all."""
+    draft = path.with_name(f"{path.name}.{os.getpid()}")
+    draft.write_text(text)
+    draft.rename(path)
+
+
+def prepare(folders: Folders, seed: int, number: int) -> str:
+    """Write records and sealed truth of a case if they are not there; return the seal."""
+    kept = folders.seals / f"{number:04}.txt"
+    if not kept.is_file():
+        try:
+            found = records.write_case(
+                folders.cases / f"{number:04}", folders.sealed / f"{number:04}.json", draw(seed, number)
+            )
+        except Unreachable:
+            found = UNREACHABLE
+        write_whole(kept, f"{found}\n")
+    return kept.read_text().strip()
+
+
+def ask(case: Path, seed: int, limit: float) -> dict:
+    """The verdict of the discovery workflow."""
+    from separatrix.discovery import Options, discover
+    from separatrix.errors import SeparatrixError
+
+    def stop(*_: object) -> None:
+        raise Late
+
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    try:
+        training = [case / name for name in records.TRAINING]
+        verdict = discover(case / records.BASE, training, [case / records.HELD_OUT], Options(seed=seed))
+        return {key: verdict[key] for key in KEPT if key in verdict}
+    except Late:
+        return {"outcome": "failed", "reasons": [f"not done after {limit:g} s of processor time"]}
+    except SeparatrixError as reason:
+        return {"outcome": "failed", "reasons": [str(reason)]}
+    except Exception as reason:
+        # one broken case must not end the campaign, and counts as a failure
+        where = traceback.extract_tb(reason.__traceback__)[-1]
+        text = f"{type(reason).__name__} in {Path(where.filename).name}:{where.lineno}: {reason}"
+        return {"outcome": "failed", "reasons": [text]}
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def run_case(folders: Folders, seed: int, number: int, limit: float, with_baselines: bool) -> None:
+    """One case from hiding to result."""
+    found = prepare(folders, seed, number)
+    if found == UNREACHABLE:
+        write_whole(folders.result(number), json.dumps({"number": number, "seal": found}) + "\n")
+        return
+    case = folders.cases / f"{number:04}"
+    began = time.process_time()
+    verdict = ask(case, seed, limit)
+    seconds = round(time.process_time() - began, 2)
+    named = {}
+    if with_baselines:
+        from baselines import verdicts
+
+        named = verdicts(case / records.BASE, [case / name for name in records.TRAINING], number)
+    result = {"number": number, "commit": commit(), "seal": found, "verdict": verdict}
+    result |= {"baselines": named, "seconds": seconds}
+    write_whole(folders.result(number), json.dumps(result, default=plain) + "\n")
+    told = " ".join(verdict.get("effects", [])) or "; ".join(verdict.get("reasons", []))
+    print(f"case {number}: {verdict['outcome']} {told} ({seconds:.0f} s)", flush=True)
+
+
+def plain(value: object) -> object:
+    """A number of NumPy as JSON."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def work(numbers: list[int], do: Callable[[int], None]) -> None:
+    """Do all cases, handed out one by one by rank 0 where there is more than one rank."""
+    if int(os.environ.get("OMPI_COMM_WORLD_SIZE", "1")) == 1:
+        for number in numbers:
+            do(number)
+        return
+    from mpi4py import MPI
+
+    world = MPI.COMM_WORLD
+    if world.rank == 0:
+        hand_out(world, numbers)
+        return
+    while (number := world.sendrecv(None, 0, source=0)) is not None:
+        do(number)
+
+
+def hand_out(world: object, numbers: Iterable[int]) -> None:
+    """Give every other rank a case whenever it asks; ask seldom, because somebody computes on this core."""
+    from mpi4py import MPI
+
+    left, busy = iter(numbers), world.size - 1
+    while busy:
+        status = MPI.Status()
+        if not world.iprobe(status=status):
+            time.sleep(0.02)
+            continue
+        world.recv(source=status.source)
+        number = next(left, None)
+        busy -= number is None
+        world.send(number, status.source)
+
+
+def main() -> int:
+    """Run or summarise; return the exit code."""
+    parser = argparse.ArgumentParser(prog="discovery_campaign")
+    parser.add_argument("--cases", type=int, default=520)
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--subset", choices=["ci"])
+    parser.add_argument("--out", type=Path, default=SOURCE / "out" / "discovery")
+    parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "discovery.md")
+    parser.add_argument("--limit", type=float, default=200.0)
+    parser.add_argument("--prepare", action="store_true")
+    parser.add_argument("--summary", action="store_true")
+    options = parser.parse_args()
+    numbers: Sequence[int] = range(options.cases)
+    if options.subset:
+        options.seed, numbers = CI_SEED, CI_CASES
+    folders = Folders(options.out / f"seed_{options.seed}")
+    folders.make()
+    if not options.summary:
+        if options.prepare:
+            missing = [n for n in numbers if not (folders.seals / f"{n:04}.txt").is_file()]
+            work(missing, lambda number: prepare(folders, options.seed, number))
+            return 0
+        missing = [n for n in numbers if not folders.result(n).is_file()]
+        work(
+            missing, lambda number: run_case(folders, options.seed, number, options.limit, not options.subset)
+        )
+    if int(os.environ.get("OMPI_COMM_WORLD_RANK", "0")) == 0:
+        import report
+
+        return report.write(folders, options.seed, numbers, options.output)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,281 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Opens the truths and writes docs/discovery.md with the figure of the confusion matrix."""
+
+import json
+import math
+import statistics
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import figure
+import records
+from bars import bars
+from markdown import table
+from rates import Rate, rate
+from scoring import PRECISE, SEPARABLE, STRONG, Score, score
+
+TEMPLATE = Path(__file__).resolve().parent / "discovery.md.in"
+METHODS = ("STLSQ", "ensemble SINDy")
+
+
+class Broken(Exception):
+    """A truth does not fit its seal."""
+
+
+def scores_of(folders: object, numbers: Sequence[int]) -> tuple[list[Score], int]:
+    """All cases with a result, judged, and the number of those whose effect could not have its size."""
+    found, unreachable = [], 0
+    for number in numbers:
+        if not folders.result(number).is_file():
+            continue
+        result = json.loads(folders.result(number).read_text())
+        if "verdict" not in result:
+            unreachable += 1
+            continue
+        sealed = folders.sealed / f"{number:04}.json"
+        if records.seal(sealed) != result["seal"]:
+            raise Broken(f"{sealed} is not what was sealed")
+        found.append(score(json.loads(sealed.read_text()), result))
+    return found, unreachable
+
+
+def versions(folders: object, found: list[Score]) -> str:
+    """Commits whose workflow gave the verdicts."""
+    commits = [json.loads(folders.result(one.number).read_text())["commit"] for one in found]
+    return ", ".join(f"{name} ({commits.count(name)})" for name in dict.fromkeys(commits))
+
+
+def percent(share: float) -> str:
+    """A share, or a dash."""
+    return "-" if math.isnan(share) else f"{100 * share:.1f} %"
+
+
+def middle(values: list[float]) -> float:
+    """The median, NaN of nothing."""
+    return statistics.median(values) if values else math.nan
+
+
+def classes(found: list[Score], of: Callable[[Score], str], order: list[str]) -> list[list[str]]:
+    """Rates of effects in the catalogue, class by class."""
+    rows = []
+    for name in order:
+        chosen = [one for one in found if one.in_catalogue and of(one) == name]
+        decided = [one for one in chosen if one.decided]
+        rows.append(
+            [
+                name,
+                str(len(chosen)),
+                str(rate([one.decided for one in chosen])),
+                str(rate([one.right for one in decided])),
+                str(rate([one.contains for one in chosen if one.answer in ("named", "ambiguous")])),
+                str(rate([one.wrong_name for one in chosen])),
+            ]
+        )
+    return rows
+
+
+def size_class(one: Score) -> str:
+    """By d'."""
+    limits = ((4, "below 4"), (7, "4 to 7"), (20, "7 to 20"))
+    return next((name for limit, name in limits if one.d_prime < limit), "above 20")
+
+
+def truths(found: list[Score]) -> list[str]:
+    """Hidden effects in the order of the figure and the table."""
+    rank = {"none": 0, "single": 1, "pair": 2, "outside": 3}
+    return list(
+        dict.fromkeys(one.truth for one in sorted(found, key=lambda one: (rank[one.kind], one.truth)))
+    )
+
+
+def by_truth(found: list[Score]) -> list[list[str]]:
+    """One row per hidden effect."""
+    rows = []
+    for name in truths(found):
+        chosen = [one for one in found if one.truth == name]
+        wrong = [one.column for one in chosen if one.wrong_name]
+        rows.append(
+            [
+                name,
+                str(len(chosen)),
+                str(sum(one.right for one in chosen)),
+                str(
+                    sum(
+                        one.column in ("set with the truth", "one of the pair") and not one.right
+                        for one in chosen
+                    )
+                ),
+                str(sum(not one.decided and not one.contains and not one.right for one in chosen)),
+                ", ".join(f"{other} {wrong.count(other)}" for other in dict.fromkeys(wrong)) or "-",
+            ]
+        )
+    return rows
+
+
+def precision(found: list[Score]) -> list[list[str]]:
+    """Errors and coverage by size."""
+    rows = []
+    for name in ("below 4", "4 to 7", "7 to 20", "above 20"):
+        chosen = [one for one in found if one.right and one.in_catalogue and size_class(one) == name]
+        errors = [error for one in chosen for error in one.errors]
+        covered = [inside for one in chosen for inside in one.covered]
+        rows.append([name, str(len(errors)), percent(middle(errors)), str(rate(covered))])
+    return rows
+
+
+def baselines(found: list[Score]) -> list[list[str]]:
+    """Right names of all asked, single effects."""
+    strong = [one for one in found if one.kind == "single" and one.strong]
+    quiet = [one for one in strong if one.noise <= 0.01]
+    none = [one for one in found if one.kind == "none"]
+
+    def row(name: str, right: Callable[[Score], bool], alarm: Callable[[Score], bool]) -> list[str]:
+        groups = [rate([right(one) for one in group]) for group in (strong, quiet)]
+        return [name, *map(str, groups), str(rate([alarm(one) for one in none]))]
+
+    rows = [row("Separatrix", lambda one: one.right, lambda one: one.decided)]
+    for method in METHODS:
+        rows.append(
+            row(
+                method,
+                lambda one, method=method: one.baselines_right.get(method, False),
+                lambda one, method=method: one.baselines.get(method) != "none",
+            )
+        )
+    return rows
+
+
+def undecided(folders: object, found: list[Score]) -> list[list[str]]:
+    """Why strong effects of the catalogue got no single answer."""
+    reasons: dict[tuple[str, str], int] = {}
+    for one in found:
+        if not one.strong or one.decided:
+            continue
+        verdict = json.loads(folders.result(one.number).read_text())["verdict"]
+        for text in verdict.get("reasons") or ["nothing was detected"]:
+            key = (one.column, text)
+            reasons[key] = reasons.get(key, 0) + 1
+    return [[*key, str(count)] for key, count in sorted(reasons.items(), key=lambda item: -item[1])]
+
+
+def page(folders: object, found: list[Score], unreachable: int, seed: int, asked: int) -> str:
+    """The text of the page."""
+    rate_head = "cases, decided, right of the decided, truth in the set reported, wrong name".split(", ")
+    noises = sorted({one.noise for one in found})
+    strong = [one for one in found if one.strong]
+    fields = {
+        "cases": len(found),
+        "asked": asked,
+        "unreachable": unreachable,
+        "seed": seed,
+        "version": versions(folders, found),
+        "none": sum(one.kind == "none" for one in found),
+        "single": sum(one.kind == "single" for one in found),
+        "pair": sum(one.kind == "pair" for one in found),
+        "outside": sum(one.kind == "outside" for one in found),
+        "strong": f"{STRONG:g}",
+        "separable": f"{SEPARABLE:g}",
+        "precise": f"{PRECISE:g}",
+        "seconds": f"{middle([one.seconds for one in found]):.0f}",
+        "bars": table(["figure", "bar", "found", "met"], bars(found)),
+        "separable_bars": table(
+            ["effects with d' of at least 5", "decided", "right of the decided", "wrong name"],
+            [
+                [name, str(decided(group)), str(right(group)), str(rate([one.wrong_name for one in group]))]
+                for name, group in (
+                    ("told from any other", [one for one in strong if one.separable]),
+                    ("hidden behind another", [one for one in strong if not one.separable]),
+                )
+            ],
+        ),
+        "by_noise": table(
+            ["noise", *rate_head],
+            classes(
+                [one for one in found if one.strong],
+                lambda one: f"{one.noise:.1%}",
+                [f"{n:.1%}" for n in noises],
+            ),
+        ),
+        "by_size": table(
+            ["d'", *rate_head], classes(found, size_class, ["below 4", "4 to 7", "7 to 20", "above 20"])
+        ),
+        "by_condition": table(["condition", *rate_head], conditions([one for one in found if one.strong])),
+        "by_truth": table(
+            ["hidden", "cases", "right", "set with it, or one of the pair", "abstained", "wrong names"],
+            by_truth(found),
+        ),
+        "outside_by_size": table(
+            ["d' beside any one effect", "cases", "recognised", "wrongly named", "a set", "none"],
+            outside(found),
+        ),
+        "precision": table(
+            ["d'", "parameters", "median error", "intervals with the truth"], precision(found)
+        ),
+        "baselines": table(
+            ["method", "right, d' >= 5", "right, noise <= 1 %", "name where nothing is hidden"],
+            baselines(found),
+        ),
+        "undecided": table(["answer", "reason", "cases"], undecided(folders, found)),
+        "failed": str(rate([one.answer == "failed" for one in found])),
+    }
+    return TEMPLATE.read_text().format(**fields)
+
+
+def decided(group: list[Score]) -> Rate:
+    """How many got one answer."""
+    return rate([one.decided for one in group])
+
+
+def right(group: list[Score]) -> Rate:
+    """How many of these are right."""
+    return rate([one.right for one in group if one.decided])
+
+
+def conditions(found: list[Score]) -> list[list[str]]:
+    """Rates by what the records are like."""
+    rows = []
+    for of in (
+        lambda one: one.colour + " noise",
+        lambda one: f"{one.samples} samples per period",
+        lambda one: "position and velocity" if one.velocity else "position only",
+        lambda one: "crank angle measured" if one.crank_angle else "crank angle from a mark",
+        lambda one: f"regime `{one.regime}`",
+        lambda one: "one effect" if one.kind == "single" else "two effects",
+    ):
+        rows += classes(
+            found,
+            of,
+            sorted({of(one) for one in found if one.in_catalogue}, key=lambda name: (len(name), name)),
+        )
+    return rows
+
+
+def outside(found: list[Score]) -> list[list[str]]:
+    """Effects that have no name."""
+    rows = []
+    for low, high in ((0, 5), (5, 15), (15, math.inf)):
+        chosen = [one for one in found if one.kind == "outside" and low <= one.beyond < high]
+        answers = [
+            [one.right for one in chosen],
+            [one.wrong_name for one in chosen],
+            [one.answer == "ambiguous" and not one.decided for one in chosen],
+            [one.answer == "none" for one in chosen],
+        ]
+        name = f"{low} to {high:g}" if high < math.inf else f"above {low}"
+        rows.append([name, str(len(chosen)), *(str(rate(flags)) for flags in answers)])
+    return rows
+
+
+def write(folders: object, seed: int, numbers: Sequence[int], output: Path) -> int:
+    """Write page and figure; return the exit code."""
+    found, unreachable = scores_of(folders, numbers)
+    if not found:
+        print("discovery_campaign: there is no result yet")
+        return 1
+    text = page(folders, found, unreachable, seed, len(numbers))
+    (output.parent / "figures").mkdir(parents=True, exist_ok=True)
+    figure.confusion(found, truths(found), output.parent / "figures" / "discovery_confusion.png")
+    output.write_text(text)
+    print(f"discovery_campaign: {len(found)} of {len(numbers)} cases; wrote {output}")
+    return 0

@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Holds a verdict against the truth."""
+
+import math
+from dataclasses import dataclass
+
+EQUIVALENT = frozenset({"offset_force", "asymmetric_friction", "sensor_bias", "sensor_gain"})
+"""One motion while the body slides and scale, friction and barrier are free: only a set is right."""
+STRONG = 5.0
+"""d' from which on the bars count."""
+SEPARABLE = 3.0
+"""d' that has to be left beside any one other effect for a name to be possible."""
+PRECISE = 10.0
+ANSWERS = ("named", "ambiguous", "none", "not-in-catalogue")
+
+
+@dataclass(frozen=True)
+class Score:
+    """One case, judged."""
+
+    number: int
+    kind: str
+    truth: str
+    noise: float
+    colour: str
+    regime: str
+    samples: int
+    velocity: bool
+    crank_angle: bool
+    d_prime: float
+    beyond: float
+    answer: str
+    """named, ambiguous, none, not-in-catalogue, or failed."""
+    column: str
+    """Where it stands in the confusion matrix."""
+    decided: bool
+    right: bool
+    contains: bool
+    """The set that was reported has the truth."""
+    wrong_name: bool
+    errors: tuple[float, ...]
+    """Relative errors of the parameters of the effect, where it was named rightly."""
+    covered: tuple[bool, ...]
+    removed: float
+    """Share of the held-out excess that the verdict removed; NaN without excess or name."""
+    seconds: float
+    baselines: dict[str, str]
+    baselines_right: dict[str, bool]
+
+    @property
+    def in_catalogue(self) -> bool:
+        """Whether it has a name."""
+        return self.kind in ("single", "pair")
+
+    @property
+    def strong(self) -> bool:
+        """Whether the bars on names count for it."""
+        return self.in_catalogue and self.d_prime >= STRONG
+
+    @property
+    def separable(self) -> bool:
+        """Whether something is left of it beside any one other effect."""
+        return self.in_catalogue and self.beyond >= SEPARABLE
+
+
+def reported(verdict: dict) -> set[frozenset[str]]:
+    """All that a verdict considers possible, each as a set of effects."""
+    if verdict["outcome"] not in ("named", "ambiguous"):
+        return set()
+    words = ["+".join(verdict["effects"]), *verdict.get("alternatives", [])]
+    return {frozenset(word.split("+")) for word in words if word}
+
+
+def only_equivalent(sets: set[frozenset[str]]) -> bool:
+    """Whether sets of effects differ by effects only that nothing can tell apart here."""
+    common = frozenset.intersection(*sets)
+    rest = [one - common for one in sets]
+    return len(sets) > 1 and all(len(one) == 1 and one <= EQUIVALENT for one in rest)
+
+
+def score(truth: dict, result: dict) -> Score:
+    """Judge one case."""
+    verdict, names = result["verdict"], frozenset(truth["names"])
+    sets = reported(verdict)
+    answer = verdict["outcome"] if verdict["outcome"] in ANSWERS else "failed"
+    one_answer = answer == "named" or (answer == "ambiguous" and bool(sets) and only_equivalent(sets))
+    contains = names in sets
+    right = {
+        "none": answer == "none",
+        "outside": answer == "not-in-catalogue",
+    }.get(truth["kind"], one_answer and contains)
+    in_catalogue = truth["kind"] in ("single", "pair")
+    part = truth["kind"] == "pair" and answer == "named" and next(iter(sets)) < names
+    errors, covered = precision(truth, verdict) if right and in_catalogue else ((), ())
+    held_out = verdict.get("gap", {}).get("held_out")
+    return Score(
+        number=truth["number"],
+        kind=truth["kind"],
+        truth="+".join(truth["names"]) or "none",
+        noise=truth["noise"],
+        colour=truth["colour"],
+        regime=truth["regime"],
+        samples=truth["samples_per_period"],
+        velocity=truth["velocity"],
+        crank_angle=truth["crank_angle"],
+        d_prime=min(truth["d_prime"].values(), default=0.0),
+        beyond=min((value["d_prime"] or 0.0 for value in truth["beyond"].values()), default=0.0),
+        answer=answer,
+        column=column(answer, sets, one_answer, contains, part),
+        decided=one_answer,
+        right=right,
+        contains=contains,
+        wrong_name=one_answer and not right and not part,
+        errors=errors,
+        covered=covered,
+        removed=removed(held_out) if one_answer else math.nan,
+        seconds=result["seconds"],
+        baselines=result.get("baselines", {}),
+        baselines_right={
+            method: named in names or (named in EQUIVALENT and bool(names & EQUIVALENT))
+            if in_catalogue
+            else named == "none"
+            for method, named in result.get("baselines", {}).items()
+        },
+    )
+
+
+def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: bool, part: bool) -> str:
+    """Column of the confusion matrix."""
+    if answer == "failed":
+        return "no verdict"
+    if answer in ("none", "not-in-catalogue"):
+        return answer
+    if contains:
+        return "right name" if answer == "named" else "equivalent set" if one_answer else "set with the truth"
+    if answer == "ambiguous":
+        return "set without the truth"
+    return "one of the pair" if part else "+".join(sorted(next(iter(sets))))
+
+
+def precision(truth: dict, verdict: dict) -> tuple[tuple[float, ...], tuple[bool, ...]]:
+    """Relative errors of the size of each effect, and whether its interval has the truth.
+
+    A parameter whose truth is 0, and one that the fit keeps, has no relative error.
+    """
+    errors, covered = [], []
+    for path, value in truth["parameters"].items():
+        found = verdict.get("parameters", {}).get(path)
+        if found is None or value == 0 or not found.get("standard_error"):
+            continue
+        errors.append(abs(found["value"] / value - 1))
+        low, high = found["interval_95"]
+        covered.append(low <= value <= high)
+    return tuple(errors), tuple(covered)
+
+
+def removed(held_out: dict | None) -> float:
+    """Share of reduced chi^2 above 1 that is gone on the held-out record; NaN where there was none."""
+    if not held_out or held_out["before"] is None or held_out["before"] <= 1.1:
+        return math.nan
+    return (held_out["before"] - max(1.0, held_out["after"])) / (held_out["before"] - 1)

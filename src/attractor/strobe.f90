@@ -1,0 +1,285 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A machine of one body or two as the stroboscopic map sees it: a state that moves from section to section, and the
+!> coordinates that fix it there. Those of one body are x and v. Of two, what nothing depends on is left out: the driving
+!> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
+!> velocity of both where nothing ties either to the ground.
+module strobe
+  use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck
+  use contact_law, only: contact_t
+  use energy, only: energy_of_body, record_with_book
+  use kinds, only: wp
+  use motion, only: advance, advance_period, motion_t, start_state
+  use motion_state, only: log_t, record_sample, state_t, tally_t
+  use pair, only: driven_by_controller, driven_by_force, driven_by_motion
+  use pair_flight, only: body_state, driver_of, energy_of
+  use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
+  use pair_motion, only: advance_pair, advance_pair_period, start_pair
+  implicit none
+  private
+
+  public :: strobe_t, coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, section_state, &
+    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, rest_lasts, energy_now, record_end
+
+  !> Coordinates of two bodies.
+  integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5
+
+  !> `state` is that of the body, or of the driven one of two.
+  type :: strobe_t
+    type(state_t) :: state
+    type(pair_state_t) :: pair
+  end type strobe_t
+
+contains
+
+  !> Which coordinates of two bodies count.
+  pure function counts_of(moving) result(counts)
+    type(motion_t), intent(in) :: moving
+    logical :: counts(most_coordinates)
+    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
+    associate (machine => moving%pair%machine)
+      counts = .false.
+      counts(of_place) = machine%upper < unreachable .or. machine%lower > -unreachable
+      counts(of_v2) = .true.
+      if (machine%drive == driven_by_motion) return
+      counts(of_x1) = machine%stiffness > 0 .or. machine%drive == driven_by_controller
+      counts(of_v1) = .not. floats(moving)
+      counts(of_integral) = abs(machine%integral) > 0
+    end associate
+  end function counts_of
+
+  !> The same two bodies without stops, if that takes away just the first coordinate, the place; else nothing.
+  pure subroutine without_stops(moving, free, found)
+    type(motion_t), intent(in) :: moving
+    type(motion_t), intent(out) :: free
+    logical, intent(out) :: found
+    found = .false.
+    if (.not. allocated(moving%pair)) return
+    free = moving
+    free%machine%contact = contact_t()
+    associate (machine => free%pair%machine)
+      machine%contact = contact_t()
+      machine%upper = huge(1.0_wp)
+      machine%lower = -huge(1.0_wp)
+    end associate
+    associate (before => counts_of(moving), after => counts_of(free))
+      found = before(of_place) .and. .not. after(of_place) .and. all(before(of_v2:) .eqv. after(of_v2:))
+    end associate
+  end subroutine without_stops
+
+  !> Whether two bodies may as well be looked at from a frame that moves along.
+  pure logical function floats(moving)
+    type(motion_t), intent(in) :: moving
+    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
+    associate (machine => moving%pair%machine)
+      floats = machine%drive == driven_by_force .and. .not. machine%stiffness > 0 .and. .not. machine%damping > 0 .and. &
+               (machine%carried .or. (machine%upper >= unreachable .and. machine%lower <= -unreachable))
+    end associate
+  end function floats
+
+  !> Number of coordinates on the section.
+  pure integer function coordinates_of(moving) result(n)
+    type(motion_t), intent(in) :: moving
+    n = 2
+    if (allocated(moving%pair)) n = count(counts_of(moving))
+  end function coordinates_of
+
+  !> Whether the state on the section tells what follows: not with a controller that acts at times of its own, nor before
+  !> a blow.
+  pure logical function has_section(moving)
+    type(motion_t), intent(in) :: moving
+    has_section = .true.
+    if (.not. allocated(moving%pair)) return
+    associate (machine => moving%pair%machine)
+      has_section = .not. machine%sample_time > 0 .and. .not. abs(machine%blow) > 0
+    end associate
+  end function has_section
+
+  !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says.
+  pure function start_strobe(moving, start) result(strobe)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: start(3)
+    type(strobe_t) :: strobe
+    if (allocated(moving%pair)) then
+      associate (machine => moving%pair%machine)
+        strobe%pair = start_pair(moving%pair, start(1), start(2), [machine%driver_x0, machine%driver_v0], start(3))
+      end associate
+      strobe%state = body_state(strobe%pair)
+    else
+      strobe%state = start_state(moving, start(1), start(2), start(3))
+    end if
+  end function start_strobe
+
+  !> The state of one machine given to another, on the section with the crank at an angle [rad]; a driving body whose motion
+  !> is given has that of the new one. What was never moved starts as the new machine says.
+  pure function resume_strobe(moving, before, angle) result(strobe)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: before
+    real(wp), intent(in) :: angle
+    type(strobe_t) :: strobe
+    if (.not. allocated(moving%pair) .or. before%pair%mode == 0) then
+      strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
+      return
+    end if
+    associate (y => before%pair%y)
+      strobe%pair = start_pair(moving%pair, y(at_x2) - merge(y(at_ramp), 0.0_wp, moving%pair%machine%carried), y(at_v2), &
+                               [y(at_x1) - y(at_ramp), y(at_v1)], angle, y(at_integral))
+    end associate
+    strobe%state = body_state(strobe%pair)
+  end function resume_strobe
+
+  !> The state on the section with the coordinates `point`; what they leave open is zero.
+  pure function strobe_at(moving, point) result(strobe)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    type(strobe_t) :: strobe
+    real(wp) :: all_of_them(most_coordinates)
+    integer :: n
+    if (.not. allocated(moving%pair)) then
+      strobe%state = start_state(moving, point(1), point(2), 0.0_wp)
+      return
+    end if
+    n = coordinates_of(moving)
+    all_of_them = unpack(point(:n), counts_of(moving), 0.0_wp)
+    associate (machine => moving%pair%machine)
+      if (machine%carried) then
+        if (machine%drive == driven_by_motion) all_of_them(of_x1) = machine%mean + machine%amplitude
+        all_of_them(of_place) = all_of_them(of_place) + all_of_them(of_x1)
+      end if
+      strobe%pair = start_pair(moving%pair, all_of_them(of_place), all_of_them(of_v2), all_of_them([of_x1, of_v1]), 0.0_wp, &
+                               all_of_them(of_integral))
+    end associate
+    strobe%state = body_state(strobe%pair)
+  end function strobe_at
+
+  !> Coordinates of a state on the section, zeros after the last.
+  pure function section_point(moving, strobe) result(point)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(in) :: strobe
+    real(wp) :: point(most_coordinates), all_of_them(most_coordinates)
+    integer :: n
+    point = 0
+    if (.not. allocated(moving%pair)) then
+      point(:2) = [strobe%state%x, strobe%state%v]
+      return
+    end if
+    all_of_them = strobe%pair%y([at_x2, at_v2, at_x1, at_v1, at_integral])
+    if (moving%pair%machine%carried) all_of_them(of_place) = all_of_them(of_place) - all_of_them(of_x1)
+    if (floats(moving)) all_of_them(of_v2) = all_of_them(of_v2) - all_of_them(of_v1)
+    ! A reference that runs away takes the driving body along.
+    all_of_them(of_x1) = all_of_them(of_x1) - strobe%pair%y(at_ramp)
+    n = coordinates_of(moving)
+    point(:n) = pack(all_of_them, counts_of(moving))
+  end function section_point
+
+  !> x, v at a point of the section, and those of the driving body of two (0 of one).
+  pure function section_state(moving, point) result(state)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    real(wp) :: state(4)
+    type(strobe_t) :: strobe
+    strobe = strobe_at(moving, point)
+    state = 0
+    if (allocated(moving%pair)) state(3:) = driver_of(strobe%pair)
+    state(:2) = [strobe%state%x, strobe%state%v]
+  end function section_state
+
+  !> Sizes of the coordinates in a motion over `half_range` [m] of the position. Two bodies may drift: then they are those of
+  !> what the stops or the forces allow.
+  pure function scales_of(moving, half_range) result(scales)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: half_range
+    real(wp) :: scales(most_coordinates), w, length
+    logical :: counts(most_coordinates)
+    integer :: n
+    w = moving%machine%drive_frequency
+    scales = 1
+    if (.not. allocated(moving%pair)) then
+      scales(:2) = half_range*[1.0_wp, w]
+    else
+      counts = counts_of(moving)
+      n = count(counts)
+      length = half_range
+      if (moving%pair%machine%carried) length = min(length, (moving%pair%machine%upper - moving%pair%machine%lower)/2)
+      if (.not. counts(of_place)) length = min(length, moving%pair%force_scale/(moving%machine%mass*w**2))
+      scales(:n) = pack(length*[1.0_wp, w, 1.0_wp, w, 1/w], counts)
+    end if
+  end function scales_of
+
+  !> Moves to `time_end` [s after the section, at most one period]; `reason` as in `advance`.
+  pure subroutine advance_strobe(moving, strobe, time_end, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(inout) :: strobe
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    if (allocated(moving%pair)) then
+      call advance_pair(moving%pair, strobe%pair, time_end, tally, reason, log)
+      strobe%state = body_state(strobe%pair)
+    else
+      call advance(moving, strobe%state, time_end, tally, reason, log)
+    end if
+  end subroutine advance_strobe
+
+  !> Moves to the next section and starts the clock anew.
+  pure subroutine advance_strobe_period(moving, strobe, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(inout) :: strobe
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    if (allocated(moving%pair)) then
+      call advance_pair_period(moving%pair, strobe%pair, tally, reason, log)
+      strobe%state = body_state(strobe%pair)
+    else
+      call advance_period(moving, strobe%state, tally, reason, log)
+    end if
+  end subroutine advance_strobe_period
+
+  !> Features of what was counted over `periods` drive periods. Two bodies that do not slip may well move.
+  pure function features_over(moving, tally, periods) result(features)
+    type(motion_t), intent(in) :: moving
+    type(tally_t), intent(in) :: tally
+    real(wp), intent(in) :: periods
+    type(features_t) :: features
+    features = regime_of(tally, periods)
+    if (allocated(moving%pair) .and. features%regime == regime_at_rest) features%regime = regime_stuck
+  end function features_over
+
+  !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move
+  !> as one in a way that is given.
+  pure logical function rest_lasts(moving)
+    type(motion_t), intent(in) :: moving
+    rest_lasts = .true.
+    if (allocated(moving%pair)) rest_lasts = moving%pair%machine%drive == driven_by_motion
+  end function rest_lasts
+
+  !> Energy of the machine [J].
+  pure real(wp) function energy_now(moving, strobe) result(energy)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(in) :: strobe
+    if (allocated(moving%pair)) then
+      energy = energy_of(moving%pair, strobe%pair)
+    else
+      energy = energy_of_body(moving%machine, strobe%state)
+    end if
+  end function energy_now
+
+  !> Closes the book of a log, with a last sample if it has any.
+  pure subroutine record_end(moving, strobe, sampled, log)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(in) :: strobe
+    logical, intent(in) :: sampled
+    type(log_t), intent(inout) :: log
+    log%book%at_end = energy_now(moving, strobe)
+    if (.not. sampled) return
+    if (allocated(moving%pair)) then
+      call record_sample(log, strobe%state, driver_of(strobe%pair), log%book)
+    else
+      call record_with_book(moving%machine, strobe%state, log)
+    end if
+  end subroutine record_end
+
+end module strobe

@@ -1,0 +1,81 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What is allowed in a case and hardly meant.
+module case_warnings
+  use case_setup, only: grid_of
+  use case_type, only: case_t
+  use contact_law, only: contact_at_speed, contact_hunt_crossley, contact_t
+  use errors, only: error_t
+  use friction_law, only: power
+  use grid, only: grid_t, slice_motion
+  use journal, only: journal_t
+  use kinds, only: int64, wp
+  use motion, only: motion_t
+  use pair, only: impact_mass
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: warn_about
+
+contains
+
+  !> One line in the journal for each. Looks at the case itself, not along its axes.
+  subroutine warn_about(the_case, journal)
+    type(case_t), intent(in) :: the_case
+    type(journal_t), intent(inout) :: journal
+    type(grid_t) :: grid
+    type(motion_t) :: moving
+    type(error_t), allocatable :: error
+    grid = grid_of(the_case, the_case%axes(:0))
+    call slice_motion(grid, 0_int64, moving, error)
+    if (allocated(error)) return
+    if (allocated(moving%pair)) then
+      associate (machine => moving%pair%machine)
+        if (abs(machine%blow) > 0 .and. machine%blow_time > the_case%run%duration) then
+          call journal%line('warning', 'warning: body.blow_time = '//to_text(machine%blow_time)//' s is after the end, run.'// &
+            'duration = '//to_text(the_case%run%duration)//' s: no blow falls')
+        end if
+      end associate
+    end if
+    if (moving%machine%contact%soft) call warn_about_steps(the_case, moving, journal)
+  end subroutine warn_about
+
+  !> Says if a body that leans on a soft barrier would use up the steps of a trajectory.
+  subroutine warn_about_steps(the_case, moving, journal)
+    type(case_t), intent(in) :: the_case
+    type(motion_t), intent(in) :: moving
+    type(journal_t), intent(inout) :: journal
+    real(wp) :: force, mass, lasts
+    mass = moving%machine%mass
+    force = moving%machine%force_scale
+    if (allocated(moving%pair)) then
+      mass = impact_mass(moving%pair%machine)
+      force = moving%pair%force_scale
+    end if
+    lasts = the_case%integrator%step_budget/steps_per_second(moving%machine%contact, mass, force)
+    if (lasts >= the_case%run%duration) return
+    call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &
+      to_text(the_case%integrator%step_budget)//' lasts a body that leans on it about '//to_text(lasts, 2)//' s of '// &
+      to_text(the_case%run%duration)//' s; it then ends as step_budget. A softer barrier, or a rigid one '// &
+      '(contact.law = "newton"), is faster')
+  end subroutine warn_about_steps
+
+  !> About how many steps a body of `mass` [kg] pressed by `force` [N] takes [1/s]: twenty a period of its vibration, and
+  !> no longer than an explicit method of this order is stable under the damping, 6 m/D.
+  pure real(wp) function steps_per_second(contact, mass, force) result(rate)
+    type(contact_t), intent(in) :: contact
+    real(wp), intent(in) :: mass, force
+    type(contact_t) :: law
+    real(wp) :: depth, damping
+    law = contact_at_speed(contact, 1.0_wp)
+    depth = power(force/law%stiffness, 1/law%exponent)
+    damping = law%damping
+    if (law%kind == contact_hunt_crossley) damping = law%damping*force
+    rate = damping/(6*mass)
+    if (depth > 0) rate = rate + 3*sqrt(law%exponent*law%stiffness*power(depth, law%exponent - 1)/mass)
+    rate = max(rate, tiny(rate)**0.25_wp)
+  end function steps_per_second
+
+end module case_warnings

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Regimes of the published machine, and the motion of one experiment on it."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from simulator import NOWHERE, Machine, V, X, simulate, simulate_pieces, state
+
+GRAVITY = 9.81
+STIFFNESS = 9 * math.pi**2
+ANGLE = math.radians(191.1)
+COSINE = (0.09495, 0.01, -0.02003)
+SINE = (0.0, 0.02849, -0.02686)
+FINE = 1600
+"""Least steps per drive period of a record."""
+
+
+@dataclass(frozen=True)
+class Regime:
+    """A machine as its owner believes it to be, and the drive ratios of its experiments."""
+
+    friction: tuple[str, ...]
+    """What the base case has: coulomb, viscous or both."""
+    coefficient: float
+    damping: float
+    restitution: float
+    upper: float
+    ratios: tuple[float, float]
+    spacing: float
+    """Least distance of two ratios."""
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Parameters of the machine that whoever looks for an effect has to refit."""
+        return ("stiffness", *self.friction, "restitution", "upper", "scale")
+
+    def machine(self) -> Machine:
+        """The machine of the base case; its drive has yet no frequency."""
+        return Machine(
+            mass=1,
+            stiffness=STIFFNESS,
+            free_length=0.4,
+            mean=0.31055,
+            scale=1,
+            angle=ANGLE,
+            coulomb=self.coefficient * GRAVITY,
+            viscous=self.damping,
+            restitution=self.restitution,
+            upper=self.upper,
+            lower=-NOWHERE,
+        ).copy(cosine=COSINE, sine=SINE)
+
+
+REGIMES = {
+    "published": Regime(("coulomb",), 0.2, 0.0, 0.5, 1.1, (0.7, 1.32), 0.12),
+    "damped": Regime(("coulomb", "viscous"), 0.1, 1.0, 0.6, 0.95, (0.7, 1.32), 0.12),
+    "viscous": Regime(("viscous",), 0.0, 1.5, 0.5, 1.05, (0.7, 1.32), 0.12),
+    "wild": Regime(("coulomb",), 0.05, 0.0, 0.8, 0.71, (0.77, 0.9), 0.025),
+    "rough": Regime(("coulomb",), 0.05, 0.0, 0.65, 0.71, (0.8, 0.97), 0.03),
+}
+
+
+@dataclass
+class Experiment:
+    """Conditions of one record."""
+
+    ratio: float
+    """Drive frequency over the natural frequency of the *base case*."""
+    phase: float
+    """Crank angle at the first sample [rad]."""
+    x0: float
+    v0: float
+    settling: int
+    """Drive periods from the start to the first sample."""
+    samples_per_period: int
+    periods: int
+    sensor: dict[str, float] = field(default_factory=dict)
+    """sensor_bias [m], sensor_gain [1], sensor_delay [s] of the position."""
+
+    @property
+    def frequency(self) -> float:
+        """Of the drive [rad/s]."""
+        return self.ratio * math.sqrt(STIFFNESS)
+
+    @property
+    def interval(self) -> float:
+        """Time between samples [s]."""
+        return 2 * math.pi / self.frequency / self.samples_per_period
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return self.periods * self.samples_per_period + 1
+
+    def driven(self, machine: Machine) -> Machine:
+        """The machine with the drive of this experiment."""
+        return machine.copy(frequency=self.frequency, phase=self.phase)
+
+    def substeps(self, steps_per_period: int) -> int:
+        """Steps between two samples."""
+        return -(-steps_per_period // self.samples_per_period)
+
+    def states(self, driven: Machine, steps_per_period: int = FINE) -> tuple[np.ndarray, int]:
+        """States at the samples, time 0 at the first, and the number of impacts in the record."""
+        before = self.settling * self.samples_per_period
+        substeps = self.substeps(steps_per_period)
+        begin = (-before * self.interval, self.interval, before + self.count, substeps)
+        start = state(driven, self.x0, self.v0)
+        states, impacts = simulate(driven, start, *begin)
+        if before:
+            _, earlier = simulate(driven.copy(), start, *begin[:2], before + 1, substeps)
+            impacts -= earlier
+        return states[before:], impacts
+
+    def observe(self, driven: Machine, states: np.ndarray, steps_per_period: int = FINE) -> np.ndarray:
+        """Position and velocity (count, 2) as a sensor without noise shows them."""
+        seen = states[:, [X, V]].copy()
+        delay = self.sensor.get("sensor_delay", 0.0)
+        if delay > 0:
+            seen[:, X] = self._delayed(driven, states, delay, self.substeps(steps_per_period))
+        seen[:, X] *= 1 + self.sensor.get("sensor_gain", 0.0)
+        seen[:, X] += self.sensor.get("sensor_bias", 0.0)
+        return seen
+
+    def _delayed(self, driven: Machine, states: np.ndarray, delay: float, substeps: int) -> np.ndarray:
+        """Positions `delay` before the samples; before the first sample the first."""
+        whole = math.ceil(delay / self.interval)
+        rest = whole * self.interval - delay
+        starts = np.ascontiguousarray(states[: len(states) - whole])
+        t0 = np.arange(len(starts)) * self.interval
+        first = np.arange(0, 2 * len(starts) + 1, 2)
+        ends, _ = simulate_pieces(driven, starts, t0, first, max(rest, 1e-12), substeps)
+        return np.concatenate([np.full(whole, states[0, X]), ends[1::2, X]])

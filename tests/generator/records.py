@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes a case: the base case file, the records, and the truth under a seal that can be published before."""
+
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+from design import MEMORY, Case, sizes_of_noise
+from experiment import ANGLE, COSINE, FINE, GRAVITY, REGIMES, SINE, STIFFNESS, Experiment, Regime
+from simulator import X
+
+TRAINING = ("first.csv", "second.csv")
+HELD_OUT = "held_out.csv"
+BASE = "base.toml"
+SEALS = "seals.txt"
+QUANTUM = math.sqrt(6)
+"""Resolution over the standard deviation of the noise, half of whose power it has."""
+FRICTION = {
+    ("coulomb",): 'law = "coulomb"\nkinetic_coefficient = {coefficient!r}',
+    ("viscous",): 'law = "viscous"\ndamping = {damping!r}',
+    (
+        "coulomb",
+        "viscous",
+    ): 'law = "coulomb_viscous"\nkinetic_coefficient = {coefficient!r}\ndamping = {damping!r}',
+}
+
+
+def base_case(regime: Regime, ratio: float) -> str:
+    """The case file of the machine as its owner believes it to be."""
+    friction = FRICTION[regime.friction].format(coefficient=regime.coefficient, damping=regime.damping)
+    return f"""[body]
+mass = 1.0
+gravity = {GRAVITY!r}
+
+[restoring]
+law = "linear"
+stiffness = {STIFFNESS!r}
+free_length = 0.4
+
+[friction]
+{friction}
+
+[contact]
+law = "newton"
+restitution = {regime.restitution!r}
+upper = {regime.upper!r}
+
+[drive]
+law = "fourier"
+ratio = {ratio!r}
+mean = 0.31055
+cosine = {list(COSINE)!r}
+sine = {list(SINE)!r}
+angle = {ANGLE!r}
+"""
+
+
+def measured(case: Case, experiment: Experiment, random: np.random.Generator) -> tuple[dict, float, float]:
+    """Columns of a record as the sensors show them, the noise of the position, and its resolution [m]."""
+    driven = experiment.driven(case.machine)
+    states, _ = experiment.states(driven, FINE)
+    seen = experiment.observe(driven, states, FINE)
+    sigma, sigma_v = sizes_of_noise(seen, case.level)
+    noise = random.standard_normal(seen.shape)
+    resolution = 0.0
+    if case.colour == "coloured":
+        for i in range(1, len(noise)):
+            noise[i] = MEMORY * noise[i - 1] + math.sqrt(1 - MEMORY**2) * noise[i]
+    if case.colour == "quantised":
+        sigma /= math.sqrt(2)
+        resolution = QUANTUM * sigma * math.sqrt(2)
+    x = seen[:, X] + sigma * noise[:, 0]
+    if resolution > 0:
+        x = resolution * np.round(x / resolution)
+    time = np.arange(len(x)) * experiment.interval
+    columns = {"t": time, "x": x}
+    if case.velocity:
+        columns["v"] = seen[:, 1] + sigma_v * noise[:, 1]
+    if case.crank_angle:
+        columns["phi"] = experiment.phase + experiment.frequency * time
+    return columns, sigma, resolution
+
+
+def write_record(path: Path, case: Case, which: int, random: np.random.Generator) -> None:
+    """A record of the CSV contract."""
+    experiment = [*case.training, case.held_out][which]
+    columns, sigma, resolution = measured(case, experiment, random)
+    units = {"t": "s", "x": "m", "v": "m/s", "phi": "rad"}
+    head = {"units": ", ".join(units[name] for name in columns)}
+    head["sampling_rate_hz"] = repr(1 / experiment.interval)
+    head["drive_ratio"] = repr(experiment.ratio)
+    if case.tells_noise:
+        head["sensor_noise_sigma_m"] = repr(sigma)
+    if resolution > 0:
+        head["sensor_resolution_m"] = repr(resolution)
+    if not case.crank_angle:
+        head["phase"] = f"{experiment.phase + case.phase_error[which]:.4f}"
+    lines = [f"# {key}: {value}" for key, value in head.items()]
+    lines.append(",".join(columns))
+    lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def truth_of(case: Case) -> dict:
+    """What is sealed."""
+    return {
+        "number": case.number,
+        "kind": case.kind,
+        "names": [hidden.name for hidden in case.hidden],
+        "parameters": {path: value for hidden in case.hidden for path, value in hidden.parameters.items()},
+        "target": case.target,
+        "d_prime": case.d_prime,
+        "beyond": {
+            name: {"d_prime": worst, "besides": other} for name, (worst, other) in case.beyond.items()
+        },
+        "regime": case.regime,
+        "noise": case.level,
+        "colour": case.colour,
+        "samples_per_period": case.held_out.samples_per_period,
+        "velocity": case.velocity,
+        "crank_angle": case.crank_angle,
+        "ratios": [experiment.ratio for experiment in [*case.training, case.held_out]],
+        "base": {name: getattr(case.base, name) for name in REGIMES[case.regime].unknowns},
+        "seed": case.seed,
+    }
+
+
+def seal(path: Path) -> str:
+    """The hash of a sealed file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def write_case(folder: Path, sealed: Path, case: Case) -> str:
+    """Write what is given into `folder` and the truth into the file `sealed`; return its hash."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / BASE).write_text(base_case(REGIMES[case.regime], case.training[0].ratio))
+    # the sensor's noise has nothing to do with the numbers that drew the case
+    random = np.random.default_rng([*case.seed, 7])
+    for which, name in enumerate((*TRAINING, HELD_OUT)):
+        write_record(folder / name, case, which, random)
+    sealed.parent.mkdir(parents=True, exist_ok=True)
+    sealed.write_text(json.dumps(truth_of(case), indent=1) + "\n")
+    return seal(sealed)

@@ -1,0 +1,282 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The discovery campaign: statistics, how verdicts are judged, command line, and that it can be killed."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+CASES = 3
+SEED = 3
+# what discovery answers in the campaigns of these tests, which are about the campaign
+STAND_IN = """\
+import time
+
+class Options:
+    def __init__(self, seed): self.seed = seed
+
+def discover(base, records, hold_out, options):
+    time.sleep({pause})
+    gap = {{"training": {{"before": 2.0, "after": 1.0}}, "held_out": {{"before": 3.0, "after": 1.2}}}}
+    return {{"outcome": "named", "effects": ["cubic_spring"], "alternatives": [], "gap": gap, "version": "0",
+            "parameters": {{}}, "records": [str(len(records) + len(hold_out))], "seed": options.seed}}
+"""
+
+
+@pytest.fixture(scope="module")
+def campaign(source_dir):
+    """The modules of scripts/campaign."""
+    with pytest.MonkeyPatch.context() as patch:
+        for folder in ("scripts/campaign", "scripts", "tests/generator", "postprocess"):
+            patch.syspath_prepend(str(source_dir / folder))
+        import bars
+        import figure
+        import rates
+        import scoring
+
+        yield rates, scoring, bars, figure
+
+
+# R. G. Newcombe, Statistics in Medicine 17 (1998), table I, method 3
+@pytest.mark.parametrize(
+    ("hits", "cases", "low", "high"),
+    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
+)
+def test_wilson_intervals_as_published(campaign, hits, cases, low, high):
+    found = campaign[0].Rate(hits, cases).interval
+    assert found == pytest.approx((low, high), abs=5e-5)
+
+
+def test_a_rate_without_cases_reaches_no_bar(campaign):
+    rates, _, bars, _ = campaign
+    assert rates.Rate(0, 0).interval == (0.0, 1.0)
+    assert not bars.reached(rates.Rate(0, 0), 0.0, high=True)
+    assert not bars.reached(rates.Rate(0, 0), 1.0, high=False)
+
+
+def truth(names: list[str], kind: str = "single", number: int = 0, **more) -> dict:
+    """A truth as the generator seals it."""
+    return {
+        "number": number,
+        "kind": kind,
+        "names": names,
+        "parameters": {},
+        "d_prime": {name: 12.0 for name in names},
+        "beyond": {name: {"d_prime": 6.0, "besides": "viscous"} for name in names},
+        "regime": "published",
+        "noise": 0.01,
+        "colour": "white",
+        "samples_per_period": 50,
+        "velocity": False,
+        "crank_angle": False,
+    } | more
+
+
+def verdict(outcome: str, effects: list[str] = (), alternatives: list[str] = (), **more) -> dict:
+    """A verdict as the workflow gives it, with its time."""
+    said = {"outcome": outcome, "effects": list(effects), "alternatives": list(alternatives)}
+    return {"verdict": said | more, "seconds": 1.0}
+
+
+# truth, verdict, (decided, right, contains, wrong name), column
+JUDGED = [
+    (truth(["viscous"]), verdict("named", ["viscous"]), (True, True, True, False), "right name"),
+    (truth(["viscous"]), verdict("named", ["stribeck"]), (True, False, False, True), "stribeck"),
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["stribeck"], ["viscous"]),
+        (False, False, True, False),
+        "set with the truth",
+    ),
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["stribeck"], ["dahl"]),
+        (False, False, False, False),
+        "set without the truth",
+    ),
+    (
+        truth(["sensor_bias"]),
+        verdict("ambiguous", ["offset_force"], ["sensor_bias"]),
+        (True, True, True, False),
+        "equivalent set",
+    ),
+    (truth(["sensor_bias"]), verdict("named", ["offset_force"]), (True, False, False, True), "offset_force"),
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["offset_force"], ["sensor_bias"]),
+        (True, False, False, True),
+        "set without the truth",
+    ),
+    (truth(["viscous"]), verdict("none"), (False, False, False, False), "none"),
+    (truth(["viscous"]), verdict("failed"), (False, False, False, False), "no verdict"),
+    (truth([], "none"), verdict("none"), (False, True, False, False), "none"),
+    (truth([], "none"), verdict("named", ["dahl"]), (True, False, False, True), "dahl"),
+    (
+        truth(["second_mode"], "outside"),
+        verdict("not-in-catalogue"),
+        (False, True, False, False),
+        "not-in-catalogue",
+    ),
+    (truth(["second_mode"], "outside"), verdict("named", ["dahl"]), (True, False, False, True), "dahl"),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("named", ["offset_force", "viscous"]),
+        (True, True, True, False),
+        "right name",
+    ),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("ambiguous", ["viscous", "offset_force"], ["viscous+sensor_bias"]),
+        (True, True, True, False),
+        "equivalent set",
+    ),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("named", ["viscous"]),
+        (True, False, False, False),
+        "one of the pair",
+    ),
+    (
+        truth(["viscous"]),
+        verdict("named", ["viscous", "dahl"]),
+        (True, False, False, True),
+        "dahl+viscous",
+    ),
+]
+
+
+@pytest.mark.parametrize(("hidden", "said", "flags", "column"), JUDGED)
+def test_verdicts_are_judged(campaign, hidden, said, flags, column):
+    found = campaign[1].score(hidden, said)
+    assert (found.decided, found.right, found.contains, found.wrong_name) == flags
+    assert found.column == column
+
+
+def test_parameters_are_judged_by_their_intervals(campaign):
+    hidden = truth(["viscous"], parameters={"effect.viscous.damping": 2.0})
+    for value, inside in ((2.1, True), (2.5, False)):
+        found = {"value": value, "standard_error": 0.1, "interval_95": [value - 0.2, value + 0.2]}
+        said = verdict("named", ["viscous"], parameters={"effect.viscous.damping": found})
+        one = campaign[1].score(hidden, said)
+        assert one.errors == pytest.approx((value / 2 - 1,))
+        assert one.covered == (inside,)
+
+
+def test_removed_excess(campaign):
+    assert campaign[1].removed({"before": 3.0, "after": 1.5}) == pytest.approx(0.75)
+    assert campaign[1].removed({"before": 3.0, "after": 0.9}) == 1
+    assert math.isnan(campaign[1].removed({"before": 1.05, "after": 1.0}))
+
+
+def test_the_confusion_matrix_has_every_case_once(campaign):
+    _, scoring, bars, figure = campaign
+    found = [scoring.score({**hidden, "number": i}, said) for i, (hidden, said, _, _) in enumerate(JUDGED)]
+    rows = sorted({one.truth for one in found})
+    counts, columns = figure.confusion_counts(found, rows)
+    assert counts.sum() == len(JUDGED)
+    assert counts[:, columns.index("right")].sum() == sum(flags[1] for _, _, flags, _ in JUDGED)
+    wrong = {row[0]: row[2] for row in bars.bars(found)}["wrong name, all cases"]
+    assert f"({sum(flags[3] for _, _, flags, _ in JUDGED)} of {len(JUDGED)};" in wrong
+
+
+@pytest.mark.parametrize(("name", "size"), [("none", 0.0), ("quadratic_drag", 0.3), ("cubic_spring", 40.0)])
+def test_the_baselines_name_what_is_large(campaign, tmp_path, name, size):
+    pytest.importorskip("pysindy")
+    import baselines
+    import design
+    import effects
+    import records
+
+    number = next(n for n in range(200) if design.plan(SEED, n)[0] == "none")
+    case = design.draw(SEED, number)
+    case.level, case.colour, case.velocity, case.crank_angle = 1e-4, "white", True, True
+    for experiment in (*case.training, case.held_out):
+        experiment.samples_per_period = 400
+    if size > 0:
+        case.hidden = [design.Hidden(name, effects.CATALOGUE[name], {}, 1.0, size)]
+        case.machine = case.hidden[0].on(case.base)
+    records.write_case(tmp_path, tmp_path / "truth.json", case)
+    training = [tmp_path / name for name in records.TRAINING]
+    found = baselines.verdicts(tmp_path / records.BASE, training, 1)
+    if size > 0:
+        assert set(found.values()) == {name}
+    else:
+        assert set(found) == {"STLSQ", "ensemble SINDy"}
+
+
+@pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--many", 64), ("--cases", 64)])
+def test_the_command_line(source_dir, option, code):
+    command = [source_dir / "scripts" / "discovery_campaign", option]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == code
+    assert (option in result.stderr) == (code != 0)
+
+
+def start(source_dir, folder, pause: float) -> subprocess.Popen:
+    """A campaign with an answer that is always the same."""
+    package = folder / "stand_in" / "separatrix"
+    (package / "discovery").mkdir(parents=True, exist_ok=True)
+    (package / "discovery" / "__init__.py").write_text(STAND_IN.format(pause=pause))
+    for name in ("errors", "style"):
+        (package / f"{name}.py").write_text(
+            (source_dir / "postprocess" / "separatrix" / f"{name}.py").read_text()
+        )
+    (package / "__init__.py").write_text("")
+    (folder / "stand_in" / "pysindy.py").write_text("STLSQ = None\n")
+    (folder / "stand_in" / "baselines.py").write_text(
+        "verdicts = lambda *_: {'STLSQ': 'none', 'ensemble SINDy': 'none'}\n"
+    )
+    program = source_dir / "scripts" / "campaign" / "campaign.py"
+    code = f"import sys, runpy; sys.path.insert(0, {str(folder / 'stand_in')!r}); import baselines; "
+    code += (
+        f"sys.path.insert(1, {str(program.parent)!r}); runpy.run_path({str(program)!r}, run_name='__main__')"
+    )
+    words = [
+        "--cases",
+        str(CASES),
+        "--seed",
+        str(SEED),
+        "--out",
+        folder / "out",
+        "--output",
+        folder / "page.md",
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(folder / "stand_in"), "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.Popen([sys.executable, "-c", code, *words], env=environment, stdout=subprocess.DEVNULL)
+
+
+def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path):
+    results = {}
+    for name in ("whole", "killed"):
+        folder = tmp_path / name
+        if name == "killed":
+            first = start(source_dir, folder, 0.5)
+            done = folder / "out" / f"seed_{SEED}" / "results" / "0000.json"
+            deadline = time.monotonic() + 120
+            while not done.is_file() and time.monotonic() < deadline:
+                time.sleep(0.05)
+            first.send_signal(signal.SIGKILL)
+            first.wait()
+            assert done.is_file()
+            assert not (folder / "page.md").is_file()
+        assert start(source_dir, folder, 0.0).wait(timeout=300) == 0
+        results[name] = (folder / "page.md").read_text()
+        found = sorted((folder / "out" / f"seed_{SEED}" / "results").glob("*.json"))
+        assert [json.loads(path.read_text())["number"] for path in found] == list(range(CASES))
+        assert (folder / "figures" / "discovery_confusion.png").is_file()
+    assert results["whole"] == results["killed"]
+
+
+def test_another_truth_than_the_sealed_one_is_noticed(campaign, source_dir, tmp_path):
+    assert start(source_dir, tmp_path, 0.0).wait(timeout=300) == 0
+    sealed = tmp_path / "out" / f"seed_{SEED}" / "sealed" / "0001.json"
+    sealed.write_text(sealed.read_text().replace('"kind"', '"kind" '))
+    (tmp_path / "page.md").unlink()
+    assert start(source_dir, tmp_path, 0.0).wait(timeout=300) != 0
+    assert not (tmp_path / "page.md").is_file()

@@ -1,0 +1,308 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report of a discovery says what the verdict says, whatever it is, and shows no empty figure."""
+
+import base64
+import io
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from program import CASE
+from separatrix.discovery.options import Options
+from separatrix.discovery.report import write_report
+
+SECTIONS = [
+    "verdict", "compared", "gap", "where", "missing", "confusable", "residuals", "impacts", "held-out",
+    "parameters", "detectable", "next", "motion",
+]  # fmt: skip
+FIGURES = [
+    "gap",
+    "where-lines",
+    "where-plane",
+    "ranking",
+    "confusability",
+    "residual",
+    "impact-map",
+    "overlay",
+]
+RATE = 12.0
+NAMES = ["cubic_spring", "offset_force", "sensor_bias"]
+
+
+class Page(HTMLParser):
+    """Sections, tables (by their first head cell), pictures and text of a report."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.sections: list[str] = []
+        self.tables: dict[str, list[list[str]]] = {}
+        self.pictures: list[tuple[str, np.ndarray]] = []
+        self.sources: list[str] = []
+        self.text = ""
+        self._rows: list[list[str]] = []
+        self._figure = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list) -> None:
+        found = dict(attrs)
+        if tag == "section":
+            self.sections.append(found["id"])
+        elif tag == "table":
+            self._rows = []
+        elif tag == "tr":
+            self._rows.append([])
+        elif tag in ("th", "td"):
+            self._rows[-1].append("")
+        elif tag == "figure":
+            self._figure = found["id"]
+        elif tag == "img":
+            self.sources.append(found["src"])
+            data = base64.b64decode(found["src"].removeprefix("data:image/png;base64,"))
+            self.pictures.append((self._figure, imread(io.BytesIO(data))))
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "table":
+            self.tables[self._rows[0][0]] = self._rows[1:]
+            self._rows = []
+
+    def handle_data(self, data: str) -> None:
+        self.text += data + " "
+        if self._rows and self._rows[-1]:
+            self._rows[-1][-1] += data
+
+
+def verdict(outcome: str) -> dict:
+    """A verdict like those of the workflow."""
+    found = outcome in ("named", "ambiguous")
+    effects = NAMES[:1] if found else []
+    after = 1.013 if found else 7.25
+    parameters = {
+        "restoring.stiffness": {
+            "value": 88.8833, "standard_error": 0.0804, "interval_95": [88.7257, 89.0409], "unit": "N/m",
+        }
+    }  # fmt: skip
+    if found:
+        parameters["effect.cubic_spring.stiffness"] = {
+            "value": 9.83014, "standard_error": 0.8334, "interval_95": [8.19671, 11.4636], "unit": "N/m^3",
+        }  # fmt: skip
+    return {
+        "outcome": outcome,
+        "effects": effects,
+        "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
+        "equivalent": False,
+        "equivalences": ["offset_force and sensor_bias: a shift"] if outcome == "ambiguous" else [],
+        "parameters": parameters,
+        "where": [{"map": "position", "text": "a force of 2.55 +- 0.32 N is missing at 0.9 to 1.1 m"}],
+        "gap": {
+            "training": {"before": 7.25, "after": after, "noise_floor": 1.0},
+            "held_out": {"before": 41234.5, "after": 1.0093 if found else 41234.5, "noise_floor": 1.0},
+        },
+        "gates": {"converged": True, "detect": True, "separate": outcome == "named"} if found else {},
+        "p_value": 5.8e-74 if found else None,
+        "reasons": [] if outcome in ("named", "none") else ["gate 'separate' was not passed"],
+        "detectable": {
+            "cubic_spring": {"size": 4.2252, "path": "effect.cubic_spring.stiffness", "unit": "N/m^3"},
+            "offset_force": {"size": None, "path": "effect.offset_force.force", "unit": "N"},
+        },
+        "confusability": {"names": NAMES, "matrix": [[1.0, 0.31, 0.2], [0.31, 1.0, 0.98], [0.2, 0.98, 1.0]]},
+        "separating_experiment": "measure the barrier" if outcome == "ambiguous" else "",
+        "d_prime": {"cubic_spring": 11.879, "offset_force": 8.2804, "sensor_bias": 0.0},
+        "candidates": [
+            {
+                "effect": name, "training": 69.75 / k, "held_out": 99.69 / k, "evidence": 168.44 / k,
+                "reduced_chi2": 1.01 * k, "converged": k == 1, "starts": 1,
+                "values": {f"effect.{name}.size": 9.83 * k},
+            }
+            for k, name in enumerate(NAMES[:2], 1)
+        ],
+        "ceiling": {"speed": {"gain": 130.05, "rank": 7, "p": 6.1e-25}},
+        "not_tested": {"static_excess": "it changes nothing"},
+        "warnings": ["f0: noise is stated"],
+        "records": [
+            {
+                "name": name, "use": use, "samples": 600, "sigma": 1e-3, "memory": 0.0, "resolution": 0.0,
+                "drive_frequency": RATE, "phase_known": True,
+            }
+            for name, use in (("f0", "training"), ("f1", "held out"))
+        ],
+        "held_out_chosen": "as asked for",
+        "seed": 1,
+        "version": "0.1.0",
+        "runtime_s": 7.662,
+    }  # fmt: skip
+
+
+def write_details(path: Path, stages: tuple[str, ...]) -> None:
+    """Numbers behind the figures, in the layout of details.h5."""
+    random = np.random.default_rng(3)
+    t = np.arange(600) / 100
+    x, v = 0.7 + 0.3 * np.cos(RATE * t), -0.3 * RATE * np.sin(RATE * t)
+    segment = np.arange(t.size) // 50
+    hits = np.arange(0.0, 6.0, 0.5)
+    speed = 1 + 0.5 * np.sin(hits)
+    with h5py.File(path, "w") as file:
+        for name, unit, count in (
+            ("time", "s", 12),
+            ("position", "m", 10),
+            ("position and velocity", "m, m/s", 25),
+        ):
+            group = file.create_group(f"where/{name}")
+            group.attrs["unit"] = unit
+            group["edges"] = np.linspace(0, 1, count + 1 if count < 25 else 6)
+            if count == 25:
+                group["velocity_edges"] = np.linspace(-3, 3, 6)
+            group["force"], group["error"] = random.normal(size=count), np.full(count, 0.2)
+            group["flagged"] = group["force"][:] > 0.6
+        for use, name in (("training", "f0"), ("held_out", "f1")):
+            record = file.create_group(f"records/{name}")
+            record.attrs["held_out"], record.attrs["sigma"] = use == "held_out", 1e-3
+            record["t"], record["x"] = t, x
+            record["smoothed"] = np.column_stack([x, v, 0 * v])
+            record["impacts"] = np.column_stack(
+                [hits, 1.1 + 0 * hits, speed, -0.5 * speed, 0.01 + 0 * hits, 0.01 + 0 * hits]
+            )
+            for stage in stages:
+                group = file.create_group(f"{use}/{name}/{stage}")
+                group.attrs["crank_angle"] = 0.0
+                group["t"], group["segment"], group["x"], group["v"] = t, segment, x, v
+                size = 300 * np.sin(3 * t) if stage == "before" else 0
+                group["residual"] = random.normal(size=t.size) + size
+                group["good"] = np.ones(segment[-1] + 1, bool)
+                group["impacts"] = np.column_stack([0 * hits, hits, speed, 0.45 * speed, 1 + 0 * hits])
+
+
+def make(folder: Path, outcome: str) -> dict:
+    """What separatrix-discover leaves in its folder."""
+    told = verdict(outcome)
+    (folder / "verdict.json").write_text(json.dumps(told))
+    write_details(folder / "details.h5", ("before", "after") if told["effects"] else ("before",))
+    return told
+
+
+@pytest.fixture(scope="module", params=["named", "ambiguous", "none", "not-in-catalogue"])
+def report(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[dict, Page, bytes]:
+    """The verdict, the page and the PDF of each outcome."""
+    folder = tmp_path_factory.mktemp(request.param)
+    told = make(folder, request.param)
+    html, pdf = write_report(folder, folder / "base.toml", Options(quick=True))
+    return told, Page(html.read_text()), pdf.read_bytes()
+
+
+def same(cell: str, value: float | None) -> bool:
+    """Whether a cell prints a number to the digits that it shows."""
+    return cell == "unknown" if value is None else float(cell) == pytest.approx(value, rel=6e-3)
+
+
+def test_every_section_is_there(report: tuple) -> None:
+    assert report[1].sections == SECTIONS
+
+
+def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
+    told, page, _ = report
+    for row, gap in zip(page.tables["records"], told["gap"].values(), strict=True):
+        assert all(
+            same(cell, gap[key])
+            for cell, key in zip(row[1:4], ("before", "after", "noise_floor"), strict=True)
+        )
+    for row, (path, one) in zip(page.tables["parameter"], told["parameters"].items(), strict=True):
+        assert row[0] == path
+        assert row[4] == one["unit"]
+        numbers = [*row[1:3], *row[3].split(" to ")]
+        wanted = [one["value"], one["standard_error"], *one["interval_95"]]
+        assert all(same(cell, value) for cell, value in zip(numbers, wanted, strict=True))
+    assert page.tables["gate" if told["gates"] else "effect"]
+    for row, (gate, passed) in zip(page.tables.get("gate", []), told["gates"].items(), strict=True):
+        assert (row[0], row[2]) == (gate, "passed" if passed else "failed")
+    for row, one in zip(page.tables["effect"], told["detectable"].values(), strict=True):
+        assert row[1] == one["path"]
+        assert same(row[2].split(" ")[0], one["size"])
+
+
+def test_the_excess_that_was_removed(report: tuple) -> None:
+    told, page, _ = report
+    gap = told["gap"]["held_out"]
+    removed = (gap["before"] - gap["after"]) / (gap["before"] - 1)
+    cell = page.tables["records"][1][4]
+    assert (
+        cell == "-"
+        if removed == 0
+        else float(cell.removesuffix(" %")) == pytest.approx(100 * removed, abs=0.06)
+    )
+
+
+def test_the_words_fit_the_outcome(report: tuple) -> None:
+    told, page, _ = report
+    said = {
+        "named": "The base machine lacks: cubic spring",
+        "ambiguous": "but offset force, offset force with sensor bias would do about as well",
+        "none": "No effect is missing that these records could show",
+        "not-in-catalogue": "no effect of the catalogue explains it",
+    }
+    present = [outcome for outcome, text in said.items() if text in page.text]
+    assert present == [told["outcome"]]
+    assert ("measure the barrier" in page.text) == (told["outcome"] == "ambiguous")
+    for text in (*told["reasons"], *told["warnings"], told["where"][0]["text"]):
+        assert text in page.text
+
+
+def test_no_figure_is_empty(report: tuple) -> None:
+    assert [name for name, _ in report[1].pictures] == FIGURES
+    for name, image in report[1].pictures:
+        inked = np.any(image[:, :, :3] < 0.9, axis=2).mean()
+        coloured = (np.ptp(image[:, :, :3], axis=2) > 0.2).mean()
+        assert inked > 0.005, name
+        assert coloured > 0.0005, name
+
+
+def test_nothing_is_loaded_from_elsewhere(report: tuple) -> None:
+    assert all(source.startswith("data:image/png;base64,") for source in report[1].sources)
+
+
+def test_the_pdf_has_text_and_every_figure(report: tuple) -> None:
+    assert len(re.findall(rb"/Type /Page\b", report[2])) > 3
+    assert len(re.findall(rb"/Subtype /Image\b", report[2])) >= len(FIGURES)
+
+
+def test_a_record_without_impacts_says_so(tmp_path: Path) -> None:
+    make(tmp_path, "named")
+    with h5py.File(tmp_path / "details.h5", "a") as file:
+        empty = {"impacts": np.zeros((0, 6))}
+        for group in (*file["records"].values(), file["training/f0/before"], file["training/f0/after"],
+                      file["held_out/f1/before"], file["held_out/f1/after"]):  # fmt: skip
+            del group["impacts"]
+            group["impacts"] = empty["impacts"]
+    html, _ = write_report(tmp_path, tmp_path / "base.toml", Options(quick=True))
+    page = Page(html.read_text())
+    assert "impact-map" not in [name for name, _ in page.pictures]
+    assert "There are no impacts" in page.text
+
+
+def test_maps_before_and_after(
+    separatrix: Path, build_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = build_dir / "lib" / "libseparatrix.so"
+    if not library.is_file():
+        pytest.skip(f"{library} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    monkeypatch.setenv("SEPARATRIX_PROGRAM", str(separatrix))
+    make(tmp_path, "named")
+    (tmp_path / "base.toml").write_text(CASE)
+    (tmp_path / "extended.toml").write_text(CASE + "[effect.restitution_slope]\nslope = 0.06\n")
+    html, _ = write_report(tmp_path, tmp_path / "base.toml")
+    page = Page(html.read_text())
+    assert {"bifurcation", "impact-speeds"} <= {name for name, _ in page.pictures}
+
+
+def test_no_program_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SEPARATRIX_PROGRAM", str(tmp_path / "absent"))
+    make(tmp_path, "named")
+    html, _ = write_report(tmp_path, tmp_path / "base.toml")
+    assert "No maps before and after: the program separatrix was not found" in html.read_text()
