@@ -39,6 +39,7 @@ def _run(chosen: argparse.Namespace) -> None:
     options = Options(
         seed=chosen.seed,
         quick=chosen.quick,
+        partial=chosen.partial,
         segment_periods=chosen.segment_periods,
         segment_seconds=chosen.segment_seconds,
         candidates=chosen.effects,
@@ -138,6 +139,11 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         help="record that is never fitted; repeatable",
+    )
+    parser.add_argument(
+        "--partial",
+        action="store_true",
+        help="name effects that help on every record though more is missing: real machines",
     )
     parser.add_argument("--rest", metavar="FILE", type=Path, help="record at rest, for the noise")
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")

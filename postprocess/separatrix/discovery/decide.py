@@ -42,6 +42,8 @@ class Decision:
     foretold: Prediction | None
     reasons: list[str] = field(default_factory=list)
     equivalent: bool = False
+    # whether nothing is left to name
+    complete: bool = True
     shares: list[float] = field(default_factory=list)
 
 
@@ -60,8 +62,8 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     decision = Decision("none", [], [], [], [first], gap, foretold)
     if not first.judged:
         return _without_name(bench, decision)
-    best, rivals = _leaders(bench, first)
-    _pass_gates(bench, best, base, rivals, len(first.judged))
+    best, rivals = leaders(bench, first)
+    pass_gates(bench, best, base, rivals, len(first.judged))
     if not best.gates["detect"]:
         return _without_name(bench, decision)
     share = _ceiling_of(bench, best, base)
@@ -90,7 +92,7 @@ def remeasured(bench: Bench, first: Round) -> Fitted | None:
     return Fitted(base.names, base.model, problem, fit, base.added)
 
 
-def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
+def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
     converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
     pool = converged or found.judged
@@ -100,7 +102,7 @@ def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     return best, rivals
 
 
-def _pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
+def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
     options = bench.options
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.fitted.fit.converged
@@ -162,13 +164,13 @@ def _with_more(
         return _give_up(decision)
     second = run_round(bench, best.fitted, best.prediction, 0.75, 0.9)
     decision.rounds.append(second)
-    pairs = [_over_base(bench, base, decision.foretold, one) for one in second.judged]
+    pairs = [over_base(bench, base, decision.foretold, one) for one in second.judged]
     tried = {frozenset(one.fitted.names) for one in pairs}
     for _, one, other in pair_gains(decision.rounds[0])[:_PAIRS]:
         if frozenset((one, other)) not in tried:
             made = _fit_pair(bench, decision.rounds[0], one, other)
             if made is not None:
-                pairs.append(_over_base(bench, base, decision.foretold, made))
+                pairs.append(over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
     pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
     if not pairs:
@@ -177,7 +179,7 @@ def _with_more(
     pair = pairs[0]
     scale = max(1.0, pair.fitted.fit.reduced_chi2)
     close = [one for one in pairs[1:] if pair.evidence - one.evidence < bench.options.separation * scale]
-    _pass_gates(bench, pair, base, close, len(second.judged))
+    pass_gates(bench, pair, base, close, len(second.judged))
     # both must be needed: each over the other alone
     singles = {one.name: one for one in decision.rounds[0].judged}
     for name in pair.fitted.names:
@@ -192,7 +194,7 @@ def _with_more(
     return _give_up(decision)
 
 
-def _over_base(bench: Bench, base: Fitted, foretold: Prediction | None, one: Judged | Fitted) -> Judged:
+def over_base(bench: Bench, base: Fitted, foretold: Prediction | None, one: Judged | Fitted) -> Judged:
     """Evidence of a pair over the base, all parameters of both effects counted."""
     fitted = one.fitted if isinstance(one, Judged) else one
     prediction = one.prediction if isinstance(one, Judged) else bench.foretell(fitted)

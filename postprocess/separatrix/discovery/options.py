@@ -20,6 +20,8 @@ class Options:
     segment_periods: float = 1.0
     segment_seconds: float | None = None
     most_effects: int = 3
+    # name effects that help though a gap remains that none closes
+    partial: bool = False
     # None = the whole catalogue
     candidates: tuple[str, ...] | None = None
     # family-wise error of the detection

@@ -305,4 +305,6 @@ def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
 def _force_argument(record, starts: np.ndarray):
     if record.force is None:
         return None
-    return starts - record.t[0], record.interval, record.force
+    # the mean, so that the series ends where the record does
+    interval = (record.t[-1] - record.t[0]) / (record.t.size - 1)
+    return starts - record.t[0], interval, record.force

@@ -36,6 +36,7 @@ def verdict_of(findings: Findings) -> dict:
     rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
     return {
         "outcome": decision.outcome,
+        "complete": decision.complete,
         "effects": list(final.names),
         "alternatives": ["+".join(names) for names in decision.alternatives],
         "equivalent": decision.equivalent,

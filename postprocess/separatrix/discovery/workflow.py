@@ -12,6 +12,7 @@ from separatrix.discovery.base import copy_noise, fit_base
 from separatrix.discovery.data import gather, scales_of
 from separatrix.discovery.decide import decide
 from separatrix.discovery.options import Options
+from separatrix.discovery.partial import name_in_part
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.records import Record, read_record, unique_names
 from separatrix.discovery.refit import Fitted
@@ -58,7 +59,10 @@ def investigate(
         _prepare_held_out(foretold, data, model, fitted, scales.mass)
     bench = Bench(data, foretold, scales, options)
     decision = decide(bench, fitted)
-    findings = Findings(bench, fitted, decision, chosen)
+    if options.partial and decision.outcome == "not-in-catalogue":
+        decision = name_in_part(bench, decision)
+    # its noise may have been measured again
+    findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings
