@@ -1,13 +1,14 @@
 /* SPDX-FileCopyrightText: The Separatrix developers
  * SPDX-License-Identifier: GPL-3.0-or-later
  *
- * libseparatrix: the simulator as a function that a fit can call. A model is a case file; its numbers are
- * addressed by path
- * ("restoring.stiffness", "drive.cosine[1]") or by index from 0. All quantities are in SI units.
+ * libseparatrix: the simulator as a function that a fit can call (docs/library.md).
  *
- * Functions return 0, or a code as the program does (64: wrong call, 65: bad case or value, 66: a file cannot
- * be read) and then write what is wrong into `message`, of `message_size` characters, cut to fit. Nothing is
- * kept outside the handles; one handle may be used by several threads at once.
+ * A model is a case file; its numbers are addressed by path ("restoring.stiffness", "drive.cosine[1]",
+ * "effect.viscous.damping") or by index from 0. All quantities are in SI units.
+ *
+ * Functions return 0, or a code as the program does (64: wrong call, 65: bad case or value, 66: a file
+ * cannot be read) and then write what is wrong into `message`, of `message_size` characters, cut to fit.
+ * Nothing is kept outside the handles; one handle may be used by several threads at once.
  */
 #ifndef SEPARATRIX_H
 #define SEPARATRIX_H
@@ -21,7 +22,7 @@ extern "C" {
 /* A case that has been read. */
 typedef struct separatrix_model separatrix_model;
 
-/* Reads a case file. On success *model must be given to separatrix_model_free at the end; otherwise it is
+/* Reads a case file. On success *model must be given to separatrix_model_free at the end, otherwise it is
  * NULL. */
 int separatrix_model_read(const char *path, separatrix_model **model, char *message, size_t message_size);
 
@@ -33,11 +34,11 @@ int separatrix_model_from_text(const char *text, const char *directory, separatr
 /* Frees a model; NULL is allowed. */
 void separatrix_model_free(separatrix_model *model);
 
-/* Number of parameters: every number of the laws of the case, items of lists included. */
+/* Number of parameters: every number of the laws and effects of the case, items of lists included. */
 int separatrix_parameter_count(const separatrix_model *model);
 
-/* Path and unit of a parameter, and numbers[3] = value in the case, lower and upper bound (+-1.8e308: none).
- */
+/* Path and unit of a parameter, and numbers[3] = value in the case, lower and upper bound (+-1.8e308:
+ * none). */
 int separatrix_parameter(const separatrix_model *model, int index, char *path, size_t path_size, char *unit,
                          size_t unit_size, double *numbers, char *message, size_t message_size);
 
@@ -49,33 +50,51 @@ int separatrix_find_parameter(const separatrix_model *model, const char *path, i
 int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, const int *chosen,
                                const double *values, double *frequency, char *message, size_t message_size);
 
-/* Flies `segment_count` segments of the motion, each from its own start, and samples them.
+/* Flies segments of the motion, each from its own start, and samples them. Arrays are contiguous.
  *
- * chosen, values [chosen_count]   parameters with values of their own, and with derivatives
- * start [segment_count][3]        x [m], v [m/s] and crank angle [rad] at the time 0 of each segment
- * first [segment_count + 1]       samples of segment i are first[i] ... first[i + 1] - 1; m =
- * first[segment_count] times [m]                       seconds since the start of the segment, ascending
- * within it, >= 0 derivatives                     0: none; jacobian and velocity_jacobian may then be NULL
- * tolerance                       relative tolerance of the adaptive flight, 1e-15 to 1e-3; exact flights
- * need none
+ * In:
+ *   chosen, values [chosen_count]
+ *     parameters with values of their own, by which the samples are differentiated
+ *   start [segment_count][3]
+ *     x [m], v [m/s] and crank angle [rad] at the time 0 of each segment
+ *   first [segment_count + 1]
+ *     samples of segment i are first[i] ... first[i + 1] - 1; m = first[segment_count] in all
+ *   times [m]
+ *     seconds since the start of the segment, ascending within it, >= 0
+ *   force_count, force_interval, force [force_count]
+ *     with drive.law = "measured_force": samples [N] every force_interval [s] in place of those of the
+ *     case, 0: those of the case. They are one turn of the crank: a segment that starts t seconds after
+ *     the first has the crank angle 2 pi t/((force_count - 1) force_interval).
+ *   derivatives
+ *     0: none; jacobian and velocity_jacobian may then be NULL
+ *   tolerance
+ *     relative tolerance of the adaptive flight, 1e-15 to 1e-3; exact flights need none
  *
- * x, v [m]                        position as the sensor shows it, and velocity
- * jacobian, velocity_jacobian [m][chosen_count + 3]
- *                                 their derivatives: columns are the chosen parameters, then x, v and crank
- * angle of the start impacts, steady, reason [segment_count] number of impacts; 1 if all neighbours that the
- * derivatives are taken from meet the same barriers in the same order (0: do not trust the derivatives); 0,
- * or why the segment could not be flown: 3 left the domain, 4 not finite, 5 too many events, 6 step size, 65
- * its start is not finite or beyond a barrier. Its samples then are not numbers. impact_capacity,
- * impact_count   room for impacts, and how many there were (those beyond the room are left out)
- * impact_segment [impact_capacity], impact [impact_capacity][4]
- *                                 segment, and time since its start [s], speed before and after [m/s], +1
- * upper or -1 lower barrier. After a soft contact: the speed when it ends, not a number if it lasts.
+ * Out:
+ *   x, v [m]
+ *     position as the sensor shows it, and velocity
+ *   jacobian, velocity_jacobian [m][chosen_count + 3]
+ *     their derivatives by the chosen parameters, then by x, v and crank angle of the start
+ *   impacts [segment_count]
+ *     number of impacts
+ *   steady [segment_count]
+ *     1 if the neighbours that the derivatives are taken from meet the same barriers in the same order and
+ *     none is grazed; 0: do not trust the derivatives
+ *   reason [segment_count]
+ *     0, or why the segment could not be flown and has samples that are not numbers: 3 left the domain,
+ *     4 not finite, 5 too many events, 6 step size, 65 its start is not finite or beyond a rigid barrier
+ *   impact_capacity, impact_count
+ *     room for impacts, and how many there were; those beyond the room are left out
+ *   impact_segment [impact_capacity], impact [impact_capacity][4]
+ *     segment; time since its start [s], speed before and after [m/s], +1 upper or -1 lower barrier. After
+ *     a soft contact: the speed when it ends, not a number if it lasts.
  *
  * Results depend on a segment and the arguments common to all, not on the other segments. */
 int separatrix_segments(const separatrix_model *model, int chosen_count, const int *chosen,
                         const double *values, int segment_count, const double *start, const int *first,
-                        const double *times, int derivatives, double tolerance, double *x, double *v,
-                        double *jacobian, double *velocity_jacobian, int *impacts, int *steady, int *reason,
+                        const double *times, int force_count, double force_interval, const double *force,
+                        int derivatives, double tolerance, double *x, double *v, double *jacobian,
+                        double *velocity_jacobian, int *impacts, int *steady, int *reason,
                         int impact_capacity, int *impact_count, int *impact_segment, double *impact,
                         char *message, size_t message_size);
 
@@ -85,11 +104,12 @@ int separatrix_model_text(const separatrix_model *model, int chosen_count, const
                           const double *values, char *text, size_t text_size, size_t *length, char *message,
                           size_t message_size);
 
-/* Row `index` of the catalogue of effects, one per parameter: effect, its meaning, parameter and unit; numbers[4] = default,
- * lower and upper bound (+-1.8e308: none), and 1 if the parameter is optional. Code 64 beyond the last row. */
-int separatrix_effect_parameter(int index, char *effect, size_t effect_size, char *meaning, size_t meaning_size,
-                                char *parameter, size_t parameter_size, char *unit, size_t unit_size, double *numbers,
-                                char *message, size_t message_size);
+/* Row `index` of the catalogue of effects, one per parameter: effect, its meaning, parameter and unit;
+ * numbers[4] = default, lower and upper bound (+-1.8e308: none), and 1 if the parameter is optional. Code 64
+ * beyond the last row. */
+int separatrix_effect_parameter(int index, char *effect, size_t effect_size, char *meaning,
+                                size_t meaning_size, char *parameter, size_t parameter_size, char *unit,
+                                size_t unit_size, double *numbers, char *message, size_t message_size);
 
 #ifdef __cplusplus
 }

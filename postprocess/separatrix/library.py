@@ -40,7 +40,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """A law of the family `effect`, its parameters by name; `value` is the default, NaN where one must be given."""
+    """A law of the family `effect`, its parameters; `value` is the default, NaN where it must be given."""
 
     name: str
     meaning: str
@@ -135,16 +135,17 @@ class Model:
     ) -> Segments:
         """Fly many segments, each from its own start, and sample them.
 
-        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start` is
-        (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are
-        at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0. `tolerance` is that
-        of the adaptive flight.
+        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start`
+        is (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of
+        segment i are at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
+        `tolerance` is that of the adaptive flight.
+
+        `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
+        takes the place of the measured force of the case; the crank angles of `start` are not looked at.
         """
         for path in active:
             if active.count(path) > 1:
                 raise CaseError(f"active: found '{path}' twice")
-        if force is not None:
-            raise CaseError('force: given, allowed with drive.law = "measured_force"')
         chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
         start = np.asarray(start, float)
         start = _array(start, (len(start), 3), "start")
@@ -153,6 +154,7 @@ class Model:
         if first.shape != (count + 1,):
             raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
         times = _array(times, (int(first[-1]),), "times")
+        start, interval, series = _with_force(start, first, times, force)
         m, columns = len(times), len(active) + 3
         x, v = np.empty(m), np.empty(m)
         slopes = [np.empty((m, columns)) for _ in range(2)] if derivatives else [None, None]
@@ -167,6 +169,9 @@ class Model:
                 *chosen,
                 count,
                 *(_pointer(array) for array in (start, first, times)),
+                len(series),
+                ctypes.c_double(interval),
+                _pointer(series),
                 int(derivatives),
                 ctypes.c_double(tolerance),
                 *(_pointer(array) for array in (x, v, *slopes, *report)),
@@ -273,6 +278,28 @@ def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
     if array.shape != shape:
         raise CaseError(f"{name}: found shape {array.shape}, allowed {shape}")
     return array
+
+
+def _with_force(
+    start: np.ndarray,
+    first: np.ndarray,
+    times: np.ndarray,
+    force: tuple[np.ndarray, float, np.ndarray] | None,
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return starts whose crank angle is the place in the force, its interval and its samples."""
+    if force is None:
+        return start, 0.0, np.empty(0)
+    begins, interval, series = force
+    series = _array(series, (len(series),), "force")
+    begins = _array(begins, (len(start),), "force: begin of each segment")
+    duration = (len(series) - 1) * interval
+    last_sample = np.minimum(first[1:], len(times)) - 1
+    ends = begins + np.where(np.diff(first) > 0, times[last_sample], 0.0) if len(times) else begins
+    lowest, highest = begins.min(initial=0.0), ends.max(initial=0.0)
+    if not (duration > 0 and lowest >= 0 and highest <= duration * (1 + 1e-9)):
+        raise CaseError(f"force: segments from {lowest} to {highest} s, allowed 0 to {duration} s")
+    angle = 2 * np.pi * begins / duration
+    return np.column_stack([start[:, :2], angle]), float(interval), series
 
 
 def _pointer(array: np.ndarray | None) -> ctypes.c_void_p | None:

@@ -3,11 +3,13 @@
 
 !> Texts across the C interface.
 module c_text
-  use, intrinsic :: iso_c_binding, only: c_char, c_null_char, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_size_t
+  use errors, only: error_t
+  use status, only: exit_done
   implicit none
   private
 
-  public :: from_c, to_c
+  public :: from_c, to_c, answer
 
 contains
 
@@ -39,5 +41,19 @@ contains
     end do
     buffer(length + 1) = c_null_char
   end subroutine to_c
+
+  !> The code of an error, its message in the buffer of the caller.
+  integer(c_int) function answer(error, message, message_size) result(code)
+    type(error_t), allocatable, intent(in) :: error
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), intent(in) :: message_size
+    code = exit_done
+    if (allocated(error)) then
+      code = error%code
+      call to_c(error%message, message, message_size)
+    else
+      call to_c('', message, message_size)
+    end if
+  end function answer
 
 end module c_text

@@ -5,10 +5,11 @@
 module model_type
   use case_echo, only: echo_case
   use case_reader, only: load_case, load_case_text
-  use case_type, only: case_t
+  use case_type, only: case_t, drive_law
   use case_values, only: allowed_range, bounds_t
   use errors, only: error_t, fail
   use kinds, only: int64, wp
+  use law_table, only: law_choice_t, set_value
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
   use parameter_list, only: list_parameters, parameter_t, put_values
   use status, only: exit_bad_case, exit_usage
@@ -17,7 +18,7 @@ module model_type
   implicit none
   private
 
-  public :: read_model, model_from_text, find_parameter, check_values, model_options, text_with
+  public :: read_model, model_from_text, find_parameter, check_values, laws_with_force, model_options, text_with
 
   type, public :: model_t
     type(case_t) :: the_case
@@ -90,6 +91,28 @@ contains
       end associate
     end do
   end subroutine check_values
+
+  !> The laws of the case with another measured force, `force` [N] every `interval` [s]; none of them leaves it as it is.
+  !> Code 64 if the case has no place for it.
+  subroutine laws_with_force(model, interval, force, laws, error)
+    type(model_t), intent(in) :: model
+    real(wp), intent(in) :: interval, force(:)
+    type(law_choice_t), allocatable, intent(out) :: laws(:)
+    type(error_t), allocatable, intent(out) :: error
+    laws = model%the_case%laws
+    if (size(force) == 0) return
+    if (laws(drive_law)%name /= 'measured_force') then
+      call fail(error, exit_usage, model%the_case%path//': force: given with drive.law = "'//trim(laws(drive_law)%name)// &
+                '", allowed with "measured_force"')
+    else if (size(force) < 2 .or. .not. all(abs(force) <= huge(force))) then
+      call fail(error, exit_usage, 'force: found '//to_text(size(force))//' samples, allowed two or more, finite')
+    else if (.not. (interval > 0 .and. interval <= huge(interval))) then
+      call fail(error, exit_usage, 'force: found an interval of '//to_text(interval)//' s, allowed more than 0')
+    else
+      call set_value(laws(drive_law), 'interval', [interval])
+      call set_value(laws(drive_law), 'force', force)
+    end if
+  end subroutine laws_with_force
 
   !> Integrator options of the case with another `tolerance` of the adaptive flight.
   pure function model_options(model, tolerance) result(options)

@@ -79,6 +79,11 @@ contains
       call check_series(source, laws(drive_law))
     case ('crank_lever_rod')
       call check_lever(source, laws(drive_law), at)
+    case ('measured_force')
+      if (size(list_of(laws(drive_law), 'force')) < 2) then
+        call report(source, 'drive.force', 'found '//to_text(size(list_of(laws(drive_law), 'force')))// &
+                    ' samples, allowed two or more')
+      end if
     end select
   end subroutine check_laws
 
@@ -288,21 +293,33 @@ contains
     type(case_t), intent(in) :: the_case
     type(axis_t), intent(in) :: axes(:)
     real(wp), intent(in) :: x
-    character(len=:), allocatable :: problem
-    real(wp) :: upper, lower, driver
+    character(len=:), allocatable :: problem, upper_key, lower_key
+    character(len=*), parameter :: second_key = 'effect.second_barrier.position'
+    real(wp) :: upper, lower, second, driver
     integer :: i
     driver = 0
     if (the_case%laws(1)%name == 'backlash_pair') driver = parameter_value(the_case%laws, 'body.driver_x0', 0.0_wp)
     upper = parameter_value(the_case%laws, 'contact.upper', huge(1.0_wp))
     lower = parameter_value(the_case%laws, 'contact.lower', -huge(1.0_wp))
+    upper_key = 'contact.upper'
+    lower_key = 'contact.lower'
+    second = parameter_value(the_case%laws, second_key, huge(1.0_wp))
     do i = 1, size(axes)
       if (axes(i)%name == 'contact.upper') upper = minval(axes(i)%values)
       if (axes(i)%name == 'contact.lower') lower = maxval(axes(i)%values)
+      if (axes(i)%name == second_key) second = merge(maxval(axes(i)%values), minval(axes(i)%values), upper < huge(upper))
     end do
+    if (second < huge(second) .and. upper < huge(upper)) then
+      lower = second
+      lower_key = second_key
+    else if (second < huge(second)) then
+      upper = second
+      upper_key = second_key
+    end if
     problem = ''
-    if (x - driver > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier contact.upper = '// &
+    if (x - driver > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier '//upper_key//' = '// &
                                       to_text(upper)//' m'
-    if (x - driver < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier contact.lower = '// &
+    if (x - driver < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier '//lower_key//' = '// &
                                       to_text(lower)//' m'
   end function beyond
 

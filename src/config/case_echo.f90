@@ -17,6 +17,8 @@ module case_echo
   public :: echo_case, case_identity
 
   character(len=1), parameter :: newline = new_line('a')
+  !> Characters of a number with its comma and blank, at most.
+  integer, parameter :: longest_number = 40
 
 contains
 
@@ -24,9 +26,13 @@ contains
   pure function echo_case(the_case) result(text)
     type(case_t), intent(in) :: the_case
     character(len=:), allocatable :: text
+    integer :: i
     text = '# The resolved case: SI units, defaults filled in.'//newline
     if (len(the_case%title) > 0) text = text//'title = '//quoted(the_case%title)//newline
     text = text//deciding_text(the_case, '')
+    do i = 1, size(the_case%laws)
+      if (is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i))
+    end do
     associate (record => the_case%record)
       text = text//newline//'[record]'//newline//line('rate', to_text(record%rate))//line('noise', to_text(record%noise))// &
              line('resolution', to_text(record%resolution))//line('delay', to_text(record%delay))// &
@@ -53,7 +59,7 @@ contains
     integer :: i
     text = ''
     do i = 1, size(the_case%laws)
-      text = text//law_text(the_case%laws(i))
+      if (.not. is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i))
     end do
     text = text//settings_text(the_case)
     if (kind == '' .or. kind == 'trajectory') text = text//newline//'[trajectory]'//newline// &
@@ -66,6 +72,12 @@ contains
     if (the_case%refine%active) text = text//refine_text(the_case%refine)
     if (the_case%sweep%present .and. (kind == '' .or. kind == 'sweep')) text = text//sweep_text(the_case%sweep)
   end function deciding_text
+
+  !> Whether a law is an effect that shows in records only.
+  pure logical function is_sensor(law)
+    type(law_choice_t), intent(in) :: law
+    is_sensor = law%family == effect_family .and. index(law%name, 'sensor_') == 1
+  end function is_sensor
 
   !> One table of a law; a barrier that is not there (at the largest number) is left out.
   pure function law_text(law) result(text)
@@ -160,14 +172,20 @@ contains
 
   pure function reals(values) result(text)
     real(wp), intent(in) :: values(:)
-    character(len=:), allocatable :: text
-    integer :: i
-    text = '['
+    character(len=:), allocatable :: text, number
+    integer :: i, length
+    ! Room for all: records are long.
+    allocate (character(len=longest_number*size(values) + 2) :: text)
+    length = 0
     do i = 1, size(values)
-      if (i > 1) text = text//', '
-      text = text//to_text(values(i))
+      number = to_text(values(i))
+      if (i > 1) number = ', '//number
+      text(length + 2:length + 1 + len(number)) = number
+      length = length + len(number)
     end do
-    text = text//']'
+    text(1:1) = '['
+    text(length + 2:length + 2) = ']'
+    text = text(:length + 2)
   end function reals
 
   pure function integers(values) result(text)

@@ -6,8 +6,10 @@ module law_reader
   use case_parameters, only: find_parameter, row_bounds
   use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
+  use force_record, only: read_force
+  use kinds, only: wp
   use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
-    parameters_of, table_of
+    parameters_of, set_value, table_of
   use suggest, only: nearest_word
   use toml_bindings, only: toml_string
   implicit none
@@ -104,7 +106,12 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: path
     integer :: i
+    logical :: found
     rows = parameters_of(choice%family, choice%name)
+    if (choice%name == 'measured_force') then
+      call read_force_file(source, choice, found)
+      if (found) return
+    end if
     do i = 1, size(rows)
       path = table_of(rows(i)%family, rows(i)%law)//'.'//trim(rows(i)%name)
       if (rows(i)%list) then
@@ -116,6 +123,34 @@ contains
       end if
     end do
   end subroutine read_parameters
+
+  !> A measured force that is the name of a file, relative to the folder of the case; `found` is false if it is not.
+  subroutine read_force_file(source, choice, found)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(inout) :: choice
+    logical, intent(out) :: found
+    character(len=:), allocatable :: path, problem
+    real(wp), allocatable :: force(:)
+    real(wp) :: interval
+    integer :: at
+    at = find(source, 'drive.force')
+    found = at > 0
+    if (found) found = source%entries(at)%entry%kind == toml_string
+    if (.not. found) return
+    path = source%entries(at)%entry%string
+    if (index(path, '/') /= 1) path = source%name(:index(source%name, '/', back=.true.))//path
+    call know(source, 'drive.force')
+    call know(source, 'drive.interval')
+    call read_force(path, interval, force, problem)
+    if (allocated(problem)) then
+      call report(source, 'drive.force', problem)
+    else if (find(source, 'drive.interval') > 0) then
+      call report(source, 'drive.interval', 'found beside the name of a file, allowed with a list')
+    else
+      call set_value(choice, 'interval', [interval])
+      call set_value(choice, 'force', force)
+    end if
+  end subroutine read_force_file
 
   !> Break-away friction that is not given equals sliding friction.
   pure subroutine resolve_static_friction(choices)

@@ -47,7 +47,14 @@ contains
       return
     end if
     first = 1
-    if (present(digits)) first = digits
+    if (present(digits)) then
+      first = digits
+    else
+      ! What 15 digits do not give, no fewer do.
+      text = with_digits(value, 15)
+      read (text, *, iostat=status) back
+      if (status == 0 .and. abs(back - value) > 0) first = 16
+    end if
     do count = first, 17
       text = with_digits(value, count)
       if (present(digits)) return

@@ -25,7 +25,8 @@ module parameter_list
 
 contains
 
-  !> Every number of `laws`, in the order of the law table; a barrier that is not there (at the largest number) is none.
+  !> Every number of `laws`, in the order of the law table. A barrier that is not there (at the largest number) is none, nor
+  !> are the samples of a measured force.
   pure function list_parameters(laws) result(list)
     type(law_choice_t), intent(in) :: laws(:)
     type(parameter_t), allocatable :: list(:)
@@ -35,6 +36,7 @@ contains
     allocate (list(0))
     do i = 1, size(laws)
       rows = parameters_of(laws(i)%family, laws(i)%name)
+      if (laws(i)%name == 'measured_force') cycle
       do j = 1, size(rows)
         one = parameter_t(unit=rows(j)%unit, lower=rows(j)%lower, upper=rows(j)%upper, lower_open=rows(j)%lower_open, &
                           law=i, row=j)

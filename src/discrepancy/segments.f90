@@ -298,7 +298,8 @@ contains
 
   !> Flies a neighbour that is `step` away and fills in its differences at the samples that are still open, but for those
   !> between an impact of the base and the same impact of the neighbour: there a velocity before it would be compared with
-  !> one after it. Takes the steadiness away if the two do not meet the same barriers.
+  !> one after it. A neighbour that cannot be flown fills in none. Takes the steadiness away if the two do not meet the same
+  !> barriers.
   pure subroutine compare(moving, start, step, times, base, other, open, x_slope, v_slope, steady)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3), step, times(:)
@@ -311,7 +312,8 @@ contains
     integer :: i
     if (.not. abs(step) > 0) return
     call fly(moving, start, times, other)
-    if (other%reason /= 0 .or. other%count /= base%count) then
+    if (other%reason /= 0) return
+    if (other%count /= base%count) then
       steady = .false.
     else if (any(abs(other%impact(4, :base%count) - base%impact(4, :base%count)) > 0)) then
       steady = .false.

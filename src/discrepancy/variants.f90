@@ -186,10 +186,13 @@ contains
     logical, intent(in) :: adaptive
     type(variant_t), intent(inout) :: variant
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: moved(size(plan%values))
+    real(wp) :: moved(size(plan%values)), length
     moved = plan%values
     associate (one => plan%chosen(which), value => plan%values(which))
-      moved(which) = value + sense*share*max(abs(value), smallest_share*natural_size(trim(one%unit), plan%scales))
+      length = share
+      ! Whole exponents are powers by products: a neighbour goes another way and shares no error.
+      if (index(one%path, 'exponent') > 0) length = max(share, sqrt(plan%options%tolerance))
+      moved(which) = value + sense*length*max(abs(value), smallest_share*natural_size(trim(one%unit), plan%scales))
       variant%step = moved(which) - value
       if (moved(which) < one%lower .or. moved(which) > one%upper .or. (one%lower_open .and. moved(which) <= one%lower)) then
         variant%step = 0

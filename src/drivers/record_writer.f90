@@ -1,15 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A motion as a sensor would have measured it: sampled, delayed, off by gain and bias, noisy, quantised; a table that looks like a record.
+!> A motion as a sensor would have measured it: delayed, sampled, scaled, noisy, quantised; a table that looks like a record.
 module record_writer
   use case_type, only: case_t, record_t
   use constants, only: two_pi
+  use drive_law, only: measured_force
   use effect_law, only: observed
   use elementary, only: logarithm, sine_cosine
   use errors, only: error_t, fail
   use kinds, only: int64, real64, wp
   use motion, only: motion_t
+  use oscillator, only: oscillator_t
   use random, only: uniform
   use sampling, only: sample_positions
   use status, only: exit_bad_case, exit_io, reason_name
@@ -28,7 +30,7 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: times(:), x(:), driver(:)
+    real(wp), allocatable :: times(:), x(:), driver(:), second(:)
     character(len=256) :: message
     character(len=*), parameter :: row_format = '(*(es23.16, :, ","))'
     integer :: count, i, unit, status, reason
@@ -45,6 +47,9 @@ contains
     end if
     call measure(the_case%record, 0_int64, x)
     call measure(the_case%record, int(count, int64), driver)
+    allocate (second(0))
+    if (allocated(moving%pair)) second = driver
+    if (moving%machine%drive%interval > 0) second = force_at(moving%machine, start(3), times)
     open (newunit=unit, file=path, status='replace', action='write', iostat=status, iomsg=message)
     associate (heading => heading_of(the_case, moving, start))
       do i = 1, size(heading)
@@ -53,8 +58,8 @@ contains
     end associate
     do i = 1, count
       if (status /= 0) exit
-      if (allocated(moving%pair)) then
-        write (unit, row_format, iostat=status, iomsg=message) times(i), x(i), driver(i)
+      if (size(second) > 0) then
+        write (unit, row_format, iostat=status, iomsg=message) times(i), x(i), second(i)
       else
         write (unit, row_format, iostat=status, iomsg=message) times(i), x(i)
       end if
@@ -62,6 +67,18 @@ contains
     if (status == 0) close (unit, iostat=status, iomsg=message)
     if (status /= 0) call fail(error, exit_io, "'"//path//"': "//trim(message))
   end subroutine write_record
+
+  !> The measured force [N] that drives a machine, at `times` [s since the start at `crank_angle`].
+  pure function force_at(machine, crank_angle, times) result(force)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: crank_angle, times(:)
+    real(wp) :: force(size(times)), rate, start
+    integer :: i
+    start = modulo(crank_angle, two_pi)/machine%drive_frequency
+    do i = 1, size(times)
+      call measured_force(machine%drive, modulo(start + times(i), machine%period), force(i), rate)
+    end do
+  end function force_at
 
   !> What the sensor and the start were, and the names of the columns.
   function heading_of(the_case, moving, start) result(lines)
@@ -80,7 +97,11 @@ contains
     if (moving%machine%drive%ratio > 0) then
       lines = [character(len=80) :: lines, '# drive_ratio: '//to_text(moving%machine%drive%ratio)]
     end if
-    lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', allocated(moving%pair))]
+    if (moving%machine%drive%interval > 0) then
+      lines = [character(len=80) :: lines, 't,x,force']
+    else
+      lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', allocated(moving%pair))]
+    end if
   end function heading_of
 
   !> Adds the noise of the sensor and rounds to its resolution; `first` keeps signals apart.

@@ -11,11 +11,12 @@ module sweep_driver
   use case_type, only: case_t, contact_position => contact_law
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
-  use contact_law, only: barrier_positions, contact_of
+  use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
   use errors, only: error_t
   use file_layout, only: add_axes, add_map_variables, add_reason, add_regime, axis_dimension
   use grid, only: grid_t
   use kinds, only: int64, wp
+  use law_table, only: effect_family
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int64, type_string
@@ -241,7 +242,15 @@ contains
   function barriers_of(session) result(barriers)
     type(session_t), intent(in) :: session
     real(wp) :: barriers(2)
-    barriers = barrier_positions(contact_of(session%the_case%laws(contact_position), mass=1.0_wp))
+    type(contact_t) :: contact
+    integer :: i
+    associate (laws => session%the_case%laws)
+      contact = contact_of(laws(contact_position), mass=1.0_wp)
+      do i = 1, size(laws)
+        if (laws(i)%family == effect_family) call add_to_contact(contact, laws(i))
+      end do
+    end associate
+    barriers = barrier_positions(contact)
   end function barriers_of
 
   subroutine add_limits(schema, unit, limits)

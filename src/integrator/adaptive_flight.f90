@@ -7,7 +7,7 @@
 !> as `guarded_march` to the bit, but for two unknowns only and faster: basins with a Stribeck layer need it.
 module adaptive_flight
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
-  use drive_law, only: foot_motion
+  use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
@@ -41,8 +41,8 @@ module adaptive_flight
 contains
 
   !> Flies from `state` (mode slip_plus or slip_minus) up to `time_end` [s after the section], `barrier` [m]
-  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, or at
-  !> the time. The state returned is that just before the event.
+  !> being the barrier ahead. Ends at speed zero, at the barrier, when the speed has risen to `exit_speed`, at
+  !> the time, or before it outside of the domain. The state returned is that just before the event.
   pure subroutine fly_adaptive(machine, options, state, time_end, exit_speed, barrier, tally, outcome, log)
     type(oscillator_t), intent(in) :: machine
     type(options_t), intent(in) :: options
@@ -52,16 +52,17 @@ contains
     integer, intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
     type(slip_t) :: slip
-    real(wp) :: y(2), next(2), slopes(2, 16), path(0:degree, 2), h, remaining, error, fraction
+    real(wp) :: y(2), next(2), slopes(2, 16), path(0:degree, 2), h, until, remaining, error, fraction
     logical :: last
     slip = slip_of(machine, state, exit_speed, barrier)
     y = [state%x, state%v]
     slopes(:, 1) = slope(machine, slip, state%time, y)
     h = first_step(machine, slip, options%tolerance, state%time, y, slopes(:, 1))
     do
-      remaining = time_end - state%time
       outcome = flight_time_over
-      if (remaining <= 0) exit
+      if (state%time >= time_end) exit
+      until = next_sample(machine%drive, state%time, time_end)
+      remaining = until - state%time
       last = h >= remaining
       h = min(h, remaining)
       outcome = flight_failed
@@ -76,10 +77,13 @@ contains
       call first_event(slip, path, outcome, fraction)
       if (outcome == flight_failed) then
         call look_along(machine, state, y, path, h, 1.0_wp, slip, tally, log)
-        state%time = merge(time_end, state%time + h, last)
+        state%time = merge(until, state%time + h, last)
         y = next
         slopes(:, 1) = slopes(:, 13)
         h = h*min(5.0_wp, 0.9_wp/eighth_root(max(error, 1e-10_wp)))
+        outcome = flight_time_over
+        ! An unstable spring drives a body to infinity within a finite time.
+        if (abs(y(1)) > options%domain) exit
         cycle
       end if
       call land(machine, slip, options%tolerance, outcome, state%time, y, h, fraction, slopes, next)
@@ -122,7 +126,7 @@ contains
     slope(1) = y(2)
     slope(2) = (restoring_force(machine%restoring, stretch) &
                 + sliding_friction(machine%friction, y(2), slip%direction))/machine%mass
-    if (machine%effects%present) slope(2) = slope(2) + extra_force(machine, slip%memory, y(1), y(2), stretch)/machine%mass
+    if (machine%extra) slope(2) = slope(2) + extra_force(machine, slip%memory, time, y(1), y(2), stretch)/machine%mass
   end function slope
 
   !> Starting step: Hairer, Norsett, Wanner, II.4.

@@ -6,7 +6,7 @@
 !> formula would pull and may not, the force is nil; the surface counts as recovered as soon as it would push again.
 module contact_flight
   use contact_law, only: contact_force, contact_margin, contact_t
-  use drive_law, only: foot_motion
+  use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
@@ -69,7 +69,7 @@ contains
     type(pressed_t) :: pressed
     type(march_t) :: march
     type(guard_t) :: guards(cut)
-    real(wp) :: y(3), scale(3), duration, time
+    real(wp) :: y(3), scale(3), duration, time, until
     integer :: fallen
     pressed%machine = machine
     pressed%side = side
@@ -83,7 +83,9 @@ contains
     guards = guards_of(pressed)
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
-      call take_step(march, pressed, guards, time_end - pressed%start, fallen)
+      until = next_sample(machine%drive, pressed%start + march%time, time_end)
+      call take_step(march, pressed, guards, until - pressed%start, fallen)
+      if (fallen == march_time_over .and. until < time_end) fallen = march_goes_on
       call look_along(march, pressed, tally, log)
       if (fallen == cut) then
         pressed%pushing = .not. pressed%pushing
@@ -128,8 +130,8 @@ contains
       stretch = machine%restoring%free_length + foot - (self%surface + self%side*y(1))
       force = restoring_force(machine%restoring, stretch) &
               + sliding_friction(machine%friction, self%side*y(2), real(self%direction, wp))
-      if (machine%effects%present) &
-        force = force + extra_force(machine, self%memory, self%surface + self%side*y(1), self%side*y(2), stretch)
+      if (machine%extra) force = force + extra_force(machine, self%memory, self%start + time, &
+                                                     self%surface + self%side*y(1), self%side*y(2), stretch)
       push = 0
       if (self%pushing) push = contact_force(machine%contact, y(1), y(2))
       slope = [y(2), (self%side*force - push)/machine%mass, push*y(2)]

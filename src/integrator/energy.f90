@@ -7,14 +7,14 @@
 !> holds elastically counts as lost until it gives it back.
 !> The powers are integrated by Gauss's rule over short pieces of a flight.
 module energy
-  use drive_law, only: foot_motion
+  use drive_law, only: foot_motion, measured_force
   use effect_law, only: effect_energy, effect_losses, slip_memory_t
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: stribeck_excess
   use kinds, only: wp
   use motion_state, only: book_t, state_t
   use oscillator, only: oscillator_t
-  use restoring_law, only: restoring_force
+  use restoring_law, only: restoring_energy, restoring_force
   implicit none
   private
 
@@ -34,16 +34,16 @@ module energy
 
 contains
 
-  !> Kinetic energy and that of a linear spring [J].
+  !> Kinetic energy and what restoring forces and effects store [J].
   pure real(wp) function energy_of_body(machine, state) result(energy)
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(in) :: state
     real(wp) :: foot
     call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
-    energy = 0.5_wp*machine%mass*state%v**2 &
-             + 0.5_wp*machine%restoring%stiffness*(machine%restoring%free_length + foot - state%x)**2
-    if (machine%effects%present) &
-      energy = energy + effect_energy(machine%effects, state%x, machine%restoring%free_length + foot - state%x)
+    associate (stretch => machine%restoring%free_length + foot - state%x)
+      energy = 0.5_wp*machine%mass*state%v**2 + restoring_energy(machine%restoring, stretch)
+      if (machine%effects%present) energy = energy + effect_energy(machine%effects, state%x, stretch)
+    end associate
   end function energy_of_body
 
   !> Adds `weight` [s] times the powers at `time` [s after the section], `x`, `v` of a slip.
@@ -52,7 +52,7 @@ contains
     type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: time, x, v, weight
     type(book_t), intent(inout) :: book
-    real(wp) :: foot, rate, stretch, losses(2)
+    real(wp) :: foot, rate, stretch, measured, losses(2)
     if (.not. book%kept) return
     call foot_motion(machine%drive, machine%drive_frequency*time, foot, rate)
     associate (law => machine%friction)
@@ -61,11 +61,16 @@ contains
     end associate
     stretch = machine%restoring%free_length + foot - x
     book%work = book%work + weight*restoring_force(machine%restoring, stretch)*rate*machine%drive_frequency
-    if (.not. machine%effects%present) return
-    losses = effect_losses(machine%effects, machine%friction, slip, x, v)
-    book%friction = book%friction + weight*losses(1)
-    book%damping = book%damping + weight*losses(2)
-    book%work = book%work + weight*machine%effects%cubic*stretch**3*rate*machine%drive_frequency
+    if (machine%effects%present) then
+      losses = effect_losses(machine%effects, machine%friction, slip, x, v)
+      book%friction = book%friction + weight*losses(1)
+      book%damping = book%damping + weight*losses(2)
+      book%work = book%work + weight*machine%effects%cubic*stretch**3*rate*machine%drive_frequency
+    end if
+    if (machine%drive%interval > 0) then
+      call measured_force(machine%drive, time, measured, rate)
+      book%work = book%work + weight*measured*v
+    end if
   end subroutine book_instant
 
   !> An exact flight from `start` to `time_end` [s after the section], slipping in `direction`.

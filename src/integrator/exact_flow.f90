@@ -64,8 +64,8 @@ contains
     integer :: n
     flow%natural = machine%natural_frequency
     flow%decay = machine%friction%damping/(2*machine%mass)
-    flow%available = machine%restoring%is_linear .and. .not. machine%effects%nonlinear .and. flow%natural > 0 &
-      .and. flow%decay <= largest_damping_ratio*flow%natural
+    flow%available = machine%restoring%is_linear .and. .not. machine%effects%nonlinear .and. .not. machine%drive%interval > 0 &
+      .and. flow%natural > 0 .and. flow%decay <= largest_damping_ratio*flow%natural
     if (.not. flow%available) return
     flow%damped = sqrt((flow%natural - flow%decay)*(flow%natural + flow%decay))
     flow%drive_frequency = machine%drive_frequency

@@ -85,8 +85,7 @@ contains
     state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
     ! Dahl's friction is taken to have slipped this way for long.
-    if (moving%machine%effects%dahl_stiffness > 0 .and. abs(v) > 0) &
-      state%z = dahl_level(moving%machine%effects, sign(1.0_wp, v))
+    if (abs(v) > 0) state%z = dahl_level(moving%machine%effects, sign(1.0_wp, v))
     if (v == 0) state%mode = mode_from_rest(moving%machine, state)
   end function start_state
 

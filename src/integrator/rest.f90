@@ -7,7 +7,7 @@ module rest
   use certified_step, only: departure_step, positive_step
   use contact_law, only: contact_constant, contact_force, restitution_at
   use effect_law, only: break_away_level, friction_factor
-  use drive_law, only: foot_motion
+  use drive_law, only: foot_motion, measured_force, next_sample
   use friction_law, only: friction_t, power
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
@@ -56,8 +56,15 @@ contains
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(in) :: state
     real(wp), intent(out) :: force, rate, curvature
+    real(wp) :: measured, measured_rate
     call holding_force(machine, state%x, machine%drive_frequency*state%time, force, rate, curvature)
-    if (machine%effects%dahl_stiffness > 0) force = force - friction_factor(machine%effects, state%x)*state%z
+    if (.not. machine%extra) return
+    force = force - friction_factor(machine%effects, state%x)*state%z
+    if (machine%drive%interval > 0) then
+      call measured_force(machine%drive, state%time, measured, measured_rate)
+      force = force + measured
+      rate = rate + measured_rate
+    end if
   end subroutine net_force
 
   !> Largest force in `direction` +1 or -1 that friction holds at `x` [m], in N.
@@ -103,7 +110,7 @@ contains
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
-    real(wp) :: force, rate, curvature, step_up, step_down, step, smallest
+    real(wp) :: force, rate, curvature, step_up, step_down, step, smallest, until
     logical :: up_open, down_open
     up_open = state%x < machine%contact%upper
     down_open = state%x > machine%contact%lower
@@ -122,11 +129,13 @@ contains
       if (up_open) step_up = holding_step(strongest_hold(machine, state%x, 1) - force, -rate, curvature)
       if (down_open) step_down = holding_step(strongest_hold(machine, state%x, -1) + force, rate, curvature)
       step = min(step_up, step_down)
-      if (step >= time_end - state%time) then
-        state%time = time_end
-        return
+      until = next_sample(machine%drive, state%time, time_end)
+      if (step >= until - state%time) then
+        state%time = until
+        if (until >= time_end) return
+      else
+        state%time = state%time + max(step, smallest)
       end if
-      state%time = state%time + max(step, smallest)
     end do
   end subroutine hold
 
@@ -167,6 +176,8 @@ contains
       shrink = sqrt(back/out)*chatter_restitution(machine, speed, bounce)
       if (shrink >= 1) return
       left = bounce/(1 - shrink)
+      if (machine%drive%interval > 0 .and. left > next_sample(machine%drive, state%time, huge(left)) - state%time) left = -1
+      if (left < 0) return
       change = (abs(rate)*left + curvature*left**2/2 + law%damping*speed &
                 + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &
                + layer_change(law, speed)/machine%mass

@@ -13,7 +13,7 @@ module drive_law
   implicit none
   private
 
-  public :: drive_of, add_ripple, foot_motion, lever_foot, lever_assembles
+  public :: drive_of, add_ripple, foot_motion, measured_force, next_sample, lever_foot, lever_assembles
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
   integer, parameter :: max_harmonics = 1024
@@ -26,7 +26,13 @@ module drive_law
     real(wp), allocatable :: cosine(:), sine(:)
     !> False if the series of a mechanism did not converge.
     logical :: converged = .true.
+    !> Measured force: time between samples [s], 0 = none, and the samples [N].
+    real(wp) :: interval = 0
+    real(wp), allocatable :: force(:)
   end type drive_t
+
+  !> Samples closer than this share of an interval count as reached.
+  real(wp), parameter :: reached = 1e-9_wp
 
   !> Crank OD, slotted lever CE turning about C, rod EA to the guide of A. Lengths in m, angles in rad.
   type, public :: lever_t
@@ -49,6 +55,11 @@ contains
     case ('crank_lever_rod')
       call expand_lever(lever_of(choice), law)
       law%mean = law%mean + value_of(choice, 'shift')
+    case ('measured_force')
+      law%interval = value_of(choice, 'interval')
+      law%force = list_of(choice, 'force')
+      allocate (law%cosine(0), law%sine(0))
+      return
     case default
       allocate (law%cosine(0), law%sine(0))
       return
@@ -95,6 +106,27 @@ contains
     end do
     if (present(first)) first = d1
   end subroutine foot_motion
+
+  !> Measured force [N] at `time` [s since its first sample] and its rate [N/s] from there on.
+  pure subroutine measured_force(law, time, force, rate)
+    type(drive_t), intent(in) :: law
+    real(wp), intent(in) :: time
+    real(wp), intent(out) :: force, rate
+    integer :: i
+    i = min(max(int(time/law%interval + reached), 0), size(law%force) - 2)
+    rate = (law%force(i + 2) - law%force(i + 1))/law%interval
+    force = law%force(i + 1) + rate*(time - i*law%interval)
+  end subroutine measured_force
+
+  !> The first sample of a measured force after `time` [s], where its rate changes, or `time_end` if that comes first.
+  pure real(wp) function next_sample(law, time, time_end) result(next)
+    type(drive_t), intent(in) :: law
+    real(wp), intent(in) :: time, time_end
+    next = time_end
+    if (.not. law%interval > 0) return
+    next = (int(time/law%interval + reached) + 1)*law%interval
+    if (next > time_end - reached*law%interval) next = time_end
+  end function next_sample
 
   pure function lever_of(choice) result(lever)
     type(law_choice_t), intent(in) :: choice

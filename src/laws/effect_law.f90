@@ -155,11 +155,12 @@ contains
     level = friction_factor(effects, x)*(friction%break_away + direction*effects%asymmetric_coulomb)
   end function break_away_level
 
-  !> Dahl's z [N] after a long slip in `direction`; 0 at rest.
+  !> Dahl's z [N] after a long slip in `direction`; 0 at rest, and without Dahl's friction.
   pure elemental real(wp) function dahl_level(effects, direction) result(z)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: direction
-    z = direction*effects%dahl_sliding + abs(direction)*effects%asymmetric_coulomb
+    z = 0
+    if (effects%dahl_stiffness > 0) z = direction*effects%dahl_sliding + abs(direction)*effects%asymmetric_coulomb
   end function dahl_level
 
   !> Dahl's z [N] where a slip has come to `x` [m].

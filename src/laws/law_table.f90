@@ -41,9 +41,11 @@ module law_table
 
   character(len=*), parameter :: lemes = 'Lemes et al., vibro-impact system with ideal excitation'
 
-  type(law_row_t), parameter :: other_laws(12) = [ &
+  type(law_row_t), parameter :: other_laws(14) = [ &
     law_row_t('body', 'point_mass', 'one body on a horizontal guide', lemes), &
     law_row_t('restoring', 'linear', 'force c (l0 + x_A - x)', lemes), &
+    law_row_t('restoring', 'pendulum', '-moment sin x; x is an angle, the mass an inertia', &
+              'Huygens, Horologium Oscillatorium (1673)'), &
     law_row_t('restoring', 'none', 'no restoring force', ''), &
     law_row_t('friction', 'none', 'no friction', ''), &
     law_row_t('friction', 'coulomb', '-mu m g sgn v; sticks up to mu_s m g', lemes), &
@@ -56,9 +58,11 @@ module law_table
     law_row_t('drive', 'fourier', 'x_A = mean + sum a_n cos n(phi + angle) + b_n sin n(phi + angle)', &
               'calibrated stand-in for the drive of Lemes et al.'), &
     law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
-              'geometry derived from '//lemes)]
+              'geometry derived from '//lemes), &
+    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats after the last', &
+              'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)')]
 
-  type(parameter_row_t), parameter :: other_parameters(33) = [ &
+  type(parameter_row_t), parameter :: other_parameters(36) = [ &
     parameter_row_t('body', 'point_mass', 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'm'), &
     parameter_row_t('body', 'point_mass', 'gravity', 'm/s^2', 0.0_wp, none_above, .false., .true., 9.81_wp, .false., &
@@ -67,6 +71,8 @@ module law_table
                     'c'), &
     parameter_row_t('restoring', 'linear', 'free_length', 'm', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
                     'l0, undeformed length of the spring'), &
+    parameter_row_t('restoring', 'pendulum', 'moment', 'N m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'm g a, weight times distance of the centre of mass'), &
     parameter_row_t('friction', 'coulomb', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
                     'mu while sliding'), &
     parameter_row_t('friction', 'coulomb', 'static_coefficient', '1', 0.0_wp, none_above, .false., .true., -1.0_wp, .false., &
@@ -124,7 +130,11 @@ module law_table
     parameter_row_t('drive', 'crank_lever_rod', 'shift', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
                     's, position of C on the axis of x'), &
     parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
-                    'offset added to the crank angle')]
+                    'offset added to the crank angle'), &
+    parameter_row_t('drive', 'measured_force', 'interval', 's', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'time between samples; from the file if the force is one'), &
+    parameter_row_t('drive', 'measured_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'samples from the start on, or the name of a CSV file with columns t and force')]
 
   type(law_row_t), parameter, public :: laws( &
     size(other_laws) + size(contact_laws) + size(pair_laws) + size(effect_laws)) = &
@@ -223,8 +233,8 @@ contains
     choice%parameters(position_of(choice, parameter))%values = values
   end subroutine set_value
 
-  !> Changes the scalar parameter `path` = 'family.parameter' or 'effect.NAME.parameter' among `choices`; `found` is false if none has it. A static
-  !> coefficient that equals the kinetic one moves with it.
+  !> Changes the scalar parameter `path` = 'family.parameter' or 'effect.NAME.parameter' among `choices`; `found` is false if
+  !> none has it. A static coefficient that equals the kinetic one moves with it.
   pure subroutine change_parameter(choices, path, value, found)
     type(law_choice_t), intent(inout) :: choices(:)
     character(len=*), intent(in) :: path

@@ -5,14 +5,15 @@
 !> A new law adds a kind here, a row to `law_table`, a branch to both functions and a test; if it is not
 !> linear in the stretch, `is_linear` stays false and the adaptive flight takes over.
 module restoring_law
+  use elementary, only: sine_cosine
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
   implicit none
   private
 
-  public :: restoring_of, restoring_force, restoring_stiffness
+  public :: restoring_of, restoring_force, restoring_stiffness, restoring_energy
 
-  integer, parameter :: kind_none = 0, kind_linear = 1
+  integer, parameter :: kind_none = 0, kind_linear = 1, kind_pendulum = 2
 
   type, public :: restoring_t
     integer :: kind = kind_none
@@ -29,6 +30,7 @@ contains
   pure function restoring_of(choice) result(law)
     type(law_choice_t), intent(in) :: choice
     type(restoring_t) :: law
+    if (choice%name == 'pendulum') law = restoring_t(kind_pendulum, value_of(choice, 'moment'), 0.0_wp, .false.)
     if (choice%name == 'linear') then
       law = restoring_t(kind_linear, value_of(choice, 'stiffness'), &
                         value_of(choice, 'free_length'), .true.)
@@ -39,9 +41,13 @@ contains
   pure elemental real(wp) function restoring_force(law, stretch)
     type(restoring_t), intent(in) :: law
     real(wp), intent(in) :: stretch
+    real(wp) :: sine, cosine
     select case (law%kind)
     case (kind_linear)
       restoring_force = law%stiffness*stretch
+    case (kind_pendulum)
+      call sine_cosine(stretch, sine, cosine)
+      restoring_force = law%stiffness*sine
     case default
       restoring_force = 0
     end select
@@ -51,12 +57,32 @@ contains
   pure elemental real(wp) function restoring_stiffness(law, stretch)
     type(restoring_t), intent(in) :: law
     real(wp), intent(in) :: stretch
+    real(wp) :: sine, cosine
     select case (law%kind)
     case (kind_linear)
       restoring_stiffness = law%stiffness
+    case (kind_pendulum)
+      call sine_cosine(stretch, sine, cosine)
+      restoring_stiffness = law%stiffness*cosine
     case default
       restoring_stiffness = 0*stretch
     end select
   end function restoring_stiffness
+
+  !> Energy stored at a stretch [m], in J.
+  pure elemental real(wp) function restoring_energy(law, stretch)
+    type(restoring_t), intent(in) :: law
+    real(wp), intent(in) :: stretch
+    real(wp) :: sine, cosine
+    select case (law%kind)
+    case (kind_linear)
+      restoring_energy = 0.5_wp*law%stiffness*stretch**2
+    case (kind_pendulum)
+      call sine_cosine(stretch/2, sine, cosine)
+      restoring_energy = 2*law%stiffness*sine**2
+    case default
+      restoring_energy = 0
+    end select
+  end function restoring_energy
 
 end module restoring_law

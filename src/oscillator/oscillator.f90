@@ -6,7 +6,7 @@
 module oscillator
   use constants, only: two_pi
   use contact_law, only: add_to_contact, compliant_contact, contact_of, contact_t, force_on_body
-  use drive_law, only: add_ripple, drive_of, drive_t, foot_motion
+  use drive_law, only: add_ripple, drive_of, drive_t, foot_motion, measured_force
   use effect_check, only: refuse_effects
   use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, replace_friction, sensor_t, &
     slip_memory_t
@@ -29,6 +29,8 @@ module oscillator
     type(contact_t) :: contact
     type(drive_t) :: drive
     type(effects_t) :: effects
+    !> Forces beyond those of the laws: effects, or a measured force.
+    logical :: extra = .false.
     !> What a record of the motion shows.
     type(sensor_t) :: sensor
     !> sqrt(stiffness/mass) [rad/s]; 0 without a spring.
@@ -104,8 +106,9 @@ contains
     end do
     do i = 1, size(choices)
       ! After the second barrier, which is to be soft too.
-      if (choices(i)%family == effect_family .and. choices(i)%name == 'compliant_contact') &
+      if (choices(i)%family == effect_family .and. choices(i)%name == 'compliant_contact') then
         machine%contact = compliant_contact(machine%contact, choices(i))
+      end if
     end do
     call replace_friction(machine%effects, machine%friction)
     call finish_effects(machine%effects)
@@ -118,6 +121,15 @@ contains
     type(oscillator_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     machine%natural_frequency = sqrt(machine%restoring%stiffness/machine%mass)
+    if (machine%drive%interval > 0) then
+      if (size(machine%drive%force) < 2) then
+        call fail(error, exit_bad_case, 'drive.force: found less than two samples')
+        return
+      end if
+      machine%period = (size(machine%drive%force) - 1)*machine%drive%interval
+      machine%drive_frequency = two_pi/machine%period
+      return
+    end if
     machine%drive_frequency = machine%natural_frequency
     if (machine%drive%ratio > 0) machine%drive_frequency = machine%drive%ratio*machine%natural_frequency
     if (machine%drive_frequency > 0) then
@@ -135,6 +147,7 @@ contains
   pure subroutine set_bounds(machine)
     type(oscillator_t), intent(inout) :: machine
     integer :: n
+    machine%extra = machine%effects%present .or. machine%drive%interval > 0
     do n = 1, size(machine%drive%cosine)
       associate (size_n => sqrt(machine%drive%cosine(n)**2 + machine%drive%sine(n)**2))
         machine%foot_speed_bound = machine%foot_speed_bound + size_n*n*machine%drive_frequency
@@ -145,6 +158,9 @@ contains
     associate (length => abs(machine%restoring%free_length) + abs(machine%drive%mean) + sum(abs(machine%drive%cosine)) &
                + sum(abs(machine%drive%sine)), effects => machine%effects)
       machine%force_scale = machine%restoring%stiffness*length + machine%friction%break_away
+      ! A pendulum has no length to compare with but the radian.
+      if (.not. machine%restoring%is_linear) machine%force_scale = machine%force_scale + machine%restoring%stiffness
+      if (machine%drive%interval > 0) machine%force_scale = machine%force_scale + maxval(abs(machine%drive%force))
       if (effects%present) machine%force_scale = machine%force_scale + abs(effects%offset) + abs(effects%asymmetric_coulomb) &
                                                  + effects%dahl_sliding + abs(effects%cubic)*length**3
     end associate
@@ -169,7 +185,7 @@ contains
 
   !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
   !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
-  !> derivative [N/s^2] over all angles. Dahl's friction is not in it.
+  !> derivative [N/s^2] over all angles. Dahl's friction and a measured force are not in it.
   pure subroutine holding_force(machine, x, phi, force, rate, curvature_bound)
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, phi
@@ -191,12 +207,19 @@ contains
     end associate
   end subroutine holding_force
 
-  !> Force [N] on a slipping body at `x` [m], `v` [m/s] beyond those of the laws, the spring being stretched by `stretch` [m].
-  pure real(wp) function extra_force(machine, slip, x, v, stretch) result(force)
+  !> Force [N] on a slipping body at `x` [m], `v` [m/s] at `time` [s after the section] beyond those of the laws, the
+  !> spring being stretched by `stretch` [m].
+  pure real(wp) function extra_force(machine, slip, time, x, v, stretch) result(force)
     type(oscillator_t), intent(in) :: machine
     type(slip_memory_t), intent(in) :: slip
-    real(wp), intent(in) :: x, v, stretch
-    force = effect_force(machine%effects, machine%friction, slip, x, v, stretch)
+    real(wp), intent(in) :: time, x, v, stretch
+    real(wp) :: measured, rate
+    force = 0
+    if (machine%effects%present) force = effect_force(machine%effects, machine%friction, slip, x, v, stretch)
+    if (machine%drive%interval > 0) then
+      call measured_force(machine%drive, time, measured, rate)
+      force = force + measured
+    end if
   end function extra_force
 
 end module oscillator

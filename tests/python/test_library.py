@@ -201,9 +201,13 @@ def test_an_effect_has_a_derivative(path: str, separatrix: Path, tmp_path: Path)
     starts = np.array([(0.5, 1.0, 0.3), (0.9, 4.0, 1.0), (0.6, -2.0, 4.0)])
     result = fly(model, [key], [value], starts)
     step = 1e-4 * value
-    sides = [fly(model, [key], [value + s * step], starts, derivatives=False, tolerance=1e-12) for s in (1, -1)]
+    sides = [
+        fly(model, [key], [value + s * step], starts, derivatives=False, tolerance=1e-12) for s in (1, -1)
+    ]
     expected = (sides[0].x - sides[1].x) / (2 * step)
-    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-9)
+    np.testing.assert_allclose(
+        result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-9
+    )
     written = tmp_path / "case.toml"
     written.write_text(model.to_text({key: 1.1 * value}))
     subprocess.run([separatrix, "trajectory", "--validate", written], check=True, capture_output=True)
@@ -220,9 +224,14 @@ def test_an_effect_of_size_zero_has_a_derivative(path: str) -> None:
     result = fly(model, [f"effect.{path}", "drive.mean"], [0.0, 0.31055], starts)
     assert result.steady.all()
     step = 2e-4 * EFFECTS[path]
-    values = [fly(model, [f"effect.{path}"], [k * step], starts, derivatives=False, tolerance=1e-12).x for k in (1, 2)]
+    values = [
+        fly(model, [f"effect.{path}"], [k * step], starts, derivatives=False, tolerance=1e-12).x
+        for k in (1, 2)
+    ]
     expected = (4 * values[0] - values[1] - 3 * result.x) / (2 * step)
-    np.testing.assert_allclose(result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-7)
+    np.testing.assert_allclose(
+        result.jacobian[:, 0], expected, rtol=0, atol=1e-3 * np.abs(expected).max() + 1e-7
+    )
     plain = fly(Model.from_text(CASE), ["drive.mean"], [0.31055], starts)
     np.testing.assert_array_equal(result.jacobian[:, 1:], plain.jacobian)
 
@@ -237,6 +246,35 @@ def test_a_sensor_shows_another_position(model: Model) -> None:
     before = [(0.5, 1.0, 0.3 - 0.05 * model.drive_frequency({}))]
     expected = fly(model, start=before, derivatives=False).x
     np.testing.assert_allclose(fly(late, derivatives=False).x, expected, rtol=0, atol=1e-13)
+
+
+def test_a_measured_force_is_taken_from_the_call() -> None:
+    """A mass under a force that rises linearly, from three places in its record: the closed form."""
+    text = '[body]\nmass = 2\n[restoring]\nlaw = "none"\n[drive]\nlaw = "measured_force"\ninterval = 1\n'
+    model = Model.from_text(text + "force = [0, 0]\n")
+    assert set(model.parameters) == {"body.mass", "body.gravity"}
+    begins, interval, rise = np.array([0.0, 0.123, 0.4]), 0.01, 5.0
+    samples = rise * interval * np.arange(101)
+    starts = np.array([(0.1, 0.2, 0.0)] * 3)
+    options = {"active": ["body.mass"], "values": [2.0], "start": starts}
+    result = fly(model, **options, force=(begins, interval, samples))
+    pushed = rise * (np.repeat(begins, 7) * np.tile(TIMES, 3) ** 2 / 2 + np.tile(TIMES, 3) ** 3 / 6)
+    np.testing.assert_allclose(result.x, 0.1 + 0.2 * np.tile(TIMES, 3) + pushed / 2, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(result.jacobian[:, 0], -pushed / 4, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(result.jacobian[:, 2], np.tile(TIMES, 3), rtol=0, atol=1e-5)
+    with pytest.raises(CaseError, match=r"force: segments from 0.0 to 1.1\d* s, allowed 0 to 1.0 s"):
+        fly(model, **options, force=(2 * begins, interval, samples))
+
+
+def test_a_pendulum_is_a_machine() -> None:
+    """Its small motions have the frequency sqrt(moment/inertia), whose derivative is known."""
+    text = '[body]\nmass = 0.5\n[restoring]\nlaw = "pendulum"\nmoment = 8\n'
+    times = np.linspace(0, 1, 11)
+    result = fly(Model.from_text(text), ["restoring.moment"], [8.0], [(1e-4, 0.0, 0.0)], times)
+    np.testing.assert_allclose(result.x, 1e-4 * np.cos(4 * times), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(
+        result.jacobian[:, 0], -1e-4 * times * np.sin(4 * times) / 4, rtol=0, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize(
@@ -276,13 +314,23 @@ def test_a_file_that_is_missing_is_named(tmp_path: Path) -> None:
         ({"times": np.array([-0.1])}, "at least 0"),
         ({"times": np.array([1e9])}, "at most 100000.* drive periods"),
         ({"tolerance": 0.1}, "tolerance: found 0.1"),
-        ({"force": (np.zeros(1), 0.1, np.zeros(3))}, "measured_force"),
+        ({"force": (np.zeros(1), 0.1, np.zeros(9))}, "measured_force"),
     ],
 )
 def test_a_bad_call_says_what_is_wrong(model: Model, options: dict, expected: str) -> None:
     """What was found and what is allowed."""
     with pytest.raises(CaseError, match=expected):
         fly(model, **options)
+
+
+def test_the_example_of_the_page_runs(source_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """docs/library.md shows what works."""
+    monkeypatch.chdir(source_dir)
+    page = (source_dir / "docs" / "library.md").read_text()
+    names: dict = {}
+    exec(page.split("```python\n")[1].split("```")[0], names)
+    assert names["result"].x.shape == (100,)
+    assert names["result"].jacobian.shape == (100, 5)
 
 
 def test_a_pair_is_refused(source_dir: Path) -> None:

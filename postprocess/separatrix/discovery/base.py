@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The base machine fitted honestly: noise measured on the way, phases found, several starts if one is not enough."""
+"""The base machine fitted honestly: noise measured, phases found, several starts."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.fit import Fit, again
 from separatrix.discovery.machine import Free, base_parameters, drive_nuisances
 from separatrix.discovery.noise import noise_of
 from separatrix.discovery.problem import Problem
@@ -14,7 +15,10 @@ from separatrix.discovery.refit import Fitted
 
 _PHASES = 12
 _DISAGREEMENT = 1.3
-_RENEWED = 1.04
+_RENEWED = 0.03
+_RENEWED_MEMORY = 0.06
+# reduced chi^2 above which correlated residuals say more about the model than about the noise
+_MISFIT = 1.5
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
@@ -41,48 +45,48 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     return best
 
 
-def measure_noise(data: Data, problem: Problem, fit, mass: float) -> None:
+def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     """Set what the records do not state, and doubt what they state if the samples scatter more.
 
     The fit must have been made without memory.
     """
     factors, memory = noise_of(problem, fit, 0, mass)
+    before = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     for number, prepared in enumerate(data.prepared):
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
         elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m")
+            prepared.note(
+                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
+            )
     if any(one.record.v is not None for one in data.prepared):
         factors, _ = noise_of(problem, fit, 1, mass)
         for number, prepared in enumerate(data.prepared):
             if prepared.record.v is not None and not prepared.velocity_sigma_stated:
                 prepared.velocity_sigma *= factors.get(number, 1.0)
+    scatter = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
+    misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
     for prepared in data.prepared:
-        prepared.memory = memory
+        prepared.memory = memory if misfit < _MISFIT else 0.0
 
 
-def renew_noise(data: Data, problem: Problem, fit, mass: float) -> bool:
-    """Measure the noise again by a better fit, on top of what is known; whether it changed enough to matter."""
-    factors, memory = noise_of(problem, fit, 0, mass)
-    others, _ = noise_of(problem, fit, 1, mass) if fit.evaluation.residual.shape[1] > problem.segments.inside.shape[1] else ({}, 0)
-    changed = False
-    for number, prepared in enumerate(data.prepared):
-        if not prepared.sigma_stated and not 1 / _RENEWED < factors.get(number, 1.0) < _RENEWED:
-            prepared.sigma = max(prepared.sigma * factors[number], prepared.resolution / np.sqrt(12))
-            changed = True
-        speed = prepared.record.v is not None and not prepared.velocity_sigma_stated
-        if speed and not 1 / _RENEWED < others.get(number, 1.0) < _RENEWED:
-            prepared.velocity_sigma *= others[number]
-            changed = True
-        if prepared.memory == 0 and memory > 0:
-            prepared.memory = memory
-            changed = True
-    return changed
+def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
+    """Measure the noise anew by a better fit; whether it changed enough to matter."""
+    before = [(one.sigma, one.velocity_sigma, one.memory) for one in data.prepared]
+    for one in data.prepared:
+        one.memory = 0.0
+    measure_noise(data, problem, again(problem, fit), mass)
+    return any(
+        abs(np.log(one.sigma / sigma)) > _RENEWED
+        or (one.record.v is not None and abs(np.log(one.velocity_sigma / speed)) > _RENEWED)
+        or abs(one.memory - memory) > _RENEWED_MEMORY
+        for one, (sigma, speed, memory) in zip(data.prepared, before, strict=True)
+    )
 
 
 def find_phases(data: Data, model, free: list[Free]) -> None:
-    """Search the crank angle of the records that do not state it, on short segments with all else as in the case."""
+    """Search the crank angle of the records that do not state it, all else as in the case."""
     missing = [i for i, one in enumerate(data.prepared) if one.frequency is not None and not one.phase_stated]
     if not missing:
         return

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The effects that can be named: their parameters, sizes to start from, and what they cannot be told from.
 
-A size to start from is a few per cent of what the machine's own forces, lengths and speeds are in the records.
+A size to start from is a few per cent of what the machine's own forces, lengths and speeds are in the
+records.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
@@ -17,7 +19,7 @@ from separatrix.errors import SeparatrixError
 
 @dataclass(frozen=True)
 class Scales:
-    """Typical sizes in the records: mass, deviation, speed, force, impact speed, friction, extremes of x, sampling."""
+    """Typical sizes in the records, in SI units."""
 
     mass: float
     length: float
@@ -32,10 +34,12 @@ class Scales:
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of the catalogue. `starts` gives, per parameter, the sizes to start from; the first is the usual one.
+    """One row of the catalogue. `starts` gives, per parameter, the sizes to start from; the first is the
+    usual one.
 
-    `linear`: the parameters that the residual is linear in near zero (both signs are tried where bounds allow);
-    `positive`: those that are fitted by their logarithm. `needs`: families or paths that the base machine must have.
+    `linear`: the parameters that the residual is linear in near zero (both signs are tried where bounds
+    allow); `positive`: those that are fitted by their logarithm. `needs`: families or paths that the base
+    machine must have.
     """
 
     name: str
@@ -54,6 +58,9 @@ class Effect:
 
 _FAR = 20.0
 _SLIDING = "while the body slides, friction that differs with the direction by a constant is a constant force"
+_GAIN = (
+    "where friction, barrier and the scale of the drive are fitted, a gain of the sensor is a constant force"
+)
 _SHIFT = "where the position of the barrier is fitted, a shifted sensor is a constant force"
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -77,7 +84,7 @@ CATALOGUE: tuple[Effect, ...] = (
         "asymmetric_friction",
         lambda s: {"coulomb": [0.02 * s.force], "viscous": [0.02 * s.force / s.speed]},
         ("coulomb", "viscous"),
-        equivalent={"offset_force": _SLIDING, "sensor_bias": _SHIFT},
+        equivalent={"offset_force": _SLIDING, "sensor_bias": _SHIFT, "sensor_gain": _GAIN},
     ),
     Effect(
         "position_dependent_friction",
@@ -90,7 +97,7 @@ CATALOGUE: tuple[Effect, ...] = (
         "offset_force",
         lambda s: {"force": [0.02 * s.force]},
         ("force",),
-        equivalent={"asymmetric_friction": _SLIDING, "sensor_bias": _SHIFT},
+        equivalent={"asymmetric_friction": _SLIDING, "sensor_bias": _SHIFT, "sensor_gain": _GAIN},
     ),
     Effect(
         "restitution_slope",
@@ -121,9 +128,15 @@ CATALOGUE: tuple[Effect, ...] = (
         lambda s: {"bias": [0.01 * s.length]},
         ("bias",),
         sensor=True,
-        equivalent={"offset_force": _SHIFT, "asymmetric_friction": _SHIFT},
+        equivalent={"offset_force": _SHIFT, "asymmetric_friction": _SHIFT, "sensor_gain": _GAIN},
     ),
-    Effect("sensor_gain", lambda s: {"gain": [0.01]}, ("gain",), sensor=True),
+    Effect(
+        "sensor_gain",
+        lambda s: {"gain": [0.01]},
+        ("gain",),
+        sensor=True,
+        equivalent={"offset_force": _GAIN, "asymmetric_friction": _GAIN, "sensor_bias": _GAIN},
+    ),
     Effect("sensor_delay", lambda s: {"delay": [0.2 * s.interval]}, ("delay",), sensor=True),
 )
 
@@ -166,7 +179,7 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
         sizes = {"position": place}
     first = {key: float(values[0]) for key, values in sizes.items()}
     try:
-        extended = type(model).from_text(text_with(model.to_text({}), name, first))
+        extended = type(model).from_text(text_with(_open_text(model, name, sizes, scales), name, first))
     except SeparatrixError as reason:
         return str(reason)
     added = []
@@ -186,6 +199,35 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
     return Candidate((*names, name), extended, whole + added, place, starts, list(forms), linear)
 
 
+def _open_text(model, name: str, sizes: dict[str, list[float]], scales: Scales) -> str:
+    """The case; where a barrier is added, its starts lie where all places that are tried leave room."""
+    text = model.to_text({})
+    if name != "second_barrier":
+        return text
+    reach = 0.2 * (scales.highest - scales.lowest)
+    if "contact.upper" in model.parameters:
+        return within_barriers(text, max(sizes["position"]) + reach, model.parameters["contact.upper"].value)
+    return within_barriers(text, model.parameters["contact.lower"].value, min(sizes["position"]) - reach)
+
+
+def within_barriers(text: str, lower: float, upper: float) -> str:
+    """A resolved case in which positions to start from lie between the barriers."""
+    table, axis, lines = "", "", []
+    for line in text.splitlines():
+        header = re.fullmatch(r"\[+(.*?)\]+", line.strip())
+        key, equals, value = (part.strip() for part in line.partition("="))
+        if header:
+            table, axis = header.group(1), ""
+        elif equals and key == "name":
+            axis = value.strip('"')
+        if equals and ((table == "axis" and axis == "x0" and key in ("from", "to")) or key == "x0"):
+            numbers = re.findall(r"[-+0-9.eE]+", value)
+            kept = [repr(float(np.clip(float(number), lower, upper))) for number in numbers]
+            line = f"{key} = [{', '.join(kept)}]" if value.startswith("[") else f"{key} = {kept[0]}"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
 def _starts(effect: Effect, sizes: dict[str, list[float]], added: list[Free]) -> list[np.ndarray]:
     """Combinations of the sizes, and the other sign of the linear ones where it is allowed."""
     choices = []
@@ -203,7 +245,7 @@ def _has(model, need: str) -> bool:
 
 
 def _free_side(model, scales: Scales) -> list[float] | str:
-    """Places for a second barrier: just inside of the extreme that the records show on the side without one."""
+    """Places for a second barrier: inside of the extreme of the records on the side without one."""
     upper, lower = ("contact.upper" in model.parameters, "contact.lower" in model.parameters)
     if upper == lower:
         return "the machine has no side without a barrier" if upper else "the machine has no barrier"

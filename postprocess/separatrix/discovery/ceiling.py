@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the most flexible machine could still explain: forces that depend smoothly on speed, place, phase and time.
+"""What the most flexible machine could still explain: forces that depend smoothly on speed, place, phase and
+time.
 
-A family of forces (and of kicks at impacts) is tried at once on what a fit left over, linearised. Under a right model the
-gain of a family is a chi^2 of its rank. The family of pieces gives each segment forces of its own and so
-sees what no function of the state can say.
+A family of forces (and of kicks at impacts) is tried at once on what a fit left over, linearised. Under a
+right model the gain of a family is a chi^2 of its rank. The family of pieces gives each segment forces of its
+own and so sees what no function of the state can say.
 """
 
 from dataclasses import dataclass
@@ -34,7 +35,7 @@ class Family:
 
 @dataclass
 class Ceiling:
-    """All families; `gain` is the largest excess of a gain over its rank, `p` is corrected for their number."""
+    """All families; `p` is corrected for their number."""
 
     families: list[Family]
 
@@ -83,7 +84,7 @@ def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
 
 
 def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int]:
-    """Forces of each segment by itself, constant over fifths of it; the common parameters stay where they are."""
+    """Forces of each segment by itself, constant over fifths of it; common parameters stay."""
     inside = problem.segments.inside
     lengths = inside.sum(axis=1)
     piece = np.minimum(np.arange(inside.shape[1])[None, :] * _PIECES // lengths[:, None], _PIECES - 1)
@@ -115,7 +116,9 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     }
     if phase is not None:
         waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
-        forces["phase"] = np.stack(waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2)
+        forces["phase"] = np.stack(
+            waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2
+        )
         forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
     since = after_impacts(problem, fit)
     if np.isfinite(since).sum() > 100:
@@ -128,7 +131,7 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
 
 
 def motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
-    """Position, velocity, crank angle and time (in [-1, 1] over each record) at the samples, scaled to about 1."""
+    """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
     inside = problem.segments.inside
     x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
     good = inside & fit.good[:, None]

@@ -121,8 +121,8 @@ def _seed(text: str) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="separatrix-discover",
-        description="Find where measured records and a case disagree, name the missing effect, add it, and prove it.",
-        epilog="Exit codes: 0 done (whatever the verdict), 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
+        description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
+        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

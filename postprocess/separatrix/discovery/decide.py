@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forward selection: which effects, if any, may be named; what cannot be told apart; what the catalogue lacks."""
+"""Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
 
 from dataclasses import dataclass, field
 
@@ -72,7 +72,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
 
 
 def remeasured(bench: Bench, first: Round) -> Fitted | None:
-    """The base fitted again where the best candidate shows that the noise is not what the base let it seem."""
+    """The base fitted again where the best candidate shows that the noise is another."""
     leaders = [one for one in first.judged if one.fitted.fit.converged]
     if not leaders:
         return None
@@ -92,7 +92,7 @@ def remeasured(bench: Bench, first: Round) -> Fitted | None:
 
 def _leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one)[0]]
+    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
     pool = converged or found.judged
     best = pool[0]
     scale = max(1.0, best.fitted.fit.reduced_chi2)
@@ -110,7 +110,7 @@ def _pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], 
         helps = any(low > 0 for low, _ in bounds)
         best.gates["hold-out"] = bool(helps and all(high > _HARM for _, high in bounds))
     best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best)[0]
+    best.gates["admissible"] = admissible(best, base)[0]
     best.gates["stable"] = stable(best, base, options) >= _INCLUSION
 
 
@@ -149,7 +149,7 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     if decision.base_ceiling.p < 0.3 * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
-            f"forces that depend on {decision.base_ceiling.best.name} would explain more than chance, no effect does"
+            f"forces that depend on {decision.base_ceiling.best.name} would explain more, no effect does"
         )
     return decision
 
@@ -170,7 +170,7 @@ def _with_more(
             if made is not None:
                 pairs.append(_over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one)[0]]
+    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
     if not pairs:
         return _give_up(decision)
     pairs.sort(key=lambda one: -one.evidence)

@@ -3,13 +3,13 @@
 """What is written: the verdict, the case with the effect added, the numbers behind the figures."""
 
 import json
-import os
 import tempfile
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from separatrix.discovery.catalogue import within_barriers
 from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
@@ -30,7 +30,7 @@ def write_all(folder: Path, verdict: dict, findings: Findings) -> list[Path]:
                 made.append(work / "extended.toml")
                 made[-1].write_text(extended_case(verdict, findings), encoding="utf-8")
             for path in made:
-                os.replace(path, folder / path.name)
+                path.replace(folder / path.name)
     except OSError as error:
         raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
     return [folder / path.name for path in made]
@@ -68,7 +68,18 @@ def extended_case(verdict: dict, findings: Findings) -> str:
         if found:
             unit = "" if found["unit"] == "1" else f" {found['unit']}"
             lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
-    return "\n".join([*lines, fitted.model.to_text(machine_values(fitted))])
+    return "\n".join([*lines, machine_text(fitted)])
+
+
+def machine_text(fitted: Fitted) -> str:
+    """The resolved case of the fitted machine; starts and axes end at its barriers."""
+    values = machine_values(fitted)
+    try:
+        return fitted.model.to_text(values)
+    except SeparatrixError:
+        ends = [values.get("contact.lower", -np.inf), values.get("contact.upper", np.inf)]
+        text = within_barriers(fitted.model.to_text({}), *ends)
+        return type(fitted.model).from_text(text).to_text(values)
 
 
 def machine_values(fitted: Fitted) -> dict[str, float]:

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Least squares over many short segments: each start is eliminated block by block, the common parameters remain.
+"""Least squares over many short segments: each start is eliminated block by block, the common parameters
+remain.
 
-The normal equations of a Levenberg-Marquardt step have the form of an arrow: one 2 x 2 block per segment, coupled
-only through the parameters. Their Schur complement has the size of the parameters (tests/python/test_discovery_fit.py
-compares it with the dense step).
+The normal equations of a Levenberg-Marquardt step have the form of an arrow: one 2 x 2 block per segment,
+coupled only through the parameters. Their Schur complement has the size of the parameters
+(tests/python/test_discovery_fit.py compares it with the dense step).
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ class Blocks:
 
 @dataclass
 class Reduced:
-    """What is left of the segments after their starts are eliminated: per segment, to be summed or resampled."""
+    """What is left of each segment after its start is eliminated, to be summed or resampled."""
 
     matrix: np.ndarray
     gradient: np.ndarray
@@ -90,7 +91,7 @@ def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, w
 
 
 def eliminate(blocks: Blocks, damping: float = 0.0) -> tuple[Reduced, np.ndarray, np.ndarray]:
-    """Schur complement by segment; also the inverse start blocks and the couplings, to find the starts again."""
+    """Schur complement by segment; also inverse start blocks and couplings, to find the starts again."""
     start = blocks.matrix[:, :2, :2].copy()
     diagonal = np.einsum("kii->ki", start)
     diagonal *= 1 + damping
@@ -152,7 +153,7 @@ def minimise(
     fixed: np.ndarray | None = None,
     hopeless: float | None = None,
 ) -> Fit:
-    """Minimise the sum of squares (or Huber's, `robust`); stop early above `hopeless` times the wanted chi^2."""
+    """Minimise squares (or Huber's loss, `robust`); stop early above `hopeless` times the wanted chi^2."""
     lower = np.array([one.lower for one in problem.free])
     upper = np.array([one.upper for one in problem.free])
     movable = np.ones(values.size, bool) if fixed is None else ~fixed
@@ -196,6 +197,12 @@ def minimise(
             if mean > hopeless:
                 break
     return _finished(problem, values, starts, current, decrement, iterations, ~_open_at(values, lower, upper))
+
+
+def again(problem: Problem, fit: Fit) -> Fit:
+    """The same values and starts, evaluated with the noise as it is known now."""
+    current = problem.evaluate(fit.values, fit.starts)
+    return _finished(problem, fit.values, fit.starts, current, fit.decrement, fit.iterations, fit.at_bound)
 
 
 def _finished(problem, values, starts, current, decrement, iterations, at_bound) -> Fit:

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well a fitted machine foretells records that the fit never saw.
 
-Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its clock. The
-score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted parameters.
+Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its
+clock. The score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted
+parameters.
 """
 
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ class Prediction:
 
 
 def predict(data: Data, model, free: list[Free], values: np.ndarray, covariance: np.ndarray) -> Prediction:
-    """Score held-out records by the machine with `values`, known up to `covariance`, of its free parameters."""
+    """Score held-out records by the machine with `values`, known up to `covariance`."""
     shared = [i for i, one in enumerate(free) if one.record is None]
     own = record_nuisances([one.phase_known for one in data.prepared]) if data.prepared[0].frequency else []
     whole = [free[i] for i in shared] + own
@@ -56,7 +57,7 @@ def _fit_own(
 
 
 def _scores(fit: Fit, covariance: np.ndarray, shared: int) -> np.ndarray:
-    """Log density of each segment, its start free and the parameters of the machine known up to their covariance."""
+    """Log density of each segment, its start free, the machine known up to its covariance."""
     values, vectors = np.linalg.eigh(covariance) if shared else (np.zeros(0), np.zeros((0, 0)))
     root = vectors * np.sqrt(np.maximum(values, 0))
     matrix = root.T @ fit.reduced.matrix[:, :shared, :shared] @ root

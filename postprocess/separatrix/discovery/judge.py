@@ -12,13 +12,14 @@ from separatrix.discovery.heldout import Prediction
 from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, gain_over
 
-_INCLUSION = 0.9
 _BLOCKS = 2
+# share of the base's segments that a candidate must be able to follow
+_FOLLOWED = 0.9
 
 
 @dataclass
 class Judged:
-    """A candidate with its evidence: log-likelihood gained in training, log score gained on held-out records."""
+    """A candidate with what it gained: log-likelihood in training, log score on held-out records."""
 
     fitted: Fitted
     prediction: Prediction | None
@@ -61,7 +62,7 @@ def detection(one: Judged, tested: int, inflation: float) -> float:
 
 
 def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
-    """Lower and upper 5 % bound of the score gained in each held-out record, by resampling blocks of segments."""
+    """Lower and upper 5 % bound of the score gained in each held-out record, by block bootstrap."""
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
     for number in np.unique(one.prediction.record):
@@ -81,7 +82,7 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 
 
 def stable(one: Judged, base: Fitted, options: Options) -> float:
-    """Share of block bootstraps of the segments in which the effect still pays for its parameters, linearised."""
+    """Share of block bootstraps of the segments in which the effect pays for its parameters."""
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
     added = added[~fit.at_bound[added]]
@@ -93,10 +94,11 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     return float(np.mean(sums > one.parameters))
 
 
-def admissible(one: Judged) -> tuple[bool, str]:
-    """Signs and bounds: the effect is not at a bound, differs from nothing, and what it is added to stays sensible."""
+def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
+    """Signs and bounds: the effect is inside of its own, is not nothing, and leaves the drive sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
     errors = np.sqrt(np.diag(one.fitted.covariance))
+    base_good = int(base.fit.good.sum())
     clear = []
     for i in one.fitted.added:
         if fit.at_bound[i]:
@@ -104,6 +106,8 @@ def admissible(one: Judged) -> tuple[bool, str]:
         # the logarithm of a number says by its error whether the number is known at all
         size = 1.0 if free[i].positive else abs(fit.values[i])
         clear.append(size > 1.96 * errors[i] > 0)
+    if fit.good.sum() < _FOLLOWED * max(1, base_good):
+        return False, "the machine with it cannot follow some segments that the base can"
     if not clear:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):

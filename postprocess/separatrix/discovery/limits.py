@@ -18,8 +18,8 @@ _ADVICE = {
     frozenset(
         ("offset_force", "asymmetric_friction")
     ): "stop the drive and let the body stick: the middle between the "
-    "places where it breaks away in either direction is off by force/stiffness for a constant force, not for friction "
-    "that differs with the direction",
+    "places where it breaks away in either direction is off by force/stiffness for a constant force, not for "
+    "friction that differs with the direction",
     frozenset(
         ("offset_force", "sensor_bias")
     ): "measure the place of the barrier: the sensor's error shifts it, a force does not",
@@ -86,7 +86,7 @@ def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
 
 
 def separating_experiment(bench: Bench, one: Fitted, others: list[Fitted]) -> str:
-    """What to measure next so that rivals part: known advice, else the drive ratio at which they differ most."""
+    """What to measure next: known advice, else the drive ratio at which the rivals differ most."""
     for other in others:
         advice = _ADVICE.get(frozenset((one.names[-1], other.names[-1])))
         if advice:

@@ -24,7 +24,8 @@ _UNBOUNDED = 1e100
 
 @dataclass(frozen=True)
 class Free:
-    """One free number of a fit; `path` of the machine, or a nuisance (`nuisance:...`) of all records or of one.
+    """One free number of a fit; `path` of the machine, or a nuisance (`nuisance:...`) of all records or of
+    one.
 
     A `positive` one is fitted by its logarithm, which `value`, `lower` and `upper` are of.
     """
@@ -70,7 +71,7 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
 def _is_fitted(path: str, measured_force: bool) -> bool:
     if path == "body.mass":
         return measured_force
-    if path.startswith(_AMPLITUDES) or path in _FIXED or path.endswith(_FIXED_ENDS):
+    if path.startswith((*_AMPLITUDES, "drive.force")) or path in _FIXED or path.endswith(_FIXED_ENDS):
         return False
     return path.split(".")[0] in ("restoring", "friction", "contact", "drive", "effect")
 
@@ -102,7 +103,7 @@ def drive_amplitudes(model) -> dict[str, float]:
 
 
 def drive_nuisances(model, phase_known: list[bool]) -> list[Free]:
-    """Scale of the drive, zero of the crank and clock of each record; the zero is known where phi was measured."""
+    """Scale of the drive; zero of the crank (where phi was not measured) and clock of each record."""
     if "drive.ratio" not in model.parameters or not model.parameters["drive.ratio"].value:
         return []
     free = []

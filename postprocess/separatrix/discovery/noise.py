@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Size and memory of the noise of records, from what segments of half a period leave over.
 
-A wrong model does little over half a period that a free start and a force that is constant over quarters of it could not
-undo. What is left is noise, less what these unknowns took away: its power and the product of its neighbours are
-compared with what noise of correlation r^|k| would leave.
+A wrong model does little over half a period that a free start and a force that is constant over quarters of
+it could not undo. What is left is noise, less what these unknowns took away: its power and the product of its
+neighbours are compared with what noise of correlation r^|k| would leave.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ _OUTLIER = 2.5
 
 
 def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dict[int, float], float]:
-    """Factor on the assumed standard deviation of each record, and the correlation of neighbours in all of them."""
+    """Factor on the assumed standard deviation by record, and the correlation of neighbours in all."""
     cleaned, left, record = _cleaned(problem, fit, channel, mass)
     length = problem.segments.inside.shape[1]
     if record.size < 4:
@@ -38,7 +38,9 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dic
     # each record in its own size
     size = np.ones(record.size)
     for number in np.unique(record):
-        size[record == number] = power[record == number].sum() / np.trace(left, axis1=1, axis2=2)[record == number].sum()
+        size[record == number] = (
+            power[record == number].sum() / np.trace(left, axis1=1, axis2=2)[record == number].sum()
+        )
     ratio = np.sum(products, axis=1) / np.sum(powers, axis=1)
     seen = float(np.sum(product / size) / np.sum(power / size))
     memory = float(np.interp(seen, ratio, _MEMORIES))
@@ -53,7 +55,9 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dic
     return factors, memory
 
 
-def _cleaned(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _cleaned(
+    problem: Problem, fit: Fit, channel: int, mass: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residuals of one channel, starts and forces projected out, the projectors, and their records."""
     segments = problem.segments
     length = segments.inside.shape[1]
@@ -62,7 +66,9 @@ def _cleaned(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[np.
     forces = (piece[:, :, None] == np.arange(_PIECES)) * segments.inside[:, :, None].astype(float)
     columns = np.concatenate([fit.evaluation.by_start, force_columns(problem, fit, forces, mass)], axis=2)
     part = slice(channel * length, (channel + 1) * length)
-    rows = np.flatnonzero(fit.good & (counts >= 2 * (_PIECES + 2)) & np.any(fit.evaluation.used[:, part], axis=1))
+    rows = np.flatnonzero(
+        fit.good & (counts >= 2 * (_PIECES + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
+    )
     columns, residual = columns[rows, part], fit.evaluation.residual[rows, part]
     size = np.linalg.norm(columns, axis=1, keepdims=True)
     basis, singular, _ = np.linalg.svd(columns / np.where(size > 0, size, 1), full_matrices=False)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known about a record before anything is fitted: noise, resolution, drive, delay between channels."""
+"""What is known of a record before anything is fitted: noise, resolution, drive, delay of channels."""
 
 from dataclasses import dataclass, field
 
@@ -58,7 +58,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     sigma = _noise(record, rest, resolution, notes)
     if np.std(record.x) < 5 * sigma:
         raise SeparatrixError(
-            f"{record.name}: x moves by {np.std(record.x):.3g} m (standard deviation) at a noise of {sigma:.3g} m: "
+            f"{record.name}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
             "nothing but noise"
         )
     prepared = Prepared(
@@ -165,7 +165,7 @@ def _check_size(prepared: Prepared, model) -> None:
     spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
     if not 1 / _MOST_RATIO < spread / expected < _MOST_RATIO:
         raise SeparatrixError(
-            f"{prepared.record.name}: x ranges over {spread:.3g} m, the machine has lengths of {expected:.3g} m: "
+            f"{prepared.record.name}: x ranges over {spread:.3g} m, the machine over {expected:.3g} m: "
             "wrong units, or a record of another machine"
         )
     for path, sign in (("contact.upper", 1), ("contact.lower", -1)):

@@ -17,7 +17,8 @@ _CLOCK_STEP = 1e-6
 
 @dataclass
 class Evaluation:
-    """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…, p).
+    """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…,
+    p).
 
     `used` is 0 where a segment was given up by the simulator or has no sample; `steady` is false where the
     sequence of impacts would change under a small step, so that the derivatives mean nothing.
@@ -237,7 +238,7 @@ class Problem:
         return active, given, chain
 
     def _ratio_slope(self, one: Free, number: int, chosen: dict[str, float]) -> float:
-        """How drive.ratio follows a parameter, so that the frequency of the drive stays that of the record."""
+        """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
         ratio = chosen["drive.ratio"]
         if one.path == "nuisance:clock" and one.record == number:
             return ratio

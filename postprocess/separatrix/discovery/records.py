@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import h5py
@@ -177,7 +178,7 @@ def _checked(
     rate = numbers.get("sampling_rate_hz")
     if rate is not None and not 0.99 < rate * usual < 1.01:
         raise SeparatrixError(
-            f"{path}: sampling_rate_hz is {rate:g}, but t advances by {usual:.6g} s per row: wrong unit of time?"
+            f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
     if np.ptp(x) == 0:
         raise SeparatrixError(f"{path}: 'x' is constant")
@@ -218,7 +219,8 @@ def _scale(
     words = [word.strip() for word in header["units"].split(",")]
     if len(words) < 2 or words[0] not in _TIME or words[1] not in _LENGTH:
         raise SeparatrixError(
-            f"{path}: units '{header['units']}', expected two out of {', '.join(_TIME)} and {', '.join(_LENGTH)}"
+            f"{path}: units '{header['units']}', expected one of {', '.join(_TIME)} and one of "
+            f"{', '.join(_LENGTH)}"
         )
     columns["t"] = columns["t"] * _TIME[words[0]]
     columns["x"] = columns["x"] * _LENGTH[words[1]]
@@ -231,7 +233,7 @@ def _pieces(t: np.ndarray, usual: float, where, warnings: list[str]) -> list[tup
     if gaps.size > 3:
         warnings.append(f"{gaps.size - 3} more gaps")
     edges = [0, *gaps.tolist(), t.size]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(edges))
 
 
 def _check_clipping(x: np.ndarray, numbers: dict, where, warnings: list[str]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.catalogue import Candidate
-from separatrix.discovery.data import Data, fit_stages
+from separatrix.discovery.data import Data, fit_stages, polished
 from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.problem import Problem
 from separatrix.discovery.screen import Screened
@@ -61,8 +61,8 @@ def refit(
 ) -> Fitted:
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
-    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start is not tried
-    further.
+    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
+    is not tried further.
     """
     best = None
     values = _base_values(base, candidate)
@@ -71,6 +71,7 @@ def refit(
         tried = values.copy()
         tried[list(candidate.added)] = start
         problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
+        fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None or gain_over(found, best)[0] > 0:
             best = found
@@ -87,7 +88,7 @@ def refit(
 def _try(
     data: Data, base: Fitted, candidate: Candidate, kind: str, values: np.ndarray, most: int
 ) -> tuple[Problem, Fit]:
-    """One start: at full length from the fitted base, or through the stages, from the case as it stands if far."""
+    """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
         return problem, minimise(problem, values, base.fit.starts, most=most)
@@ -99,6 +100,17 @@ def _try(
     return fit_stages(
         data, candidate.model, candidate.free, values, stages=stages, most=min(most, 12), hopeless=_HOPELESS
     )
+
+
+def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
+    """A fit tried again from where another effect led the machine and its starts; the better of both."""
+    values = _base_values(other, candidate)
+    added = list(candidate.added)
+    values[added] = one.fit.values[list(one.added)]
+    fit = minimise(one.problem, values, other.fit.starts, most=15)
+    fit = polished(data, one.problem, fit, data.last, 8, guesses=(one.fit.starts,))
+    found = Fitted(one.names, one.model, one.problem, fit, one.added, one.tries + 1)
+    return found if gain_over(found, one)[0] > 0 else one
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Segments whose start is caught in a wrong minimum, as beside a motion with one impact more: tried from other starts."""
+"""Segments whose start is caught in a wrong minimum (one impact more or less), tried from others."""
 
 import numpy as np
 
@@ -16,21 +16,25 @@ _ITERATIONS = 10
 _TRIED = np.array([(0, 0), (0, -3), (0, -1.5), (0, 1.5), (0, 3), (-2, 0), (2, 0), (-2, 2), (2, -2)], float)
 
 
-def rescued(
-    problem: Problem, fit: Fit, guess: np.ndarray, spread: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Starts of all segments, the suspicious ones improved where possible, and which were.
-
-    `guess` and `spread` (segments, 2): states of the smoother at the starts and their standard errors.
-    """
+def suspicious(fit: Fit) -> np.ndarray:
+    """Segments that are fitted far worse than the others or not at all, worst first."""
     reduced = fit.chi2 / np.maximum(1, fit.counts)
     usual = max(1.0, float(np.median(reduced[fit.good]))) if fit.good.any() else 1.0
     suspects = np.flatnonzero((reduced > _SUSPECT * usual) | ~fit.good)
-    suspects = suspects[np.argsort(-reduced[suspects])][:_MOST_SEGMENTS]
-    improved = np.zeros(reduced.size, bool)
-    if not suspects.size:
-        return fit.starts, improved
-    tries = len(_TRIED)
+    return suspects[np.argsort(-reduced[suspects])][:_MOST_SEGMENTS]
+
+
+def rescued(
+    problem: Problem, fit: Fit, suspects: np.ndarray, guesses: list[np.ndarray], spread: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Starts of all segments, the suspects improved where possible, and which were.
+
+    Each of `guesses` (segments, 2) is tried with steps of `spread`, the standard errors of the smoother.
+    """
+    improved = np.zeros(fit.chi2.size, bool)
+    guesses = [*guesses, fit.starts]
+    steps = np.tile(_TRIED, (len(guesses), 1))
+    tries = len(steps)
     rows = np.repeat(suspects, tries)
     segments = problem.segments
     copies = Problem(
@@ -39,7 +43,8 @@ def rescued(
         padded(segments.record[rows], segments.first[rows], segments.last[rows]),
         problem.free,
     )
-    begin = guess[rows] + np.tile(_TRIED, (suspects.size, 1)) * spread[rows]
+    places = np.tile(np.repeat(np.arange(len(guesses)), len(_TRIED)), suspects.size)
+    begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
     found, cost = solve_starts(copies, fit.values, begin)
     cost = cost.reshape(suspects.size, tries)
     best = np.argmin(cost, axis=1)
@@ -53,7 +58,7 @@ def rescued(
 
 
 def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the start of each segment by itself, the machine fixed, each with a damping of its own; also the chi^2."""
+    """Fit the start of each segment by itself, the machine fixed; also the chi^2."""
     starts = starts.copy()
     current = problem.evaluate(values, starts)
     cost = _cost(current)
@@ -64,10 +69,10 @@ def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tu
         reached = _cost(trial)
         better = reached < cost
         damping = np.where(better, 0.2 * damping, 10 * damping)
-        gained = float(np.sum(np.where(better & np.isfinite(cost), cost - reached, 0)))
         starts[better] += step[better]
+        idle = not np.any(better & ((cost == np.inf) | (reached < cost - 0.01)))
         cost = np.where(better, reached, cost)
-        if not better.any() or gained < 0.1:
+        if idle:
             break
         current = problem.evaluate(values, starts)
     return starts, cost

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a small force, acting along the fitted motion, does to the samples: from the transition matrices.
 
-With T(t) the derivative of x and v by the start, impacts included, a force f(s) moves the state at t by the integral of
-T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any number of forces can be tried.
+With T(t) the derivative of x and v by the start, impacts included, a force f(s) moves the state at t by the
+integral of T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any number of forces can be tried.
 """
 
 import numpy as np

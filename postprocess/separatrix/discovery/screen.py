@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each candidate could explain, from linearised signatures: no refit, seconds.
 
-The signature of an effect is what it does to the samples. What the starts of the segments and the parameters of
-the base machine can imitate is projected out; the rest decides whether the effect can be seen (d'), whether
-it can be told from another (cosines) and how much of the residual it takes (score).
+The signature of an effect is what it does to the samples. What the starts of the segments and the parameters
+of the base machine can imitate is projected out; the rest decides whether the effect can be seen (d'),
+whether it can be told from another (cosines) and how much of the residual it takes (score).
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Signature:
 
 @dataclass
 class Screened:
-    """Per signature: gain of log-likelihood, step of its amplitudes, their standard errors; and all cosines."""
+    """By effect: gain of log-likelihood, step of its amplitudes, their standard errors; all cosines."""
 
     names: list[str]
     gain: dict[str, float]

@@ -20,7 +20,7 @@ _SLOW = 0.3
 
 @dataclass
 class Segments:
-    """Segments of several records, padded to a table: `index[i, j]` is sample j of segment i, `inside` says if any."""
+    """Segments of several records as a table: `index[i, j]` is sample j of segment i, `inside` if any."""
 
     record: np.ndarray
     first: np.ndarray

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Position, velocity and acceleration from noisy positions, also through impacts.
 
-A Kalman filter of a body with white jerk and the Rauch-Tung-Striebel smoother over it. At a detected impact the
-velocity may jump: the process noise bursts between the two samples around it. The intensity of the jerk
+A Kalman filter of a body with white jerk and the Rauch-Tung-Striebel smoother over it. At a detected impact
+the velocity may jump: the process noise bursts between the two samples around it. The intensity of the jerk
 maximises the likelihood of the record.
 """
 
@@ -41,7 +41,7 @@ class Smoothed:
 
 
 def smooth(t: np.ndarray, x: np.ndarray, sigma: float, period_samples: float | None = None) -> Smoothed:
-    """Smooth positions of noise `sigma` [m]; `period_samples` (of the drive) sets the window of the detection."""
+    """Smooth positions of noise `sigma` [m]; the drive period sets the window of detection."""
     window = int(np.clip((period_samples or 100) / 14, 4, 12))
     impacts = detect_impacts(t, x, sigma, window)
     jerk = _tuned_jerk(t, x, sigma, impacts)
@@ -72,7 +72,7 @@ def detect_impacts(t: np.ndarray, x: np.ndarray, sigma: float, window: int) -> n
 
 
 def _one_sided_velocities(x: np.ndarray, dt: float, sigma: float, window: int) -> tuple:
-    """Velocity half a sample after sample k by parabolas through the `window` samples up to k, and after it."""
+    """Velocity half a sample after sample k by parabolas through the samples up to k, and after it."""
     offsets = (np.arange(window) + 0.5) * dt
     design = np.vander(offsets, 3, increasing=True)
     row = np.linalg.pinv(design)[1]
@@ -109,7 +109,7 @@ def impact_table(smoothed: Smoothed) -> np.ndarray:
 
 
 def stick_intervals(smoothed: Smoothed, fewest: int = 4) -> list[tuple[float, float]]:
-    """Stretches of at least `fewest` samples in which velocity and acceleration are zero within three errors."""
+    """Stretches of `fewest` samples or more with velocity and acceleration zero within three errors."""
     error = np.sqrt(np.stack([smoothed.covariance[:, i, i] for i in (1, 2)], axis=1))
     still = np.all(np.abs(smoothed.state[:, 1:]) < 3 * error, axis=1)
     still &= np.abs(smoothed.v) < 0.05 * np.sqrt(np.mean(smoothed.v**2))
@@ -195,7 +195,7 @@ def _forward(t: np.ndarray, x: np.ndarray, sigma: float, jerk: float, impacts: n
 def _filter_and_smooth(t: np.ndarray, x: np.ndarray, sigma: float, jerk: float, impacts: np.ndarray) -> tuple:
     filtered, spreads, ahead, ahead_spreads, motions, likelihood = _forward(t, x, sigma, jerk, impacts)
     n = x.size
-    # gains of all samples at once: P F' (F P F' + Q)^-1, scaled because x, v and a differ by powers of the step
+    # gains of all samples at once: P F' (F P F' + Q)^-1, scaled: x, v and a differ by powers of the step
     scale = np.sqrt(np.einsum("kii->ki", ahead_spreads[1:])) + 1e-300
     scaled = ahead_spreads[1:] / (scale[:, :, None] * scale[:, None, :])
     scaled += 1e-12 * np.eye(3)

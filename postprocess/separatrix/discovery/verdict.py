@@ -65,7 +65,7 @@ def verdict_of(findings: Findings) -> dict:
 
 
 def d_prime(found: Round) -> dict[str, float]:
-    """Linearised size of each effect over its standard error, the base refitted: its direction of largest gain."""
+    """Linearised size of each effect over its standard error, in its direction of largest gain."""
     return {name: float(np.sqrt(max(0.0, 2 * found.screened.gain[name]))) for name in found.screened.names}
 
 

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where records and model disagree: the force that is missing in each bin of time, phase, place, speed and event.
+"""Where records and model disagree: the force that is missing in each bin of time, phase, place, speed and
+event.
 
-In each bin one constant force is fitted to what the base machine left over, starts and parameters of the base projected
-out. Its error comes from resampling blocks of segments; flags are corrected for the number of bins (Benjamini and
-Hochberg).
+In each bin one constant force is fitted to what the base machine left over, starts and parameters of the base
+projected out. Its error comes from resampling blocks of segments; flags are corrected for the number of bins
+(Benjamini and Hochberg).
 """
 
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ _BLOCK = 2
 
 @dataclass
 class Map:
-    """One map: the edges of its bins and in each the missing force [N], its error and whether it is flagged."""
+    """One map: edges of its bins, and in each the missing force [N], its error and its flag."""
 
     name: str
     unit: str
@@ -108,7 +109,7 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
     whole = np.concatenate([base, columns], axis=2)
     reduced = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0]
     diagonal = np.einsum("kii->ki", reduced.matrix)[:, p:]
-    total, gradient = reduced.total()
+    total, _ = reduced.total()
     # parameters of the base projected out, segment by segment, by the same combination of their columns
     scale = 1 / np.sqrt(np.maximum(np.diag(total)[:p], 1e-300))
     inner = np.linalg.pinv(total[:p, :p] * np.outer(scale, scale), rcond=1e-11, hermitian=True) * np.outer(
@@ -158,7 +159,8 @@ def sentences(maps: list[Map]) -> list[dict]:
                     "region": region,
                     "force": float(one.force[place]),
                     "error": float(one.error[place]),
-                    "text": f"a force of {one.force[place]:.3g} +- {one.error[place]:.2g} N is missing {region['text']}",
+                    "text": f"a force of {one.force[place]:.3g} +- {one.error[place]:.2g} N is missing "
+                    + region["text"],
                 }
             )
     return found

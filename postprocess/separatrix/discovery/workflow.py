@@ -10,7 +10,7 @@ import numpy as np
 
 from separatrix.discovery.base import copy_noise, fit_base
 from separatrix.discovery.data import gather, scales_of
-from separatrix.discovery.decide import Decision, decide
+from separatrix.discovery.decide import decide
 from separatrix.discovery.options import Options
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.records import Record, read_record, unique_names
@@ -97,7 +97,7 @@ def _record(one: Path | Record) -> Record:
 
 
 def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record], list[Record], str]:
-    """Training and held-out records; without a choice of the user the last record, or the end of the only one."""
+    """Training and held-out records; by default the last record, or the end of the only one."""
     if hold_out:
         return records, hold_out, "as asked for"
     if len(records) > 1:

@@ -1,0 +1,130 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The function of include/separatrix.h that flies segments.
+module c_segments
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
+  use c_text, only: answer
+  use errors, only: error_t, fail
+  use kinds, only: wp
+  use law_table, only: law_choice_t
+  use model_type, only: check_values, laws_with_force, model_options, model_t
+  use segments, only: propagate, report_t, samples_t
+  use status, only: exit_usage
+  use text, only: to_text
+  use variants, only: family_t, prepare_family
+  implicit none
+  private
+
+  public :: separatrix_segments
+
+  !> Drive periods that a segment may last.
+  real(wp), parameter :: most_periods = 1e5_wp
+
+contains
+
+  integer(c_int) function separatrix_segments(model, chosen_count, chosen, values, segment_count, start, first, times, &
+      force_count, force_interval, force, derivatives, tolerance, x, v, jacobian, velocity_jacobian, impacts, steady, &
+      reason, impact_capacity, impact_count, impact_segment, impact, message, message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    integer(c_int), value :: chosen_count, segment_count, force_count, derivatives, impact_capacity
+    integer(c_int), intent(in) :: chosen(chosen_count), first(segment_count + 1)
+    real(c_double), value :: force_interval, tolerance
+    real(c_double), intent(in) :: values(chosen_count), start(3, segment_count), times(*), force(force_count)
+    real(c_double), intent(inout) :: x(*), v(*)
+    real(c_double), intent(inout) :: jacobian(chosen_count + 3, *), velocity_jacobian(chosen_count + 3, *)
+    integer(c_int), intent(inout) :: impacts(segment_count), steady(segment_count), reason(segment_count)
+    integer(c_int), intent(out) :: impact_count
+    integer(c_int), intent(inout) :: impact_segment(impact_capacity)
+    real(c_double), intent(inout) :: impact(4, impact_capacity)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: self
+    type(error_t), allocatable :: error
+    type(samples_t) :: samples
+    type(report_t) :: report
+    integer :: kept
+    call c_f_pointer(model, self)
+    impact_count = 0
+    call check_samples(segment_count, first, times, error)
+    if (.not. allocated(error)) then
+      call fly(self, chosen + 1, values, start, first, times(:first(segment_count + 1)), force_interval, force, &
+               derivatives /= 0, tolerance, samples, report, error)
+    end if
+    if (.not. allocated(error)) then
+      x(:size(samples%x)) = samples%x
+      v(:size(samples%x)) = samples%v
+      if (derivatives /= 0) then
+        jacobian(:, :size(samples%x)) = samples%x_slope
+        velocity_jacobian(:, :size(samples%x)) = samples%v_slope
+      end if
+      impacts = report%impacts
+      steady = merge(1, 0, report%steady)
+      reason = report%reason
+      impact_count = size(report%impact_segment)
+      kept = min(impact_count, impact_capacity)
+      impact_segment(:kept) = report%impact_segment(:kept) - 1
+      impact(:, :kept) = report%impact(:, :kept)
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_segments
+
+  subroutine fly(self, chosen, values, start, first, times, interval, force, derivatives, tolerance, samples, report, error)
+    type(model_t), intent(in) :: self
+    integer, intent(in) :: chosen(:), first(:)
+    real(wp), intent(in) :: values(:), start(:, :), times(:), interval, force(:), tolerance
+    logical, intent(in) :: derivatives
+    type(samples_t), intent(out) :: samples
+    type(report_t), intent(out) :: report
+    type(error_t), allocatable, intent(out) :: error
+    type(law_choice_t), allocatable :: laws(:)
+    type(family_t) :: family
+    call check_values(self, chosen, values, error)
+    if (allocated(error)) return
+    if (.not. (tolerance >= 1e-15_wp .and. tolerance <= 1e-3_wp)) then
+      call fail(error, exit_usage, 'tolerance: found '//to_text(tolerance)//', allowed from 1e-15 to 1e-3')
+      return
+    end if
+    call laws_with_force(self, interval, force, laws, error)
+    if (allocated(error)) return
+    call prepare_family(laws, model_options(self, tolerance), self%parameters(chosen), values, derivatives, family, error)
+    if (.not. allocated(error)) call check_length(family, times, error)
+    if (.not. allocated(error)) call propagate(family, start, first, times, derivatives, samples, report)
+  end subroutine fly
+
+  !> Offsets ascend from 0, and times within each segment from 0 on. Code 64.
+  subroutine check_samples(segment_count, first, times, error)
+    integer, intent(in) :: segment_count, first(:)
+    real(wp), intent(in) :: times(*)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: before
+    integer :: i, k
+    if (first(1) /= 0 .or. any(first(2:) < first(:segment_count))) then
+      call fail(error, exit_usage, 'first: offsets must ascend from 0')
+      return
+    end if
+    do i = 1, segment_count
+      before = 0
+      do k = first(i) + 1, first(i + 1)
+        if (.not. (times(k) >= before .and. times(k) <= huge(before))) then
+          call fail(error, exit_usage, 'times['//to_text(k - 1)//']: found '//to_text(times(k))//' s in segment '// &
+                    to_text(i - 1)//', allowed at least '//to_text(before)//' s, finite')
+          return
+        end if
+        before = times(k)
+      end do
+    end do
+  end subroutine check_samples
+
+  subroutine check_length(family, times, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: times(:)
+    type(error_t), allocatable, intent(out) :: error
+    if (size(times) == 0) return
+    if (maxval(times) > most_periods*family%moving%machine%period) then
+      call fail(error, exit_usage, 'times: found '//to_text(maxval(times))//' s, allowed at most '// &
+                to_text(most_periods)//' drive periods of '//to_text(family%moving%machine%period)//' s')
+    end if
+  end subroutine check_length
+
+end module c_segments

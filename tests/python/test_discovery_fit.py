@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Laws of the numerics of the discovery workflow that need no simulator."""
+
+import numpy as np
+import pytest
+from scipy.signal import savgol_filter
+from separatrix.discovery.fit import blocks_of, eliminate, gauss_newton_step
+from separatrix.discovery.preflight import white_noise
+from separatrix.discovery.screen import project
+from separatrix.discovery.smoother import impact_table, smooth
+from separatrix.discovery.where import benjamini_hochberg
+
+SEGMENTS, SAMPLES, PARAMETERS = 7, 12, 4
+
+
+@pytest.fixture
+def table() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Random derivatives and residuals of segments, some samples without weight."""
+    random = np.random.default_rng(5)
+    by_start = random.standard_normal((SEGMENTS, SAMPLES, 2))
+    by_parameter = random.standard_normal((SEGMENTS, SAMPLES, PARAMETERS))
+    residual = random.standard_normal((SEGMENTS, SAMPLES))
+    weights = (random.random((SEGMENTS, SAMPLES)) < 0.8).astype(float)
+    return by_start, by_parameter, residual, weights
+
+
+def dense(by_start, by_parameter, weights):
+    """The whole matrix, starts first."""
+    matrix = np.zeros((SEGMENTS * SAMPLES, 2 * SEGMENTS + PARAMETERS))
+    for k in range(SEGMENTS):
+        rows = slice(k * SAMPLES, (k + 1) * SAMPLES)
+        matrix[rows, 2 * k : 2 * k + 2] = by_start[k]
+        matrix[rows, 2 * SEGMENTS :] = by_parameter[k]
+    return matrix * np.sqrt(weights).ravel()[:, None]
+
+
+def test_block_elimination_is_the_dense_least_squares_step(table):
+    by_start, by_parameter, residual, weights = table
+    blocks = blocks_of(by_start, by_parameter, residual, weights)
+    starts, step, promised = gauss_newton_step(blocks, np.ones(PARAMETERS, bool))
+    matrix = dense(by_start, by_parameter, weights)
+    right = (np.sqrt(weights) * residual).ravel()
+    wanted, left, *_ = np.linalg.lstsq(matrix, right, rcond=None)
+    assert starts.ravel() == pytest.approx(wanted[: 2 * SEGMENTS], abs=1e-10)
+    assert step == pytest.approx(wanted[2 * SEGMENTS :], abs=1e-10)
+    assert promised == pytest.approx(right @ right - left[0], rel=1e-10)
+
+
+def test_a_closed_parameter_stays(table):
+    by_start, by_parameter, residual, weights = table
+    open_ = np.array([True, False, True, True])
+    _, step, _ = gauss_newton_step(blocks_of(by_start, by_parameter, residual, weights), open_)
+    _, other, _ = gauss_newton_step(
+        blocks_of(by_start, by_parameter[:, :, open_], residual, weights), open_[open_]
+    )
+    assert step[1] == 0
+    assert step[open_] == pytest.approx(other, abs=1e-12)
+
+
+def test_projection_leaves_what_a_regression_leaves(table):
+    """The score of the last column, others projected out, is that of its residual regression."""
+    by_start, by_parameter, residual, weights = table
+    matrix, gradient = eliminate(blocks_of(by_start, by_parameter, residual, weights))[0].total()
+    left, score = project(matrix, gradient, PARAMETERS - 1, np.ones(PARAMETERS - 1, bool))
+    whole = dense(by_start, by_parameter, weights)
+    right = (np.sqrt(weights) * residual).ravel()
+    others, last = whole[:, :-1], whole[:, -1]
+    clean = last - others @ np.linalg.lstsq(others, last, rcond=None)[0]
+    assert left[0, 0] == pytest.approx(clean @ clean, rel=1e-9)
+    assert score[0] == pytest.approx(clean @ right, rel=1e-9)
+
+
+def bouncing(noise: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A ball that is thrown against a wall at x = 0 every 0.5 s: times, noisy positions, speeds."""
+    t = np.arange(0, 4, 0.005)
+    # impacts fall between samples
+    phase = np.mod(t + 0.0025, 0.5)
+    x, v = -2 * phase + 4 * phase**2, -2 + 8 * phase
+    return t, x + noise * np.random.default_rng(3).standard_normal(t.size), v
+
+
+def test_smoother_beats_a_moving_polynomial_through_impacts():
+    t, x, v = bouncing(2e-3)
+    smoothed = smooth(t, x, 2e-3, 100)
+    inner = slice(20, -20)
+    error = np.sqrt(np.mean((smoothed.v - v)[inner] ** 2))
+    best = min(
+        np.sqrt(np.mean((savgol_filter(x, window, 2, deriv=1, delta=0.005) - v)[inner] ** 2))
+        for window in (5, 7, 9, 11, 15, 21, 31)
+    )
+    assert error < 0.8 * best
+
+
+def test_impacts_come_back_with_their_speeds_within_their_errors():
+    t, x, _ = bouncing(2e-3)
+    found = impact_table(smooth(t, x, 2e-3, 100))
+    assert found[:, 0] == pytest.approx(np.arange(0.5, 4, 0.5), abs=0.005)
+    assert np.abs(found[:, 1]).max() < 0.01
+    assert np.all(np.abs(found[:, 2] - 2) < 4 * found[:, 4])
+    assert np.all(np.abs(found[:, 3] + 2) < 4 * found[:, 5])
+
+
+def test_no_impact_is_seen_in_a_smooth_motion():
+    t = np.arange(0, 10, 0.01)
+    x = np.sin(2 * np.pi * t) + 1e-3 * np.random.default_rng(1).standard_normal(t.size)
+    assert smooth(t, x, 1e-3, 100).impacts.size == 0
+
+
+def test_noise_is_measured():
+    t = np.arange(0, 10, 0.002)
+    x = np.sin(2 * np.pi * t) + 1e-3 * np.random.default_rng(2).standard_normal(t.size)
+    assert white_noise(x) == pytest.approx(1e-3, rel=0.05)
+
+
+def test_false_flags_are_rare():
+    """Of maps without any gap, at most one in a hundred has a flag."""
+    random = np.random.default_rng(8)
+    assert sum(benjamini_hochberg(random.random(60), 0.01).any() for _ in range(1000)) < 25
+    assert benjamini_hochberg(np.array([1e-9, 0.5, 0.7]), 0.01).tolist() == [True, False, False]

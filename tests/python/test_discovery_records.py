@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records that are wrong are refused with the row and the reason, and leave nothing behind."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import CASE, listing
+from separatrix.discovery.cli import main
+from separatrix.discovery.records import read_record
+from separatrix.errors import SeparatrixError
+
+HEAD = [
+    "# units: s, m",
+    "# sampling_rate_hz: 100",
+    "# sensor_noise_sigma_m: 0.001",
+    "# drive_ratio: 1.2",
+    "# phase: 0",
+]
+
+
+def rows(count: int = 400) -> tuple[np.ndarray, np.ndarray]:
+    """A motion of the size of the machine."""
+    t = np.arange(count) / 100
+    return t, 0.8 + 0.2 * np.cos(11.3 * t) + 1e-3 * np.random.default_rng(0).standard_normal(count)
+
+
+def write(path: Path, t: np.ndarray, x: np.ndarray, head: list[str] = HEAD) -> Path:
+    """A record; row i of the arrays is line len(head) + 2 + i of the file."""
+    lines = [f"{a:.9g},{b:.9g}" for a, b in zip(t, x, strict=True)]
+    path.write_text("\n".join([*head, "t,x", *lines]) + "\n")
+    return path
+
+
+def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """A record with one fault."""
+    t, x = rows()
+    head = list(HEAD)
+    if kind == "time":
+        t[50] = t[48]
+    elif kind == "nan":
+        x[70] = np.nan
+    elif kind == "constant":
+        x[:] = 0.5
+    elif kind == "rate":
+        t *= 1000
+    elif kind == "unit":
+        head[0] = "# units: s, furlong"
+    elif kind == "clipped":
+        x = np.minimum(x, 0.9)
+    elif kind == "short":
+        t, x = t[:40], x[:40]
+    return t, x, head
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("time", ["record.csv:57", "time does not increase"]),
+        ("nan", ["record.csv:77", "nan"]),
+        ("constant", ["constant"]),
+        ("rate", ["sampling_rate_hz", "unit of time"]),
+        ("unit", ["furlong", "expected"]),
+        ("clipped", ["clipped"]),
+        ("short", ["40 samples"]),
+    ],
+)
+def test_faults_are_refused_with_their_place(tmp_path, kind, words):
+    t, x, head = spoiled(kind)
+    with pytest.raises(SeparatrixError) as error:
+        read_record(write(tmp_path / "record.csv", t, x, head))
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_lines_that_are_no_rows_are_named(tmp_path):
+    path = write(tmp_path / "record.csv", *rows())
+    lines = path.read_text().splitlines()
+    for text, word in (("1.0", "1 values for 2 columns"), ("a,b", "not a row of numbers")):
+        path.write_text("\n".join([*lines[:20], text, *lines[20:]]))
+        with pytest.raises(SeparatrixError, match=f"record.csv:21: .*{word}"):
+            read_record(path)
+
+
+def test_gaps_are_told_and_cut(tmp_path):
+    t, x = rows()
+    t[200:] += 0.5
+    record = read_record(write(tmp_path / "record.csv", t, x))
+    assert record.pieces == [(0, 200), (200, 400)]
+    assert any("record.csv:207: gap" in warning for warning in record.warnings)
+
+
+def test_units_and_hdf5(tmp_path):
+    """A record in ms and mm, and one in HDF5, are the record in s and m."""
+    t, x = rows()
+    wanted = read_record(write(tmp_path / "si.csv", t, x))
+    scaled = read_record(write(tmp_path / "mm.csv", 1000 * t, 1000 * x, ["# units: ms, mm", *HEAD[1:]]))
+    assert scaled.t == pytest.approx(wanted.t)
+    assert scaled.x == pytest.approx(wanted.x, rel=1e-7)
+    with h5py.File(tmp_path / "record.h5", "w") as file:
+        file["t"], file["x"] = wanted.t, wanted.x
+        file.attrs["units"] = "s, m"
+        file.attrs["drive_ratio"] = 1.2
+    stored = read_record(tmp_path / "record.h5")
+    assert np.array_equal(stored.x, wanted.x)
+    assert stored.header["drive_ratio"] == 1.2
+
+
+@pytest.mark.parametrize("fault", ["nan", "other machine", "coarse", "no such file"])
+def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault):
+    library = build_dir / "lib" / "libseparatrix.so"
+    if not library.is_file():
+        pytest.skip(f"{library} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    (tmp_path / "base.toml").write_text(CASE)
+    good = write(tmp_path / "good.csv", *rows())
+    t, x = rows()
+    if fault == "nan":
+        x[3] = np.nan
+    elif fault == "other machine":
+        x *= 1000
+    elif fault == "coarse":
+        t, x = np.arange(400) * 0.1, x
+    bad = tmp_path / "bad.csv"
+    if fault != "no such file":
+        write(bad, t, x, [line for line in HEAD if "rate" not in line])
+    before = listing(tmp_path)
+    arguments = [tmp_path / "base.toml", good, bad, "--out", tmp_path / "out", "-q"]
+    assert main([str(word) for word in arguments]) == (66 if fault == "no such file" else 65)
+    assert "separatrix-discover: " in capsys.readouterr().err
+    assert listing(tmp_path) == before
+
+
+def test_usage(capsys):
+    for arguments in (
+        ["base.toml"],
+        ["base.toml", "r.csv", "--out", "o", "--seed", "-1"],
+        ["--effects", "magic"],
+    ):
+        assert main(arguments) == 64
+        assert "separatrix-discover: " in capsys.readouterr().err

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From records of a machine with a hidden effect to its name, its size, and a case that has it."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import CASE, succeed
+from separatrix.discovery.cli import main
+
+RATIOS = {"first": 0.8, "second": 1.25, "held_out": 0.95}
+
+
+@pytest.fixture(autouse=True)
+def library(build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library of the build that is tested."""
+    path = build_dir / "lib" / "libseparatrix.so"
+    if not path.is_file():
+        pytest.skip(f"{path} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
+
+
+def records(separatrix: Path, folder: Path, effect: str) -> list[Path]:
+    """Records of the machine with an effect, at three frequencies; the base case beside them."""
+    (folder / "base.toml").write_text(CASE)
+    (folder / "true.toml").write_text(CASE + effect)
+    made = []
+    for seed, (name, ratio) in enumerate(RATIOS.items()):
+        path = folder / f"{name}.csv"
+        settings = (
+            f"drive.ratio={ratio}",
+            "run.duration=9",
+            f'record={{rate=200, noise="1 mm", seed={seed}}}',
+        )
+        words = [word for setting in settings for word in ("--set", setting)]
+        succeed(separatrix, "trajectory", "true.toml", "--force", "--record", path, *words, folder=folder)
+        made.append(path)
+    return made
+
+
+def asked(folder: Path, made: list[Path], out: str, *more: str) -> dict:
+    """The verdict on these records."""
+    first, second, held_out = map(str, made)
+    arguments = [
+        str(folder / "base.toml"),
+        first,
+        second,
+        "--hold-out",
+        held_out,
+        "--out",
+        str(folder / out),
+        "-q",
+    ]
+    assert main([*arguments, *more]) == 0
+    return json.loads((folder / out / "verdict.json").read_text())
+
+
+def test_a_hidden_effect_is_named_added_and_foretells(separatrix, tmp_path):
+    made = records(separatrix, tmp_path, "[effect.viscous]\ndamping = 0.3\n")
+    few = ("--effects", "viscous,restitution_slope,offset_force,drive_ripple")
+    verdict = asked(tmp_path, made, "out", *few)
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["viscous"])
+    assert all(verdict["gates"].values())
+    found = verdict["parameters"]["effect.viscous.damping"]
+    assert found["unit"] == "N s/m"
+    assert abs(found["value"] - 0.3) < 4 * found["standard_error"] < 0.15
+    gap = verdict["gap"]["held_out"]
+    assert gap["before"] > 1.3
+    assert gap["after"] < 1.15
+    assert verdict["where"]
+    succeed(separatrix, "trajectory", "out/extended.toml", "--validate", folder=tmp_path)
+    assert "viscous added" in (tmp_path / "out" / "extended.toml").read_text()
+    with h5py.File(tmp_path / "out" / "details.h5") as file:
+        assert np.array(file["confusability/matrix"]) == pytest.approx(
+            np.array(verdict["confusability"]["matrix"])
+        )
+        after = np.std(file["held_out/held_out/after/residual"])
+        assert after < np.std(file["held_out/held_out/before/residual"])
+
+
+def test_nothing_is_found_where_nothing_is_and_twice_the_same(separatrix, tmp_path):
+    made = records(separatrix, tmp_path, "")
+    few = ("--effects", "restitution_slope,viscous,offset_force,drive_ripple")
+    verdict = asked(tmp_path, made, "out", *few)
+    assert (verdict["outcome"], verdict["effects"]) == ("none", [])
+    assert not (tmp_path / "out" / "extended.toml").exists()
+    assert 0 < verdict["detectable"]["offset_force"]["size"] < 0.5
+    again = asked(tmp_path, made, "again", *few)
+    for one in (verdict, again):
+        del one["runtime_s"]
+    assert again == verdict
+
+
+def test_effects_that_are_one_motion_are_reported_together(separatrix, tmp_path):
+    made = records(separatrix, tmp_path, "[effect.offset_force]\nforce = 0.6\n")
+    few = ("--effects", "viscous,offset_force,sensor_bias,sensor_gain")
+    verdict = asked(tmp_path, made, "out", *few)
+    assert verdict["outcome"] == "ambiguous"
+    assert {"offset_force", "sensor_bias"} <= {*verdict["effects"], *verdict["alternatives"]}
+    assert verdict["equivalent"]
+    assert verdict["separating_experiment"]

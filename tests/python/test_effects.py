@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every command works on machines with effects, and what is recorded shows what a sensor would."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from program import CASE, STARTS, run, succeed
+
+RECORD = '\n[run]\nduration = 3\n[record]\nrate = "2 kHz"\n'
+DAHL = "\n[effect.dahl]\nstiffness = 500\n[effect.cubic_spring]\nstiffness = 10\n"
+
+
+def columns(path):
+    """Columns of a record by name."""
+    header, *rows = (line for line in path.read_text().splitlines() if not line.startswith("#"))
+    return dict(zip(header.split(","), np.array([row.split(",") for row in rows], float).T, strict=True))
+
+
+def record(separatrix, folder, text, *settings):
+    """The record that the case makes with these settings."""
+    (folder / "case.toml").write_text(text)
+    words = [word for setting in settings for word in ("--set", setting)]
+    succeed(separatrix, "trajectory", "case.toml", "--force", "--record", "record.csv", *words, folder=folder)
+    return columns(folder / "record.csv")
+
+
+def test_sensors_change_the_record_alone(separatrix, tmp_path):
+    """Record = (1 + gain) x(t - delay) + bias, to rounding, and the same motion."""
+    plain = record(separatrix, tmp_path, CASE + RECORD)
+    motion = h5py.File(tmp_path / "case.h5")["x"][:]
+    sensed = record(
+        separatrix,
+        tmp_path,
+        CASE + RECORD,
+        "effect.sensor_gain.gain=0.02",
+        'effect.sensor_bias.bias="3 mm"',
+        'effect.sensor_delay.delay="5 ms"',
+    )
+    np.testing.assert_array_equal(motion, h5py.File(tmp_path / "case.h5")["x"][:])
+    np.testing.assert_allclose(sensed["x"][10:], 1.02 * plain["x"][:-10] + 0.003, rtol=0, atol=1e-12)
+    assert sensed["x"][0] == pytest.approx(1.02 * 0.4 + 0.003)
+
+
+def test_measured_force_drives_what_it_was_measured_on(separatrix, tmp_path):
+    """A record of x and force, read back as the force of a case, gives the same x."""
+    times = np.arange(2001) / 1000
+    force = 30 * np.sin(4 * times) + 8 * np.sin(17 * times)
+    (tmp_path / "force.csv").write_text(
+        "t,force\n" + "".join(f"{t},{f}\n" for t, f in zip(times, force, strict=True))
+    )
+    text = (
+        '[body]\nmass = 2\n[friction]\nlaw = "coulomb_viscous"\nkinetic_coefficient = 0.3\ndamping = 4\n'
+        '[drive]\nlaw = "measured_force"\nforce = "force.csv"\n[effect.asymmetric_friction]\nviscous = 1\n'
+        '[run]\nduration = 2\n[record]\nrate = "1 kHz"\n'
+    )
+    first = record(separatrix, tmp_path, text)
+    np.testing.assert_allclose(first["force"][:-1], force[:-1], rtol=0, atol=1e-12)
+    assert np.ptp(first["x"]) > 0.1
+    (tmp_path / "force.csv").write_text((tmp_path / "record.csv").read_text().replace("# ", "# copy of "))
+    again = record(separatrix, tmp_path, text)
+    np.testing.assert_allclose(again["x"][:-1], first["x"][:-1], rtol=0, atol=1e-8)
+
+
+def test_maps_over_an_effect(separatrix, tmp_path):
+    """Basin over the size of an effect, points, sweep and verification against quadruple precision."""
+    case = CASE.replace(
+        'name = "v0"\nfrom = -6\nto = "6 m/s"\ncount = 31',
+        'name = "effect.cubic_spring.stiffness"\nvalues = [0, 10]',
+    )
+    case = case.replace("count = 19", "count = 5") + DAHL + "[run]\nduration = 4\n"
+    case = case.replace(
+        "[sweep]\nfrom = 0.8\nto = 1.4\nstep = 0.1",
+        "[sweep]\nparameter = 'effect.dahl.stiffness'\nfrom = 500\nto = 600\ncount = 2",
+    )
+    case = case.replace("sample = 32", "sample = 8").replace("starts = [3, 2]", "starts = [0, 0]")
+    (tmp_path / "case.toml").write_text(case)
+    (tmp_path / "starts.csv").write_text(STARTS)
+    succeed(separatrix, "basin", "case.toml", folder=tmp_path)
+    with h5py.File(tmp_path / "case.h5") as file:
+        np.testing.assert_array_equal(file["effect_cubic_spring_stiffness"], [0, 10])
+        assert np.all(file["reason"][:] < 3)
+    answer = run(separatrix, "verify", "case.h5", "--sample", "2", folder=tmp_path)
+    assert answer.code == 0
+    assert "0 label flips" in answer.out
+    succeed(separatrix, "points", "case.toml", "--list", "starts.csv", "-o", "points.h5", folder=tmp_path)
+    succeed(separatrix, "sweep", "case.toml", "-o", "sweep.h5", folder=tmp_path)
+
+
+def test_laws_tell_the_effects(separatrix, tmp_path):
+    """The names, units and defaults that the discovery workflow takes from the table."""
+    rows = json.loads(run(separatrix, "laws", "--json", folder=tmp_path).out)
+    effects = {
+        row["law"]: {p["name"]: p for p in row["parameters"]} for row in rows if row["family"] == "effect"
+    }
+    assert len(effects) == 17
+    assert effects["quadratic_drag"]["coefficient"]["unit"] == "N s^2/m^2"
+    assert effects["stribeck"]["exponent"]["default"] == 2
+    assert effects["dahl"]["stiffness"]["default"] is None
