@@ -67,7 +67,12 @@ contains
       outcome = flight_failed
       tally%steps = tally%steps + 1
       if (tally%steps > options%step_budget) exit
-      if (.not. h > 2*spacing(state%time + tiny(h))) exit
+      if (.not. h > 2*spacing(state%time + tiny(h))) then
+        if (.not. last) exit
+        ! Less is left than the clock can tell.
+        state%time = until
+        cycle
+      end if
       call try_step(machine, slip, options%tolerance, state%time, y, h, slopes, next, error)
       if (.not. error <= 1) then
         h = h*max(0.2_wp, 0.9_wp/eighth_root(error))

@@ -119,8 +119,14 @@ contains
     do
       last = march%next_length >= remaining
       h = min(march%next_length, remaining)
-      fallen = march_failed
-      if (.not. h > 2*spacing(march%time + tiny(h))) return
+      if (.not. h > 2*spacing(march%time + tiny(h))) then
+        fallen = march_failed
+        if (.not. last) return
+        ! Less is left than the clock can tell.
+        fallen = march_time_over
+        march%time = time_end
+        return
+      end if
       call try_step(march, system, h, next, error)
       if (error <= 1) exit
       march%next_length = h*max(0.2_wp, 0.9_wp/sqrt(sqrt(sqrt(error))))

@@ -11,13 +11,15 @@ from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.machine import Free
 from separatrix.discovery.preflight import Prepared
 from separatrix.discovery.problem import Problem
-from separatrix.discovery.rescue import rescued
-from separatrix.discovery.segments import Segments, cut
+from separatrix.discovery.rescue import rescued, suspicious
+from separatrix.discovery.segments import Segments, cut, padded
 from separatrix.discovery.smoother import Smoothed, smooth
 
 # lengths of the stages over that of the longest segments
 STAGES = (0.2, 0.5, 1.0)
 _FEWEST = 10
+# share of segments that may be wrong and the others still right
+_FEW = 0.25
 
 
 @dataclass
@@ -128,13 +130,43 @@ def fit_stages(
 
 
 def polished(
-    data: Data, problem: Problem, fit: Fit, stage: int, most: int, fixed: np.ndarray | None = None
+    data: Data,
+    problem: Problem,
+    fit: Fit,
+    stage: int,
+    most: int,
+    fixed: np.ndarray | None = None,
+    guesses: tuple[np.ndarray, ...] = (),
 ) -> Fit:
-    """The fit after its suspicious segments were tried from other starts."""
-    starts, improved = rescued(problem, fit, data.smoothed_starts(stage), data.smoothed_errors(stage))
-    if not improved.any():
+    """The fit after its suspicious segments were tried again by the machine of the others."""
+    tried = [data.smoothed_starts(stage), *guesses]
+    errors = data.smoothed_errors(stage)
+    suspects = suspicious(fit)
+    if not suspects.size:
         return fit
-    return minimise(problem, fit.values, starts, most=most, fixed=fixed)
+    versions = [fit]
+    if suspects.size <= _FEW * fit.counts.size:
+        versions.append(_without(problem, fit, suspects, most, fixed))
+    best = fit
+    for version in versions:
+        starts, improved = rescued(problem, version, suspects, tried, errors)
+        if improved.any():
+            found = minimise(problem, version.values, starts, most=most, fixed=fixed)
+            if found.good.sum() >= best.good.sum() and found.total < best.total:
+                best = found
+    return best
+
+
+def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:
+    """The machine fitted to the other segments, evaluated on all."""
+    segments = problem.segments
+    kept = np.setdiff1d(np.arange(segments.count), suspects)
+    others = padded(segments.record[kept], segments.first[kept], segments.last[kept])
+    part = Problem(problem.model, problem.prepared, others, problem.free)
+    found = minimise(part, fit.values, fit.starts[kept], most=most, fixed=fixed)
+    starts = fit.starts.copy()
+    starts[kept] = found.starts
+    return minimise(problem, found.values, starts, most=0)
 
 
 def scales_of(data: Data, model) -> Scales:

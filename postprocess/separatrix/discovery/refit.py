@@ -71,6 +71,7 @@ def refit(
         tried = values.copy()
         tried[list(candidate.added)] = start
         problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
+        fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None or gain_over(found, best)[0] > 0:
             best = found
@@ -90,8 +91,7 @@ def _try(
     """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-        fit = minimise(problem, values, base.fit.starts, most=most)
-        return problem, polished(data, problem, fit, data.last, most)
+        return problem, minimise(problem, values, base.fit.starts, most=most)
     stages = [1, data.last]
     if kind == "far":
         stages = list(range(data.last + 1))
@@ -100,6 +100,17 @@ def _try(
     return fit_stages(
         data, candidate.model, candidate.free, values, stages=stages, most=min(most, 12), hopeless=_HOPELESS
     )
+
+
+def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
+    """A fit tried again from where another effect led the machine and its starts; the better of both."""
+    values = _base_values(other, candidate)
+    added = list(candidate.added)
+    values[added] = one.fit.values[list(one.added)]
+    fit = minimise(one.problem, values, other.fit.starts, most=15)
+    fit = polished(data, one.problem, fit, data.last, 8, guesses=(one.fit.starts,))
+    found = Fitted(one.names, one.model, one.problem, fit, one.added, one.tries + 1)
+    return found if gain_over(found, one)[0] > 0 else one
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:

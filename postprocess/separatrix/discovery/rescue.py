@@ -16,21 +16,25 @@ _ITERATIONS = 10
 _TRIED = np.array([(0, 0), (0, -3), (0, -1.5), (0, 1.5), (0, 3), (-2, 0), (2, 0), (-2, 2), (2, -2)], float)
 
 
-def rescued(
-    problem: Problem, fit: Fit, guess: np.ndarray, spread: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Starts of all segments, the suspicious ones improved where possible, and which were.
-
-    `guess` and `spread` (segments, 2): states of the smoother at the starts and their standard errors.
-    """
+def suspicious(fit: Fit) -> np.ndarray:
+    """Segments that are fitted far worse than the others or not at all, worst first."""
     reduced = fit.chi2 / np.maximum(1, fit.counts)
     usual = max(1.0, float(np.median(reduced[fit.good]))) if fit.good.any() else 1.0
     suspects = np.flatnonzero((reduced > _SUSPECT * usual) | ~fit.good)
-    suspects = suspects[np.argsort(-reduced[suspects])][:_MOST_SEGMENTS]
-    improved = np.zeros(reduced.size, bool)
-    if not suspects.size:
-        return fit.starts, improved
-    tries = len(_TRIED)
+    return suspects[np.argsort(-reduced[suspects])][:_MOST_SEGMENTS]
+
+
+def rescued(
+    problem: Problem, fit: Fit, suspects: np.ndarray, guesses: list[np.ndarray], spread: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Starts of all segments, the suspects improved where possible, and which were.
+
+    Each of `guesses` (segments, 2) is tried with steps of `spread`, the standard errors of the smoother.
+    """
+    improved = np.zeros(fit.chi2.size, bool)
+    guesses = [*guesses, fit.starts]
+    steps = np.tile(_TRIED, (len(guesses), 1))
+    tries = len(steps)
     rows = np.repeat(suspects, tries)
     segments = problem.segments
     copies = Problem(
@@ -39,7 +43,8 @@ def rescued(
         padded(segments.record[rows], segments.first[rows], segments.last[rows]),
         problem.free,
     )
-    begin = guess[rows] + np.tile(_TRIED, (suspects.size, 1)) * spread[rows]
+    places = np.tile(np.repeat(np.arange(len(guesses)), len(_TRIED)), suspects.size)
+    begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
     found, cost = solve_starts(copies, fit.values, begin)
     cost = cost.reshape(suspects.size, tries)
     best = np.argmin(cost, axis=1)

@@ -13,7 +13,7 @@ from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, gain_over, refit
+from separatrix.discovery.refit import Fitted, crossed, gain_over, refit
 from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
@@ -22,6 +22,10 @@ _RELATED = 0.7
 _WORTH = 1.0
 _FEWEST = 2
 _BAD = 1.3
+# how many leaders are tried again from the best, and what they must have gained
+_CROSSED = 4
+_WORTH_CROSSING = 5.0
+_SHARE = 0.3
 
 
 @dataclass
@@ -86,7 +90,30 @@ def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: fl
             rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted)))
     found.sort(key=lambda one: -one.evidence)
+    _cross(bench, base, foretold, candidates, found)
     return Round(base, foretold, candidates, signatures, screened, found)
+
+
+def _cross(
+    bench: Bench,
+    base: Fitted,
+    foretold: Prediction | None,
+    candidates: dict[str, Candidate],
+    found: list[Judged],
+) -> None:
+    """Try the leaders again from where the best one led: minima that only one of them left."""
+    if len(found) < 2 or bench.options.quick or found[0].training < _WORTH_CROSSING:
+        return
+    best = found[0].fitted
+    for place in range(1, min(_CROSSED, len(found))):
+        one = found[place]
+        behind = found[0].evidence - one.evidence
+        if behind < bench.options.separation or one.evidence < _SHARE * found[0].evidence:
+            continue
+        better = crossed(bench.training, one.fitted, best, candidates[one.name])
+        if better is not one.fitted:
+            found[place] = judged(base, foretold, better, bench.foretell(better))
+    found.sort(key=lambda one: -one.evidence)
 
 
 def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
