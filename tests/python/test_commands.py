@@ -104,7 +104,8 @@ def test_every_command_under_mpirun(mpi_separatrix, tmp_path, results, kind):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["laws"], ["info", "map.h5"], ["verify", "map.h5", "--sample", "20"], ["--version"], ["--help"]]
+    "arguments",
+    [["laws"], ["info", "map.h5"], ["verify", "map.h5", "--sample", "20"], ["--version"], ["--help"]],
 )
 def test_what_is_not_shared_is_printed_once(mpi_separatrix, results, arguments):
     folder = results["map"].parent
