@@ -168,7 +168,7 @@ def _with_more(
     tried = {frozenset(one.fitted.names) for one in pairs}
     for _, one, other in pair_gains(decision.rounds[0])[:_PAIRS]:
         if frozenset((one, other)) not in tried:
-            made = _fit_pair(bench, decision.rounds[0], one, other)
+            made = fit_pair(bench, decision.rounds[0], one, other)
             if made is not None:
                 pairs.append(over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
@@ -207,7 +207,7 @@ def _is_added(path: str, base: Fitted) -> bool:
     return path.startswith("effect.") and path not in base.model.parameters
 
 
-def _fit_pair(bench: Bench, found: Round, one: str, other: str) -> Fitted | None:
+def fit_pair(bench: Bench, found: Round, one: str, other: str) -> Fitted | None:
     """The second effect on top of a fit of the first."""
     singles = {single.name: single for single in found.judged}
     if one not in singles:

@@ -112,7 +112,10 @@ def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):
         return False, "its 95 % intervals contain zero"
+    fastest = float(np.abs(fit.evaluation.v[fit.good]).max(initial=0))
     for i, value in enumerate(fit.values):
+        if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > fastest:
+            return False, "its velocity is beyond all speeds of the records, where it is Coulomb friction"
         if free[i].path == "nuisance:drive_scale" and not 0.5 < value < 2:
             return False, f"it would need a drive {value:.3g} times the stated one"
     return True, ""

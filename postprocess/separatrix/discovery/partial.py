@@ -2,37 +2,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names for effects of real machines, of which something always remains that no catalogue holds.
 
-The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by one as long as each
-passes every gate but the adequacy, which here is not to be had; the verdict says that it is not complete.
+The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by one (the first
+two together, if only that helps) as long as each passes every gate but the adequacy, which here is not to be had; the verdict
+says that it is not complete.
 """
 
 from dataclasses import replace
 
-from separatrix.discovery.decide import Decision, leaders, over_base, pass_gates
+import numpy as np
+
+from separatrix.discovery.decide import Decision, fit_pair, leaders, over_base, pass_gates
 from separatrix.discovery.judge import Judged, admissible
-from separatrix.discovery.rounds import Bench, run_round
+from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
+
+_PAIRS = 12
 
 
 def name_in_part(bench: Bench, decision: Decision) -> Decision:
     """Return the decision with the effects that help wherever they are tested, though something else is missing too."""
     base = decision.rounds[0].base
-    accepted: list[Judged] = []
     rounds = decision.rounds[:1]
-    while len(accepted) < bench.options.most_effects:
-        current = accepted[-1] if accepted else None
-        if current is not None:
-            done = len(accepted) / bench.options.most_effects
-            rounds.append(run_round(bench, current.fitted, current.prediction, 0.9 + 0.1 * done, 0.9 + 0.1 * (done + 0.3)))
-        best, rivals = leaders(bench, rounds[-1])
-        pass_gates(bench, best, current.fitted if current else base, rivals, len(rounds[-1].judged))
-        if not all(best.gates.values()):
+    accepted = _next(bench, rounds[0])
+    if accepted is None:
+        accepted = _pair(bench, rounds[0])
+    last = None
+    while accepted is not None:
+        last = accepted
+        if len(last.fitted.names) >= bench.options.most_effects:
             break
-        accepted.append(best)
-    if not accepted or not admissible(accepted[-1], base)[0]:
+        rounds.append(run_round(bench, last.fitted, last.prediction, 0.9, 0.98))
+        accepted = _next(bench, rounds[-1])
+    if last is None:
         return decision
-    whole = over_base(bench, base, decision.foretold, accepted[-1])
-    whole.gates = accepted[-1].gates
-    whole.p = max(one.p for one in accepted)
+    whole = over_base(bench, base, rounds[0].foretold, last)
+    whole.gates, whole.p = last.gates, last.p
     return replace(
         decision,
         outcome="named",
@@ -43,3 +46,38 @@ def name_in_part(bench: Bench, decision: Decision) -> Decision:
         rounds=rounds,
         reasons=[*decision.reasons, "named in part: what is left is not in the catalogue"],
     )
+
+
+def _next(bench: Bench, found: Round) -> Judged | None:
+    """The best candidate of a round, if it passes every gate."""
+    if not found.judged:
+        return None
+    best, rivals = leaders(bench, found)
+    pass_gates(bench, best, found.base, rivals, len(found.judged))
+    return best if all(best.gates.values()) else None
+
+
+def _pair(bench: Bench, found: Round) -> Judged | None:
+    """Two effects that pass only together: each alone drives a parameter of the base to where it should not be."""
+    pairs = []
+    for _, one, other in pair_gains(found)[:_PAIRS]:
+        fitted = fit_pair(bench, found, one, other)
+        if fitted is not None:
+            pairs.append(over_base(bench, found.base, found.foretold, fitted))
+    pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found)]
+    if not pairs:
+        return None
+    pairs.sort(key=lambda one: -one.evidence)
+    best = pairs[0]
+    scale = max(1.0, best.fitted.fit.reduced_chi2)
+    close = [one for one in pairs[1:] if best.evidence - one.evidence < bench.options.separation * scale]
+    pass_gates(bench, best, found.base, close, len(pairs))
+    return best if all(best.gates.values()) else None
+
+
+def _both_clear(pair: Judged, found: Round) -> bool:
+    """Whether every parameter of both effects is inside its bounds and differs from nothing."""
+    fit = pair.fitted.fit
+    errors = np.sqrt(np.diag(pair.fitted.covariance))
+    clear = [not fit.at_bound[i] and abs(fit.values[i]) > 1.96 * errors[i] for i in pair.fitted.added]
+    return all(clear) and admissible(pair, found.base)[0]
