@@ -138,7 +138,7 @@ def polished(
     fixed: np.ndarray | None = None,
     guesses: tuple[np.ndarray, ...] = (),
 ) -> Fit:
-    """The fit after its suspicious segments were tried from other starts, the others asked for the machine."""
+    """The fit after its suspicious segments were tried again by the machine of the others."""
     tried = [data.smoothed_starts(stage), *guesses]
     errors = data.smoothed_errors(stage)
     suspects = suspicious(fit)
