@@ -35,7 +35,7 @@ def confusion(found: list[Score], rows: list[str], path: Path) -> None:
     shares = counts / counts.sum(axis=1, keepdims=True)
     with style.context():
         made = style.new_figure(style.DOUBLE_COLUMN, 45 + 4.6 * len(rows))
-        axes = made.add_axes((0.24, 0.02, 0.74, 0.98 - 38 / (45 + 4.6 * len(rows))))
+        axes = made.add_axes((0.3, 0.02, 0.68, 0.98 - 38 / (45 + 4.6 * len(rows))))
         axes.imshow(shares, cmap="Blues", vmin=0, vmax=1.2, aspect="auto")
         for i, k in zip(*np.nonzero(counts), strict=True):
             colour = "white" if shares[i, k] > 0.6 else "black"

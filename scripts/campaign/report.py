@@ -134,7 +134,7 @@ def baselines(found: list[Score]) -> list[list[str]]:
         groups = [rate([right(one) for one in group]) for group in (strong, quiet)]
         return [name, *map(str, groups), str(rate([alarm(one) for one in none]))]
 
-    rows = [row("Separatrix", lambda one: one.right, lambda one: one.decided)]
+    rows = [row("Separatrix", lambda one: one.right, lambda one: one.alarm)]
     for method in METHODS:
         rows.append(
             row(
@@ -213,7 +213,7 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
             ["d'", "parameters", "median error", "intervals with the truth"], precision(found)
         ),
         "baselines": table(
-            ["method", "right, d' >= 5", "right, noise <= 1 %", "name where nothing is hidden"],
+            ["method", "right, d' >= 5", "right, noise <= 1 %", "alarm where nothing is hidden"],
             baselines(found),
         ),
         "undecided": table(["answer", "reason", "cases"], undecided(folders, found)),

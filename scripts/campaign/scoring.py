@@ -54,6 +54,11 @@ class Score:
         return self.kind in ("single", "pair")
 
     @property
+    def alarm(self) -> bool:
+        """Whether effects of the catalogue were reported, one or several."""
+        return self.answer in ("named", "ambiguous")
+
+    @property
     def strong(self) -> bool:
         """Whether the bars on names count for it."""
         return self.in_catalogue and self.d_prime >= STRONG
