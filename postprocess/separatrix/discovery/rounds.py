@@ -43,11 +43,8 @@ class Bench:
         """Score the held-out records."""
         if self.held_out is None:
             return None
-        fit, covariance = fitted.fit, fitted.covariance
-        if self.options.partial:
-            # where all are far from the noise, what its misfit adds would excuse the worst machine most
-            covariance = covariance / max(1.0, fit.reduced_chi2)
-        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, covariance)
+        fit = fitted.fit
+        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, fitted.covariance)
 
 
 @dataclass
