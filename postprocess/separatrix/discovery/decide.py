@@ -103,6 +103,7 @@ def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
 
 
 def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
+    """Set the p value of a candidate and every gate but the adequacy."""
     options = bench.options
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.fitted.fit.converged
