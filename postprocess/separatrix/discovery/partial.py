@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names for effects of real machines, of which something always remains that no catalogue holds.
 
-The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by one (the
-first two together, if only that helps) as long as each passes every gate but the adequacy, which here is not to be
-had; the verdict says that it is not complete.
+The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by
+one (the first two together, if only that helps) as long as each passes every gate but the adequacy, which
+here is not to be had; the verdict says that it is not complete.
 """
 
 from dataclasses import replace
@@ -19,7 +19,7 @@ _PAIRS = 12
 
 
 def name_in_part(bench: Bench, decision: Decision) -> Decision:
-    """Return the decision with the effects that help on every record, though something else is missing too."""
+    """Return the decision with the effects that help on every record, though more is missing."""
     base = decision.rounds[0].base
     rounds = decision.rounds[:1]
     accepted = _next(bench, rounds[0])
@@ -58,7 +58,7 @@ def _next(bench: Bench, found: Round) -> Judged | None:
 
 
 def _pair(bench: Bench, found: Round) -> Judged | None:
-    """Two effects that pass only together: each alone drives a parameter of the base where it should not be."""
+    """Two effects that pass only together: each alone drives the base to where it should not be."""
     pairs = []
     for _, one, other in pair_gains(found)[:_PAIRS]:
         fitted = fit_pair(bench, found, one, other)
