@@ -225,23 +225,27 @@ contains
     batch%down_hits(lane) = 0
   end subroutine occupy_lane
 
-  !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop.
-  pure function lane_state(batch, lane) result(state)
+  !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop. Not a function: the
+  !> copy of its result, just written, would stall every stop.
+  pure subroutine lane_state(batch, lane, state)
     type(lane_batch_t), intent(in) :: batch
     integer, intent(in) :: lane
-    type(state_t) :: state
-    state = state_t(x=batch%x(lane), v=batch%v(lane), time=batch%time(lane), mode=mode_slip_plus)
-    if (batch%direction(lane) < 0) state%mode = mode_slip_minus
-  end function lane_state
+    type(state_t), intent(out) :: state
+    state%x = batch%x(lane)
+    state%v = batch%v(lane)
+    state%time = batch%time(lane)
+    state%mode = merge(mode_slip_minus, mode_slip_plus, batch%direction(lane) < 0)
+  end subroutine lane_state
 
   !> The body in a lane on the section number `section` that the lane passed over.
-  pure function section_state(batch, lane, section) result(state)
+  pure subroutine section_state(batch, lane, section, state)
     type(lane_batch_t), intent(in) :: batch
     integer, intent(in) :: lane, section
-    type(state_t) :: state
-    state = state_t(x=batch%section_x(lane, section), v=batch%section_v(lane, section), mode=mode_slip_plus)
-    if (state%v < 0) state%mode = mode_slip_minus
-  end function section_state
+    type(state_t), intent(out) :: state
+    state%x = batch%section_x(lane, section)
+    state%v = batch%section_v(lane, section)
+    state%mode = merge(mode_slip_minus, mode_slip_plus, state%v < 0)
+  end subroutine section_state
 
   !> Moves what a lane has counted to a tally.
   pure subroutine take_counts(batch, lane, tally)

@@ -130,10 +130,10 @@ contains
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
     associate (course => passenger%course)
       do section = 1, int(batch%passed(lane))
-        course%state = section_state(batch, lane, section)
+        call section_state(batch, lane, section, course%state)
         call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
       end do
-      course%state = lane_state(batch, lane)
+      call lane_state(batch, lane, course%state)
       call take_counts(batch, lane, course%tally)
       if (course%tally%events > journey%moving%options%event_budget) course%reason = reason_event_budget
       taken = .false.
