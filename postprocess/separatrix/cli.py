@@ -10,18 +10,12 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from separatrix import basin, points, style, sweep, trajectory
+from separatrix.arguments import Parser, list_of, whole_number
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
 from separatrix.save import FORMATS, save
 from separatrix.version import __version__
-
-
-class _Parser(argparse.ArgumentParser):
-    """Usage errors leave with 64, as those of `separatrix` do."""
-
-    def error(self, message: str) -> None:
-        raise SeparatrixError(f"{message}; see separatrix-figures --help", USAGE)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -73,26 +67,8 @@ def _report(error: SeparatrixError) -> int:
     return error.code
 
 
-def _formats(text: str) -> list[str]:
-    names = [name.strip().lower() for name in text.split(",") if name.strip()]
-    unknown = [name for name in names if name not in FORMATS]
-    if unknown or not names:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list out of {', '.join(FORMATS)}")
-    return names
-
-
-def _dpi(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if not 50 <= value <= 2400:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 50 to 2400")
-    return value
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="separatrix-figures",
         description="Make the figures that fit each Separatrix result file.",
         epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write.",
@@ -103,11 +79,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--field", metavar="NAME", help="basin files: map this variable, e.g. settle_time")
     parser.add_argument(
-        "--formats", metavar="LIST", type=_formats, default=["png", "pdf"], help="png, pdf, svg [png,pdf]"
+        "--formats",
+        metavar="LIST",
+        type=list_of(FORMATS),
+        default=["png", "pdf"],
+        help="png, pdf, svg [png,pdf]",
     )
     parser.add_argument("--title", help="title of the figures [that of the file]")
     parser.add_argument(
-        "--dpi", type=_dpi, default=style.PNG_DPI, help=f"resolution of images [{style.PNG_DPI}]"
+        "--dpi",
+        type=whole_number(50, 2400),
+        default=style.PNG_DPI,
+        help=f"resolution of images [{style.PNG_DPI}]",
     )
     parser.add_argument("--version", action="version", version=f"separatrix-figures {__version__}")
     return parser

@@ -8,20 +8,14 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.catalogue import BY_NAME
 from separatrix.discovery.extend import write_all
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import USAGE, SeparatrixError
+from separatrix.errors import SeparatrixError
 from separatrix.version import __version__
-
-
-class _Parser(argparse.ArgumentParser):
-    """Usage errors leave with 64, as those of `separatrix` do."""
-
-    def error(self, message: str) -> None:
-        raise SeparatrixError(f"{message}; see separatrix-discover --help", USAGE)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,7 +36,7 @@ def _run(chosen: argparse.Namespace) -> None:
         partial=chosen.partial,
         segment_periods=chosen.segment_periods,
         segment_seconds=chosen.segment_seconds,
-        candidates=chosen.effects,
+        candidates=chosen.effects and tuple(chosen.effects),
         progress=(lambda stage, done: None) if chosen.quiet else Progress(),
     )
     verdict, findings = investigate(chosen.base, chosen.records, chosen.hold_out, options, chosen.rest)
@@ -93,36 +87,8 @@ def summary(verdict: dict) -> list[str]:
     return lines + [f"  warning: {warning}" for warning in verdict["warnings"]]
 
 
-def _names(text: str) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    unknown = [name for name in names if name not in BY_NAME]
-    if unknown or not names:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list out of {', '.join(BY_NAME)}")
-    return names
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
-    return value
-
-
-def _seed(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 on")
-    return value
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
         epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
@@ -147,16 +113,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--rest", metavar="FILE", type=Path, help="record at rest, for the noise")
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")
-    parser.add_argument("--seed", type=_seed, default=1, help="of all random choices [1]")
-    parser.add_argument("--effects", metavar="LIST", type=_names, help="only these effects of the catalogue")
+    parser.add_argument("--seed", type=whole_number(0), default=1, help="of all random choices [1]")
+    parser.add_argument(
+        "--effects", metavar="LIST", type=list_of(BY_NAME), help="only these effects of the catalogue"
+    )
     parser.add_argument(
         "--segment-periods",
         metavar="N",
-        type=_positive,
+        type=positive,
         default=1.0,
         help="longest segment in drive periods [1]",
     )
-    parser.add_argument("--segment-seconds", metavar="S", type=_positive, help="longest segment in seconds")
+    parser.add_argument("--segment-seconds", metavar="S", type=positive, help="longest segment in seconds")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument("--version", action="version", version=f"separatrix-discover {__version__}")
     return parser

@@ -95,11 +95,14 @@ def remeasured(bench: Bench, first: Round) -> Fitted | None:
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
     converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
-    pool = converged or found.judged
-    best = pool[0]
+    return foremost(converged or found.judged, bench.options.separation)
+
+
+def foremost(pool: list[Judged], separation: float) -> tuple[Judged, list[Judged]]:
+    """Return the candidate of most evidence, and those that it does not beat clearly for its misfit."""
+    best, *others = sorted(pool, key=lambda one: -one.evidence)
     scale = max(1.0, best.fitted.fit.reduced_chi2)
-    rivals = [one for one in pool[1:] if best.evidence - one.evidence < bench.options.separation * scale]
-    return best, rivals
+    return best, [one for one in others if best.evidence - one.evidence < separation * scale]
 
 
 def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
@@ -176,10 +179,7 @@ def _with_more(
     pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
     if not pairs:
         return _give_up(decision)
-    pairs.sort(key=lambda one: -one.evidence)
-    pair = pairs[0]
-    scale = max(1.0, pair.fitted.fit.reduced_chi2)
-    close = [one for one in pairs[1:] if pair.evidence - one.evidence < bench.options.separation * scale]
+    pair, close = foremost(pairs, bench.options.separation)
     pass_gates(bench, pair, base, close, len(second.judged))
     # both must be needed: each over the other alone
     singles = {one.name: one for one in decision.rounds[0].judged}

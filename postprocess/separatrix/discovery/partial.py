@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decide import Decision, fit_pair, leaders, over_base, pass_gates
+from separatrix.discovery.decide import Decision, fit_pair, foremost, leaders, over_base, pass_gates
 from separatrix.discovery.judge import Judged, admissible
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 
@@ -67,10 +67,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
     pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found)]
     if not pairs:
         return None
-    pairs.sort(key=lambda one: -one.evidence)
-    best = pairs[0]
-    scale = max(1.0, best.fitted.fit.reduced_chi2)
-    close = [one for one in pairs[1:] if best.evidence - one.evidence < bench.options.separation * scale]
+    best, close = foremost(pairs, bench.options.separation)
     pass_gates(bench, best, found.base, close, len(pairs))
     return best if all(best.gates.values()) else None
 

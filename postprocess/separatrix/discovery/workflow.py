@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.base import copy_noise, fit_base
-from separatrix.discovery.data import gather, scales_of
+from separatrix.discovery.base import copy_noise, find_phases, fit_base, measure_noise
+from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
+from separatrix.discovery.machine import record_nuisances, with_values
 from separatrix.discovery.options import Options
 from separatrix.discovery.partial import name_in_part
 from separatrix.discovery.preflight import prepare
@@ -19,6 +20,7 @@ from separatrix.discovery.refit import Fitted
 from separatrix.discovery.rounds import Bench
 from separatrix.discovery.verdict import Findings, verdict_of
 from separatrix.errors import SeparatrixError
+from separatrix.library import Model
 
 
 def discover(
@@ -70,10 +72,6 @@ def investigate(
 
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
     """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
-    from separatrix.discovery.base import find_phases, measure_noise
-    from separatrix.discovery.data import fit_stages
-    from separatrix.discovery.machine import record_nuisances, with_values
-
     free = with_values(fitted.problem.free, fitted.fit.values)
     shared = [one for one in free if one.record is None]
     own = (
@@ -90,8 +88,6 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
 
 def _model(base: object):
     if isinstance(base, str | Path):
-        from separatrix.library import Model
-
         return Model.read(base)
     return base
 

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the commands share in reading their arguments."""
+
+import argparse
+from collections.abc import Callable, Collection
+
+from separatrix.errors import USAGE, SeparatrixError
+
+
+class Parser(argparse.ArgumentParser):
+    """Usage errors leave with 64, as those of `separatrix` do."""
+
+    def error(self, message: str) -> None:
+        """Raise what the command reports."""
+        raise SeparatrixError(f"{message}; see {self.prog} --help", USAGE)
+
+
+def list_of(allowed: Collection[str]) -> Callable[[str], list[str]]:
+    """Return the reader of a list of names, parted by commas, out of the allowed ones."""
+
+    def read(text: str) -> list[str]:
+        names = [name.strip().lower() for name in text.split(",") if name.strip()]
+        if not names or not set(names) <= set(allowed):
+            raise argparse.ArgumentTypeError(f"'{text}' is not a list out of {', '.join(allowed)}")
+        return names
+
+    return read
+
+
+def whole_number(lowest: int, highest: int | None = None) -> Callable[[str], int]:
+    """Return the reader of a whole number within bounds."""
+    bounds = f"from {lowest} on" if highest is None else f"from {lowest} to {highest}"
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = lowest - 1
+        if value < lowest or (highest is not None and value > highest):
+            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number {bounds}")
+        return value
+
+    return read
+
+
+def positive(text: str) -> float:
+    """Read a number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < 1e9:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
