@@ -35,7 +35,7 @@ def confusion(found: list[Score], rows: list[str], path: Path) -> None:
     shares = counts / counts.sum(axis=1, keepdims=True)
     with style.context():
         made = style.new_figure(style.DOUBLE_COLUMN, 45 + 4.6 * len(rows))
-        axes = made.add_axes((0.3, 0.02, 0.68, 0.98 - 38 / (45 + 4.6 * len(rows))))
+        axes = made.add_axes((0.36, 0.02, 0.62, 0.97 - 38 / (45 + 4.6 * len(rows))))
         axes.imshow(shares, cmap="Blues", vmin=0, vmax=1.2, aspect="auto")
         for i, k in zip(*np.nonzero(counts), strict=True):
             colour = "white" if shares[i, k] > 0.6 else "black"
@@ -47,4 +47,7 @@ def confusion(found: list[Score], rows: list[str], path: Path) -> None:
             [f"{name} ({total})" for name, total in zip(rows, counts.sum(axis=1), strict=True)],
         )
         axes.tick_params(length=0)
+        axes.set_xlabel("answer")
+        axes.xaxis.set_label_position("top")
+        axes.set_ylabel("hidden effect (cases)")
         made.savefig(path, dpi=200)
