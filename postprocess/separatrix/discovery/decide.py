@@ -70,13 +70,14 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     if not first.judged:
         return _without_name(bench, decision)
     best, rivals = leaders(bench, first)
-    pass_gates(bench, best, base, rivals, len(first.judged))
-    if not best.gates["detect"]:
+    pass_gates(bench, best, base, rivals, first.screened.tests)
+    if not (best.gates["detect"] and best.gates["stable"]):
+        # what a few segments carry is not detected
         return _without_name(bench, decision)
     share = _ceiling_of(bench, best, base)
     decision.shares.append(share)
     if best.gates["adequate"]:
-        return _conclude(decision, best, rivals)
+        return _conclude(bench, decision, best, rivals)
     return _with_more(bench, decision, base, best, rivals)
 
 
@@ -120,7 +121,7 @@ def foremost(pool: list[Judged], separation: float) -> tuple[Judged, list[Judged
     return best, [one for one in others if best.evidence - one.evidence < separation * scale]
 
 
-def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
+def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
     """Set the p value of a candidate and every gate but the adequacy."""
     options = bench.options
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
@@ -141,27 +142,21 @@ def _ceiling_of(bench: Bench, one: Judged, base: Fitted) -> float:
     return share
 
 
-def _conclude(decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
+def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
     """A name, if every gate is passed; else what it could be."""
-    decision.accepted = [best]
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
+    if not (best.gates["admissible"] and best.gates["converged"]):
+        return _without_name(bench, decision)
+    decision.accepted = [best]
     decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
-    if failed == []:
-        decision.outcome = "named"
-    elif failed == ["separate"] or rivals:
-        decision.outcome = "ambiguous"
-        decision.equivalent = all(_equivalent(decision, best, one) for one in rivals)
-    elif best.gates["admissible"] and best.gates["converged"]:
-        decision.outcome = "ambiguous"
-    else:
-        decision.outcome = "not-in-catalogue"
-        decision.accepted, decision.alternatives = [], []
+    decision.outcome = "ambiguous" if failed else "named"
+    decision.equivalent = bool(rivals) and all(_equivalent(best, one) for one in rivals)
     return decision
 
 
-def _equivalent(decision: Decision, one: Judged, other: Judged) -> bool:
+def _equivalent(one: Judged, other: Judged) -> bool:
     return other.name in BY_NAME[one.name].equivalent
 
 
@@ -195,7 +190,7 @@ def _with_more(
     if not pairs:
         return _give_up(decision)
     pair, close = foremost(pairs, bench.options.separation)
-    pass_gates(bench, pair, base, close, len(second.judged))
+    pass_gates(bench, pair, base, close, second.screened.tests)
     # both must be needed: each over the other alone
     singles = {one.name: one for one in decision.rounds[0].judged}
     for name in pair.fitted.names:
@@ -206,7 +201,7 @@ def _with_more(
     share = _ceiling_of(bench, pair, base)
     decision.shares.append(share)
     if pair.gates["adequate"] and pair.gates.get("drop", True):
-        return _conclude(decision, pair, close)
+        return _conclude(bench, decision, pair, close)
     return _give_up(decision)
 
 

@@ -53,7 +53,7 @@ def _next(bench: Bench, found: Round) -> Judged | None:
     if not found.judged:
         return None
     best, rivals = leaders(bench, found)
-    pass_gates(bench, best, found.base, rivals, len(found.judged))
+    pass_gates(bench, best, found.base, rivals, found.screened.tests)
     return best if all(best.gates.values()) else None
 
 
