@@ -147,16 +147,17 @@ def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: b
 def precision(truth: dict, verdict: dict) -> tuple[tuple[float, ...], tuple[bool, ...]]:
     """Relative errors of the size of each effect, and whether its interval has the truth.
 
-    A parameter whose truth is 0, and one that the fit keeps, has no relative error.
+    A parameter whose truth is 0, and one that was not fitted, has no relative error. One that ended at its
+    bound has no interval, which cannot have the truth.
     """
     errors, covered = [], []
     for path, value in truth["parameters"].items():
         found = verdict.get("parameters", {}).get(path)
-        if found is None or value == 0 or not found.get("standard_error"):
+        if found is None or value == 0:
             continue
         errors.append(abs(found["value"] / value - 1))
-        low, high = found["interval_95"]
-        covered.append(low <= value <= high)
+        ends = found["interval_95"]
+        covered.append(ends is not None and ends[0] <= value <= ends[1])
     return tuple(errors), tuple(covered)
 
 

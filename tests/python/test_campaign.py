@@ -168,6 +168,17 @@ def test_parameters_are_judged_by_their_intervals(campaign):
         assert one.covered == (inside,)
 
 
+def test_a_parameter_at_its_bound_is_not_covered(campaign):
+    hidden = truth(["stribeck"], parameters={"effect.stribeck.excess": 2.0, "effect.stribeck.velocity": 0.1})
+    found = {
+        "effect.stribeck.excess": {"value": 2.0, "standard_error": 0.1, "interval_95": [1.8, 2.2]},
+        "effect.stribeck.velocity": {"value": 0.2, "standard_error": None, "interval_95": None},
+    }
+    one = campaign[1].score(hidden, verdict("named", ["stribeck"], parameters=found))
+    assert one.covered == (True, False)
+    assert one.errors == pytest.approx((0, 1))
+
+
 def test_removed_excess(campaign):
     assert campaign[1].removed({"before": 3.0, "after": 1.5}) == pytest.approx(0.75)
     assert campaign[1].removed({"before": 3.0, "after": 0.9}) == 1
