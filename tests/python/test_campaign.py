@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The discovery campaign: statistics, how verdicts are judged, command line, and that it can be killed."""
 
+import hashlib
 import json
 import math
 import os
@@ -228,6 +229,34 @@ def test_the_command_line(source_dir, option, code):
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == code
     assert (option in result.stderr) == (code != 0)
+
+
+def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_path, monkeypatch):
+    import campaign as program
+    import report
+
+    library = tmp_path / "libseparatrix.so"
+    library.write_bytes(b"a library")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    for command in ("init -q", "add .", "-c user.name=a -c user.email=b commit -q -m one"):
+        (tmp_path / "source").mkdir(exist_ok=True)
+        (tmp_path / "source" / "file").write_text("as committed")
+        subprocess.run(["git", "-C", tmp_path / "source", *command.split()], check=True)
+    monkeypatch.setattr(program, "SOURCE", tmp_path / "source")
+    program.commit.cache_clear()
+    program.library.cache_clear()
+    clean = program.commit()
+    (tmp_path / "source" / "file").write_text("changed")
+    program.commit.cache_clear()
+    assert program.commit() == f"{clean}-dirty"
+    folders = program.Folders(tmp_path)
+    folders.make()
+    folders.result(3).write_text(json.dumps({"commit": program.commit(), "library": program.library()}))
+    said = report.versions(folders, [campaign[1].score(truth(["viscous"], number=3), verdict("none"))])
+    digest = hashlib.sha256(b"a library").hexdigest()
+    assert said == f"{clean}-dirty with library {digest[:12]} (1)"
+    program.commit.cache_clear()
+    program.library.cache_clear()
 
 
 def start(source_dir, folder, pause: float) -> subprocess.Popen:
