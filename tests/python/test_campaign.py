@@ -54,11 +54,36 @@ def test_wilson_intervals_as_published(campaign, hits, cases, low, high):
     assert found == pytest.approx((low, high), abs=5e-5)
 
 
-def test_a_rate_without_cases_reaches_no_bar(campaign):
-    rates, _, bars, _ = campaign
-    assert rates.Rate(0, 0).interval == (0.0, 1.0)
-    assert not bars.reached(rates.Rate(0, 0), 0.0, high=True)
-    assert not bars.reached(rates.Rate(0, 0), 1.0, high=False)
+# R. G. Newcombe, Statistics in Medicine 17 (1998) 873, table II, method 10
+@pytest.mark.parametrize(
+    ("one", "other", "low", "high"),
+    [
+        ((56, 70), (48, 80), 0.0524, 0.3339),
+        ((9, 10), (3, 10), 0.1705, 0.8090),
+        ((10, 10), (0, 20), 0.6791, 1),
+    ],
+)
+def test_intervals_of_differences_as_published(campaign, one, other, low, high):
+    rates = campaign[0]
+    assert rates.difference(rates.Rate(*one), rates.Rate(*other)) == pytest.approx((low, high), abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("hits", "cases", "lowest", "highest", "said"),
+    [
+        (0, 0, 0.9, 1, "undecided"),
+        (96, 100, 0.95, 1, "undecided"),
+        (990, 1000, 0.95, 1, "yes"),
+        (80, 100, 0.95, 1, "**no**"),
+        (0, 10, 0, 0.03, "undecided"),
+        (0, 500, 0, 0.03, "yes"),
+        (20, 100, 0, 0.03, "**no**"),
+        (950, 1000, 0.9, 0.98, "yes"),
+        (999, 1000, 0.9, 0.98, "**no**"),
+    ],
+)
+def test_a_bar_is_met_where_the_whole_interval_is(campaign, hits, cases, lowest, highest, said):
+    assert campaign[2].met(campaign[0].Rate(hits, cases), lowest, highest) == said
 
 
 def truth(names: list[str], kind: str = "single", number: int = 0, **more) -> dict:
@@ -143,6 +168,21 @@ JUDGED = [
         (True, False, False, False),
         "one of the pair",
     ),
+    (truth([], "none"), verdict("ambiguous", ["dahl"]), (False, False, False, True), "dahl"),
+    (truth([], "none"), verdict("not-in-catalogue"), (False, False, False, False), "not-in-catalogue"),
+    (truth(["viscous"]), verdict("ambiguous", ["dahl"]), (False, False, False, True), "dahl"),
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["viscous"]),
+        (False, False, True, False),
+        "set with the truth",
+    ),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("ambiguous", ["viscous"]),
+        (False, False, False, False),
+        "one of the pair",
+    ),
     (
         truth(["viscous"]),
         verdict("named", ["viscous", "dahl"]),
@@ -193,7 +233,7 @@ def test_the_confusion_matrix_has_every_case_once(campaign):
     counts, columns = figure.confusion_counts(found, rows)
     assert counts.sum() == len(JUDGED)
     assert counts[:, columns.index("right")].sum() == sum(flags[1] for _, _, flags, _ in JUDGED)
-    assert sum(one.alarm for one in found if one.kind == "none") == 1
+    assert sum(one.alarm for one in found if one.kind == "none") == 3
     wrong = {row[0]: row[2] for row in bars.bars(found)}["wrong name, all cases"]
     assert f"({sum(flags[3] for _, _, flags, _ in JUDGED)} of {len(JUDGED)};" in wrong
 
