@@ -64,7 +64,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
         fitted = fit_pair(bench, found, one, other)
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found)]
+    pairs = [one for one in pairs if _both_clear(one, found)]
     if not pairs:
         return None
     best, close = foremost(pairs, bench.options.separation)
