@@ -44,7 +44,8 @@ class Bench:
         if self.held_out is None:
             return None
         fit = fitted.fit
-        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, fitted.covariance)
+        misfit = max(1.0, fit.reduced_chi2)
+        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, fitted.covariance, misfit)
 
 
 @dataclass
