@@ -88,7 +88,10 @@ def test_nothing_is_found_where_nothing_is_and_twice_the_same(separatrix, tmp_pa
     assert (verdict["outcome"], verdict["effects"]) == ("none", [])
     assert not (tmp_path / "out" / "extended.toml").exists()
     assert 0 < verdict["detectable"]["offset_force"]["size"] < 0.5
+    (tmp_path / "again").mkdir()
+    (tmp_path / "again" / "extended.toml").write_text("of an earlier run")
     again = asked(tmp_path, made, "again", *few)
+    assert not (tmp_path / "again" / "extended.toml").exists()
     for one in (verdict, again):
         del one["runtime_s"]
     assert again == verdict

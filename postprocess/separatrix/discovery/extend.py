@@ -29,6 +29,9 @@ def write_all(folder: Path, verdict: dict, findings: Findings) -> list[Path]:
             if findings.decision.accepted:
                 made.append(work / "extended.toml")
                 made[-1].write_text(extended_case(verdict, findings), encoding="utf-8")
+            else:
+                # that of an earlier run would look like one of this
+                (folder / "extended.toml").unlink(missing_ok=True)
             for path in made:
                 path.replace(folder / path.name)
     except OSError as error:

@@ -18,6 +18,7 @@ _HUBER = 1.5
 _TOLERANCE = 0.02
 _TINY = 1e-12
 _STRONGEST = 1e8
+_FINE = 0.03
 
 
 @dataclass
@@ -81,6 +82,11 @@ class Fit:
     def reduced_chi2(self) -> float:
         """Sum of squares per degree of freedom."""
         return self.total / max(1, self.freedom)
+
+    @property
+    def like_noise(self) -> bool:
+        """Whether chi^2 is what noise alone would leave, within two standard deviations or 3 %."""
+        return self.reduced_chi2 < 1 + max(_FINE, 2 * np.sqrt(2 / max(1, self.freedom)))
 
 
 def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
-from separatrix.discovery.fit import Fit
+from separatrix.discovery.fit import Fit, minimise
 from separatrix.discovery.machine import Free, record_nuisances
 from separatrix.discovery.problem import Problem
 
@@ -45,15 +45,28 @@ class Prediction:
 
 
 def predict(
-    data: Data, model, free: list[Free], values: np.ndarray, covariance: np.ndarray, misfit: float = 1.0
+    data: Data,
+    model,
+    free: list[Free],
+    values: np.ndarray,
+    covariance: np.ndarray,
+    misfit: float = 1.0,
+    guess: np.ndarray | None = None,
 ) -> Prediction:
-    """Score held-out records by the machine with `values`, known up to `covariance`, of the given `misfit`."""
+    """Score held-out records by the machine with `values`, known up to `covariance`, of the given `misfit`.
+
+    `guess`: starts of segments that another machine found there, tried too.
+    """
     shared = [i for i, one in enumerate(free) if one.record is None]
     own = record_nuisances([one.phase_known for one in data.prepared]) if data.prepared[0].frequency else []
     whole = [free[i] for i in shared] + own
     start = np.concatenate([values[shared], np.zeros(len(own))])
     fixed = np.arange(len(whole)) < len(shared)
     problem, fit = _fit_own(data, model, whole, start, fixed)
+    if guess is not None:
+        other = minimise(problem, fit.values, guess, most=12, fixed=fixed)
+        if other.good.sum() >= fit.good.sum() and other.total < fit.total:
+            fit = other
     used = covariance[np.ix_(shared, shared)]
     score = _scores(fit, used, len(shared))
     return Prediction(score, fit.good, problem.segments.record, problem, fit, len(shared), misfit)

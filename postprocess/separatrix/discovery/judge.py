@@ -54,8 +54,8 @@ def judged(
     return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
 
 
-def detection(one: Judged, tested: int, inflation: float) -> float:
-    """Family-wise p value of what a candidate gained, for as many candidates as were tested."""
+def detection(one: Judged, tested: float, inflation: float) -> float:
+    """Family-wise p value of what a candidate gained, for candidates worth so many independent tests."""
     single = chi2.sf(max(0.0, 2 * (one.training + one.held_out)) / inflation, one.parameters)
     return float(-np.expm1(tested * np.log1p(-min(single, 1 - 1e-16))))
 

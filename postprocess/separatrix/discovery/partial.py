@@ -67,7 +67,7 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
     pool = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
-    return _passing(bench, found, pool, len(found.judged))
+    return _passing(bench, found, pool)
 
 
 def _pair(bench: Bench, found: Round) -> Judged | None:
@@ -86,7 +86,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
     pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found)]
-    best = _passing(bench, found, pairs, len(pairs))
+    best = _passing(bench, found, pairs)
     return best if best is not None and _all_needed(bench, found, best) else None
 
 
@@ -98,12 +98,12 @@ def _both_clear(pair: Judged, found: Round) -> bool:
     return all(clear) and admissible(pair, found.base)[0]
 
 
-def _passing(bench: Bench, found: Round, pool: list[Judged], tested: int) -> Judged | None:
+def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
     if not pool:
         return None
     best, rivals = preferred(pool, bench.options)
-    pass_gates(bench, best, found.base, rivals, tested)
+    pass_gates(bench, best, found.base, rivals, found.screened.tests)
     best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
     return best if all(best.gates.values()) else None
 

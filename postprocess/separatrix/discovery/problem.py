@@ -8,7 +8,7 @@ import numpy as np
 
 from separatrix.discovery.machine import Free, drive_amplitudes
 from separatrix.discovery.preflight import Prepared
-from separatrix.discovery.segments import Segments
+from separatrix.discovery.segments import Segments, padded
 from separatrix.errors import SeparatrixError
 
 _SCALE_STEP = 1e-5
@@ -32,6 +32,8 @@ class Evaluation:
     v: np.ndarray
     # per record rows of segment (of that record), time, speed before, speed after, side
     impacts: list[np.ndarray | None]
+    # number of impacts of each segment
+    hits: np.ndarray
     by_start: np.ndarray | None = None
     by_parameter: np.ndarray | None = None
     # derivatives of x and v by the start, without noise: what a force does later follows from them
@@ -56,6 +58,12 @@ class Problem:
         other.__dict__.update(self.__dict__)
         other.free = free
         return other
+
+    def of_segments(self, rows: np.ndarray) -> "Problem":
+        """The same problem with these segments only; a segment may come several times."""
+        old = self.segments
+        chosen = padded(old.record[rows], old.first[rows], old.last[rows])
+        return Problem(self.model, self.prepared, chosen, self.free)
 
     @property
     def values(self) -> np.ndarray:
@@ -98,6 +106,7 @@ class Problem:
             x=np.zeros(shape),
             v=np.zeros(shape),
             impacts=[None] * len(self._parts),
+            hits=np.zeros(count, int),
         )
         if derivatives:
             out.by_start = np.zeros((count, width, 2))
@@ -110,6 +119,10 @@ class Problem:
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
+        # what was not flown to its end says nothing
+        for table in (out.residual, out.by_start, out.by_parameter):
+            if table is not None:
+                table[out.failed] = 0
         out.residual = self.whitened(out.residual)
         if derivatives:
             out.by_start = self.whitened(out.by_start)
@@ -153,6 +166,7 @@ class Problem:
         out.failed[rows] = failed
         out.x[rows] = _padded(result.x, inside)
         out.v[rows] = _padded(result.v, inside)
+        out.hits[rows] = result.impacts
         hits = result.impact
         out.impacts[number] = np.column_stack(
             [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side]

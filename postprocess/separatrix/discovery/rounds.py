@@ -39,13 +39,14 @@ class Bench:
     # why some candidates make no sense for this machine
     absent: dict[str, str] = field(default_factory=dict)
 
-    def foretell(self, fitted: Fitted) -> Prediction | None:
-        """Score the held-out records."""
+    def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
+        """Score the held-out records; the starts that an `other` prediction found there are tried too."""
         if self.held_out is None:
             return None
-        fit = fitted.fit
+        free, fit = fitted.problem.free, fitted.fit
+        guess = None if other is None else other.fit.starts
         misfit = max(1.0, fit.reduced_chi2)
-        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, fitted.covariance, misfit)
+        return predict(self.held_out, fitted.model, free, fit.values, fitted.covariance, misfit, guess)
 
 
 @dataclass
@@ -60,8 +61,18 @@ class Round:
     judged: list[Judged]
 
 
-def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: float, last: float) -> Round:
-    """Screen all candidates on top of `base` and refit those that matter."""
+def run_round(
+    bench: Bench,
+    base: Fitted,
+    foretold: Prediction | None,
+    first: float,
+    last: float,
+    earlier: Round | None = None,
+) -> Round:
+    """Screen all candidates on top of `base` and refit those that matter.
+
+    The fits of an `earlier` round on the same machine, made with another noise, are carried on.
+    """
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
@@ -84,15 +95,30 @@ def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: fl
     chosen = choose(base, screened, options)
     found: list[Judged] = []
     rival = None
+    known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick)
+        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick, known.get(name))
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
-        found.append(judged(base, foretold, fitted, bench.foretell(fitted)))
+        found.append(judged(base, foretold, fitted, bench.foretell(fitted, foretold)))
     found.sort(key=lambda one: -one.evidence)
     _cross(bench, base, foretold, candidates, found)
+    foretold, found = _fair(bench, base, foretold, found)
     return Round(base, foretold, candidates, signatures, screened, found)
+
+
+def _fair(
+    bench: Bench, base: Fitted, foretold: Prediction | None, found: list[Judged]
+) -> tuple[Prediction | None, list[Judged]]:
+    """The base foretelling also from where the best candidate began, and all held against that."""
+    if foretold is None or not found or found[0].held_out < _WORTH:
+        return foretold, found
+    fairer = bench.foretell(base, found[0].prediction)
+    if fairer.score[fairer.good].sum() <= foretold.score[foretold.good].sum():
+        return foretold, found
+    again = [judged(base, fairer, one.fitted, one.prediction) for one in found]
+    return fairer, sorted(again, key=lambda one: -one.evidence)
 
 
 def _cross(
@@ -113,7 +139,7 @@ def _cross(
             continue
         better = crossed(bench.training, one.fitted, best, candidates[one.name])
         if better is not one.fitted:
-            found[place] = judged(base, foretold, better, bench.foretell(better))
+            found[place] = judged(base, foretold, better, bench.foretell(better, found[0].prediction))
     found.sort(key=lambda one: -one.evidence)
 
 
