@@ -45,9 +45,10 @@ class Bench:
         """Score the held-out records; the starts that an `other` prediction found there are tried too."""
         if self.held_out is None:
             return None
-        free, values = fitted.problem.free, fitted.fit.values
+        free, fit = fitted.problem.free, fitted.fit
         guess = None if other is None else other.fit.starts
-        return predict(self.held_out, fitted.model, free, values, fitted.covariance, guess)
+        misfit = max(1.0, fit.reduced_chi2)
+        return predict(self.held_out, fitted.model, free, fit.values, fitted.covariance, misfit, guess)
 
 
 @dataclass
