@@ -14,6 +14,7 @@ from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.verdict import Findings
+from separatrix.discovery.wording import with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
 
@@ -69,8 +70,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
     for path in fitted.model.parameters:
         found = verdict["parameters"].get(path)
         if found:
-            unit = "" if found["unit"] == "1" else f" {found['unit']}"
-            lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
+            lines.append(f"# {path} = {with_error(found, 6)}")
     return "\n".join([*lines, machine_text(fitted)])
 
 

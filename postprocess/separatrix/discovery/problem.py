@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.machine import Free, drive_amplitudes
-from separatrix.discovery.preflight import Prepared
+from separatrix.discovery.preflight import Prepared, even_interval
 from separatrix.discovery.segments import Segments, padded
 from separatrix.errors import SeparatrixError
 
@@ -86,7 +86,7 @@ class Problem:
             "inside": self.segments.inside[rows],
             "x": record.x[samples],
             "v": None if record.v is None else record.v[samples],
-            "force": _force_argument(record, starts),
+            "force": _force_argument(record, first),
         }
 
     def evaluate(self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True) -> Evaluation:
@@ -288,9 +288,13 @@ def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
     return table
 
 
-def _force_argument(record, starts: np.ndarray):
+def _force_argument(record, first: np.ndarray):
+    """Force of a record for segments that begin at the samples `first`.
+
+    Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
+    there are leaves room for the last times, which need not be quite even.
+    """
     if record.force is None:
         return None
-    # the mean, so that the series ends where the record does
-    interval = (record.t[-1] - record.t[0]) / (record.t.size - 1)
-    return starts - record.t[0], interval, record.force
+    interval = even_interval(record)
+    return first * interval, interval, np.append(record.force, record.force[-1])

@@ -38,7 +38,7 @@ class Bench:
     held_out: Data | None
     scales: Scales
     options: Options
-    # why some candidates make no sense for this machine
+    # why some candidates make no sense for this machine, as the first round found
     absent: dict[str, str] = field(default_factory=dict)
 
     def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
@@ -78,6 +78,7 @@ def run_round(
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
+    absent: dict[str, str] = {}
     for effect in CATALOGUE:
         if effect.name in base.names or (options.candidates and effect.name not in options.candidates):
             continue
@@ -85,14 +86,15 @@ def run_round(
             continue
         made = candidate(base.model, free, base.names, effect.name, bench.scales)
         if isinstance(made, str):
-            bench.absent.setdefault(effect.name, made)
+            absent[effect.name] = made
         else:
             candidates[effect.name] = made
     options.progress(f"screening {len(candidates)} effects", first)
-    signatures = [signature(base.problem, base.fit, one) for one in candidates.values()]
-    signatures = [one for one in signatures if one is not None]
-    for name in set(candidates) - {one.name for one in signatures}:
-        bench.absent.setdefault(name, "it changes nothing in these records")
+    shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
+    signatures = [one for one in shown.values() if one is not None]
+    absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
+    if not base.names:
+        bench.absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
     screened = screen(base.fit, signatures)
     chosen = choose(base, screened, options)
     found: list[Judged] = []

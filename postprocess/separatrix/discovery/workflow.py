@@ -47,7 +47,7 @@ def investigate(
     model = _model(base)
     training, held_out, chosen = _split([_record(one) for one in records], [_record(one) for one in hold_out])
     unique_names([*training, *held_out])
-    still = None if rest is None else _record(rest)
+    still = None if rest is None else _record(rest, at_rest=True)
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[prepare(one, model, still) for one in group] for group in (training, held_out)]
     data = gather(prepared[0], options.segment_periods, options.segment_seconds)
@@ -90,8 +90,8 @@ def _model(base: object):
     return base
 
 
-def _record(one: Path | Record) -> Record:
-    return one if isinstance(one, Record) else read_record(Path(one))
+def _record(one: Path | Record, at_rest: bool = False) -> Record:
+    return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
 def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record], list[Record], str]:
