@@ -13,6 +13,7 @@
 #define SEPARATRIX_LANE_KERNEL_HPP
 
 #include "lane_layer.hpp"
+#include "lane_stops.hpp"
 
 namespace {
 
@@ -227,42 +228,6 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   return rare;
 }
 
-// The state of the lanes that have come to where they stop. The end of the period starts the clock anew.
-template <bool damping> inline void take_stops(const lane_machine &m, mask sent, lane_group &g) {
-  mask stopped = sent & (g.status == lane_stopped);
-  if (!any(stopped))
-    return;
-  kinematics k = evaluate<damping>(m, g, g.until - g.start);
-  mask section = stopped & (g.until >= m.period);
-  g.x = stopped ? k.x : g.x;
-  g.v = stopped ? k.v : g.v;
-  g.time = stopped ? (section ? vec{} : g.until) : g.time;
-  g.start = section ? g.start - m.period : g.start;
-}
-
-// Lanes with a layer that come to a stop. Those that need not stop at this section: their motion is noted,
-// and the clock starts anew. Those within the layer at that time are `left` to the scalar code.
-inline void pass_sections(const lane_machine &m, int first, mask stops, lane_group &g, lane_batch &batch) {
-  mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
-  mask passing = stops & ~within & (g.sections > 0.5);
-  g.status = stops & ~passing ? (within ? all(lane_left) : all(lane_stopped)) : g.status;
-  if (!any(passing))
-    return;
-  kinematics k = evaluate<false>(m, g, g.until - g.start);
-  for (int i = 0; i < width; i++) {
-    if (passing[i]) {
-      batch.section_x[(int)g.passed[i]][first + i] = k.x[i];
-      batch.section_v[(int)g.passed[i]][first + i] = k.v[i];
-    }
-  }
-  g.passed = passing ? g.passed + 1.0 : g.passed;
-  g.sections = passing ? g.sections - 1.0 : g.sections;
-  g.x = passing ? k.x : g.x;
-  g.v = passing ? k.v : g.v;
-  g.time = passing ? vec{} : g.time;
-  g.start = passing ? g.start - m.period : g.start;
-}
-
 // Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that
 // failed.
 template <bool damping, bool layer>
@@ -284,31 +249,33 @@ inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrie
   return left;
 }
 
-// Flies the lanes of one vector until each has stopped or is left to the scalar code.
+// Flies the lanes of one vector until one has stopped or is left to the scalar code. They pass the sections
+// together, so that those set off together, whose first flights take longer to find, stay together.
 template <bool damping> void fly(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
   load<false>(batch, first, g);
   begin_flight<damping, false>(m, g);
   mask flying = g.status == lane_flying, sent = flying;
-  while (any(flying)) {
-    mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
-    vec barrier = upward ? all(m.upper) : all(m.lower);
-    if (any(seek))
-      left = look_ahead<damping, false>(m, seek, upward, barrier, g);
-    mask stops = flying & ~left & (g.start + g.span >= g.until);
-    g.status = stops ? all(lane_stopped) : g.status;
-    flying = flying & ~left & ~stops;
-    if (any(flying))
-      left = left | take_events<damping, false>(m, flying, upward, barrier, g);
-    g.status = left ? all(lane_left) : g.status;
-    flying = flying & ~left;
+  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+    flying = sent;
+    while (any(flying)) {
+      mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
+      vec barrier = upward ? all(m.upper) : all(m.lower);
+      if (any(seek))
+        left = look_ahead<damping, false>(m, seek, upward, barrier, g);
+      flying = flying & ~left & (g.start + g.span < g.until);
+      if (any(flying))
+        left = left | take_events<damping, false>(m, flying, upward, barrier, g);
+      g.status = left ? all(lane_left) : g.status;
+      flying = flying & ~left;
+    }
+    take_stops<damping>(m, g.status == lane_flying, batch, g);
   }
-  take_stops<damping>(m, sent, g);
   store<false>(g, first, batch);
 }
 
-// The same with a Stribeck layer, until one lane has stopped or is left. Turnings are dear here: a lane that
-// has come to one waits until all have. Before that the impacts are taken, and then the sections passed.
+// The same with a Stribeck layer. Turnings are dear here, so no lane waits for another at a section, but one
+// that has come to a turning waits until all have. Before that the impacts are taken, and then the stops.
 void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
   load<true>(batch, first, g);
@@ -320,20 +287,19 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
     vec barrier = upward ? all(m.upper) : all(m.lower);
     if (any(seek))
       left = look_ahead<false, true>(m, seek, upward, barrier, g);
+    flying = flying & ~left;
+    mask stops = flying & (g.start + g.span >= g.until), due = flying & ~stops & (g.hits > 0.5);
+    if (!any(due) && any(stops)) {
+      mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
+      left = left | within;
+      take_stops<false>(m, stops & ~within, batch, g);
+    } else if (!any(due))
+      due = flying;
+    if (any(due))
+      left = left | take_events<false, true>(m, due, upward, barrier, g);
     g.status = left ? all(lane_left) : g.status;
     flying = g.status == lane_flying;
-    mask stops = flying & (g.start + g.span >= g.until), due = flying & ~stops & (g.hits > 0.5);
-    if (!any(due) && any(stops))
-      pass_sections(m, first, stops, g, batch);
-    else if (!any(due))
-      due = flying;
-    if (any(due)) {
-      left = take_events<false, true>(m, due, upward, barrier, g);
-      g.status = left ? all(lane_left) : g.status;
-    }
-    flying = g.status == lane_flying;
   }
-  take_stops<false>(m, sent, g);
   store<true>(g, first, batch);
 }
 

@@ -17,7 +17,7 @@ typedef lane_fields<vec> lane_group;
 
 enum {
   members = sizeof(lane_batch::fields) / sizeof(double[lanes]),
-  plain_members = offsetof(lane_fields<double[lanes]>, sections) / sizeof(double[lanes])
+  plain_members = offsetof(lane_fields<double[lanes]>, skip) / sizeof(double[lanes])
 };
 
 template <bool layer> inline void load(const lane_batch &batch, int first, lane_group &g) {
