@@ -16,7 +16,7 @@ inline vec captors(const lane_batch &batch, vec x, vec v) {
     const lane_region &r = batch.region[i];
     vec dx = (x - r.x) * r.stretch_x, dv = (v - r.v) * r.stretch_v;
     vec square = r.metric_xx * dx * dx + 2 * r.metric_xv * dv * dx + r.metric_vv * dv * dv;
-    captor = square <= r.reach ? all(r.attractor) : captor;
+    put(captor, square <= r.reach, r.attractor);
   }
   return captor;
 }
@@ -32,15 +32,15 @@ inline void take_stops(const lane_machine &m, mask there, const lane_batch &batc
   vec captor = captors(batch, k.x, k.v);
   mask passing = section & (g.sections > 0.5) & (g.flights <= g.budget) & ((captor < 0.5) | (g.leaves < 0.5));
   passing = batch.complete ? passing : mask{};
-  g.x = there ? k.x : g.x;
-  g.v = there ? k.v : g.v;
-  g.time = there ? (section ? vec{} : g.until) : g.time;
-  g.start = section ? g.start - m.period : g.start;
-  g.elapsed = passing ? g.elapsed + m.period : g.elapsed;
-  g.captor = passing ? captor : g.captor;
-  g.settled = passing ? (captor < 0.5 ? all(-1) : (g.settled < 0.0 ? g.elapsed : g.settled)) : g.settled;
-  g.sections = passing ? g.sections - 1.0 : g.sections;
-  g.status = there & ~passing ? all(lane_stopped) : g.status;
+  put(g.x, there, k.x);
+  put(g.v, there, k.v);
+  put(g.time, there, pick(section, vec{}, g.until));
+  put(g.start, section, g.start - m.period);
+  put(g.elapsed, passing, g.elapsed + m.period);
+  put(g.captor, passing, captor);
+  put(g.settled, passing, pick(captor < 0.5, -1, pick(g.settled < 0.0, g.elapsed, g.settled)));
+  put(g.sections, passing, g.sections - 1.0);
+  put(g.status, there & ~passing, lane_stopped);
 }
 
 } // namespace

@@ -72,9 +72,9 @@ template <class T> struct lane_fields {
   // whether it stops where it is captured. Time since the start of the trajectory, the attractor that has
   // captured it (0 = none), and since when (-1 = not).
   T sections, budget, leaves, elapsed, captor, settled;
-  // From here on with a Stribeck layer only. The time since the start of the flight at which the body leaves the layer (`start_v`, ... are those
-  // then), and at which it enters it again or hits, with its motion. Fourth derivative at the end of the
-  // flight.
+  // From here on with a Stribeck layer only. The time since the start of the flight at which the body leaves
+  // the layer (`start_v`, ... are those then), and at which it enters it again or hits, with its motion.
+  // Fourth derivative at the end of the flight.
   T skip, reach, reach_v, reach_a, reach_j, end_s;
 };
 
@@ -86,8 +86,8 @@ struct lane_region {
 
 struct lane_batch {
   lane_fields<double[lanes]> fields;
-  // What the lanes can be captured by; a point in several belongs to the first. Unless these are all, every lane
-  // stops at every section.
+  // What the lanes can be captured by; a point in several belongs to the first. Unless these are all, every
+  // lane stops at every section.
   int regions, complete;
   lane_region region[most_regions];
 };
