@@ -158,7 +158,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             length = inside.shape[1]
             group["residual"] = fit.evaluation.residual[rows, :length][inside]
             group["good"] = fit.good[rows]
-            group.attrs["crank_angle"] = problem.crank_angle(number, fit.values, float(prepared.record.t[0]))
+            group.attrs["crank_angle"] = float(problem.crank_angle(number, fit.values, prepared.record.t[0]))
             impacts = fit.evaluation.impacts[number]
             group["impacts"] = np.zeros((0, 5)) if impacts is None else impacts
             group["impacts"].attrs["columns"] = "segment time speed_before speed_after side"

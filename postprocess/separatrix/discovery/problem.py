@@ -11,9 +11,6 @@ from separatrix.discovery.preflight import Prepared, even_interval
 from separatrix.discovery.segments import Segments, padded
 from separatrix.errors import SeparatrixError
 
-_SCALE_STEP = 1e-5
-_CLOCK_STEP = 1e-6
-
 
 @dataclass
 class Evaluation:
@@ -156,7 +153,7 @@ class Problem:
     ) -> None:
         prepared = self.prepared[number]
         active, given, chain = self._active(number, values, derivatives)
-        start = np.column_stack([starts[part["rows"]], self._crank(number, part, values)])
+        start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
         result = self._simulate(part, active, given, start, derivatives)
         rows, inside = part["rows"], part["inside"]
         length = inside.shape[1]
@@ -174,8 +171,7 @@ class Problem:
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
-            jacobians, steady = self._derivatives(number, part, active, given, chain, start, values, result)
-            out.steady[rows] &= steady
+            jacobians = self._derivatives(number, part, active, chain, result)
             n = len(active)
             out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
@@ -208,10 +204,10 @@ class Problem:
             if not one.is_nuisance
         }
         prepared = self.prepared[number]
-        scale = prepared.drive_scale * self._nuisance("nuisance:drive_scale", number, values, 1.0)
-        if scale != 1.0 or prepared.drive_scale != 1.0:
+        scale = self._nuisance("nuisance:drive_scale", number, values, None)
+        if scale is not None or prepared.drive_scale != 1.0:
             for path, value in self.amplitudes.items():
-                chosen[path] = scale * value
+                chosen[path] = prepared.drive_scale * (1.0 if scale is None else scale) * value
         if prepared.frequency is not None:
             frequency = prepared.frequency * (1 + self._nuisance("nuisance:clock", number, values, 0.0))
             ratio = self.model.parameters["drive.ratio"].value
@@ -219,26 +215,23 @@ class Problem:
             chosen["drive.ratio"] = ratio * frequency / self.model.drive_frequency(chosen)
         return chosen
 
-    def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float) -> float:
+    def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float | None) -> float | None:
         for one, value in zip(self.free, values, strict=True):
             if one.path == path and one.record in (None, number):
                 return float(value)
         return absent
 
-    def crank_angle(self, number: int, values: np.ndarray, t: float) -> float:
-        """Angle of the crank at time `t` of a record [rad]."""
-        return float(self._crank(number, {"starts": np.array([t])}, values)[0])
-
-    def _crank(self, number: int, part: dict, values: np.ndarray) -> np.ndarray:
+    def crank_angle(self, number: int, values: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Angle of the crank at times `t` of a record [rad]; 0 without a crank."""
         prepared = self.prepared[number]
         if prepared.frequency is None:
-            return np.zeros(part["starts"].size)
+            return np.zeros(np.shape(t))
         clock = self._nuisance("nuisance:clock", number, values, 0.0)
         phase = prepared.phase + self._nuisance("nuisance:phase", number, values, 0.0)
-        return phase + prepared.frequency * (1 + clock) * (part["starts"] - prepared.origin)
+        return phase + prepared.frequency * (1 + clock) * (t - prepared.origin)
 
     def _active(self, number: int, values: np.ndarray, derivatives: bool) -> tuple:
-        """Paths, their values and d(values)/d(free parameters); the scale of the drive is differenced."""
+        """Paths, their values and d(values)/d(free parameters)."""
         chosen = self.machine_values(number, values)
         active = list(chosen)
         given = np.array([chosen[path] for path in active])
@@ -246,9 +239,11 @@ class Problem:
             return active, given, None
         chain = np.zeros((len(active), len(self.free)))
         for j, one in enumerate(self.free):
-            if one.is_nuisance:
-                continue
-            chain[active.index(one.path), j] = one.slope(values[j])
+            if one.path == "nuisance:drive_scale":
+                for path, value in self.amplitudes.items():
+                    chain[active.index(path), j] = self.prepared[number].drive_scale * value
+            elif not one.is_nuisance:
+                chain[active.index(one.path), j] = one.slope(values[j])
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):
@@ -270,44 +265,21 @@ class Problem:
         slope = (ends[0] - ends[1]) / (2 * step)
         return -ratio * slope / (0.5 * (ends[0] + ends[1]))
 
-    def _derivatives(self, number, part, active, given, chain, start, values, result) -> tuple:
+    def _derivatives(self, number: int, part: dict, active: list[str], chain: np.ndarray, result) -> list:
+        """Derivatives of x and v by the start, and by the free parameters through `active` and the crank."""
         n = len(active)
         prepared = self.prepared[number]
-        lengths = np.diff(part["offsets"])
         crank = np.zeros((part["starts"].size, len(self.free)))
-        scale_column = None
         for j, one in enumerate(self.free):
             if one.path == "nuisance:phase" and one.record == number:
                 crank[:, j] = 1
             elif one.path == "nuisance:clock" and one.record == number:
                 crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
-            elif one.path == "nuisance:drive_scale":
-                scale_column = j
-        crank = np.repeat(crank, lengths, axis=0)
-        jacobians, steady = [], np.ones(part["rows"].size, bool)
-        for whole in (result.jacobian, result.velocity_jacobian):
-            by_parameter = whole[:, :n] @ chain + whole[:, n + 2 : n + 3] * crank
-            jacobians.append((whole[:, n : n + 2], by_parameter))
-        if scale_column is not None:
-            slopes, steady = self._scale_slopes(part, active, given, start, values[scale_column])
-            for (_, by_parameter), slope in zip(jacobians, slopes, strict=True):
-                by_parameter[:, scale_column] = slope
-        return jacobians, steady
-
-    def _scale_slopes(self, part, active, given, start, scale: float) -> tuple:
-        amplitude = np.array([path in self.amplitudes for path in active])
-        base = np.where(amplitude, given / scale, 0.0)
-        if not amplitude.any():
-            active = [*active, *self.amplitudes]
-            base = np.concatenate([np.zeros(given.size), list(self.amplitudes.values())])
-            given = np.concatenate([given, list(self.amplitudes.values())])
-        ends = [
-            self._simulate(part, active, given + sign * _SCALE_STEP * base, start, False) for sign in (1, -1)
-        ]
-        steady = np.asarray(ends[0].impacts) == np.asarray(ends[1].impacts)
+        crank = np.repeat(crank, np.diff(part["offsets"]), axis=0)
         return [
-            (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * _SCALE_STEP) for name in ("x", "v")
-        ], steady
+            (whole[:, n : n + 2], whole[:, :n] @ chain + whole[:, n + 2 : n + 3] * crank)
+            for whole in (result.jacobian, result.velocity_jacobian)
+        ]
 
 
 def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, crossed, gain_over, refit
+from separatrix.discovery.refit import Fitted, carried_on, crossed, gain_over, refit
 from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
@@ -26,6 +26,8 @@ _BAD = 1.3
 _CROSSED = 4
 _WORTH_CROSSING = 5.0
 _SHARE = 0.3
+# behind the best by less than so many separations: fitted to the end
+_NEAR = 3.0
 
 
 @dataclass
@@ -43,9 +45,10 @@ class Bench:
         """Score the held-out records; the starts that an `other` prediction found there are tried too."""
         if self.held_out is None:
             return None
-        free, values = fitted.problem.free, fitted.fit.values
+        free, fit = fitted.problem.free, fitted.fit
         guess = None if other is None else other.fit.starts
-        return predict(self.held_out, fitted.model, free, values, fitted.covariance, guess)
+        misfit = max(1.0, fit.reduced_chi2)
+        return predict(self.held_out, fitted.model, free, fit.values, fitted.covariance, misfit, guess)
 
 
 @dataclass
@@ -99,11 +102,14 @@ def run_round(
     known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick, known.get(name))
+        fitted = refit(
+            bench.training, base, candidates[name], screened, rival, options.quick, known.get(name)
+        )
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted, foretold)))
     found.sort(key=lambda one: -one.evidence)
+    _carry_on(bench, base, foretold, candidates, found)
     _cross(bench, base, foretold, candidates, found)
     foretold, found = _fair(bench, base, foretold, found)
     return Round(base, foretold, candidates, signatures, screened, found)
@@ -120,6 +126,22 @@ def _fair(
         return foretold, found
     again = [judged(base, fairer, one.fitted, one.prediction) for one in found]
     return fairer, sorted(again, key=lambda one: -one.evidence)
+
+
+def _carry_on(
+    bench: Bench,
+    base: Fitted,
+    foretold: Prediction | None,
+    candidates: dict[str, Candidate],
+    found: list[Judged],
+) -> None:
+    """Fit those near the best to their end, however little effort they were thought worth before."""
+    for place, one in enumerate(found):
+        near = found[0].evidence - one.evidence < _NEAR * bench.options.separation
+        if near and not one.fitted.fit.converged:
+            fitted = carried_on(bench.training, candidates[one.name], one.fitted)
+            found[place] = judged(base, foretold, fitted, bench.foretell(fitted, one.prediction))
+    found.sort(key=lambda one: -one.evidence)
 
 
 def _cross(

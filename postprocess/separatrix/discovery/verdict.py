@@ -42,6 +42,7 @@ def verdict_of(findings: Findings) -> dict:
         "equivalent": decision.equivalent,
         "equivalences": equivalents([*final.names, *[names[-1] for names in decision.alternatives]]),
         "parameters": _parameters(final),
+        "base_parameters": _parameters(findings.base),
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "gates": best.gates if best else {},

@@ -13,7 +13,7 @@ from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
 from separatrix.discovery.machine import record_nuisances, with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.partial import name_in_part
+from separatrix.discovery.partial import decide_in_part
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.records import Record, read_record, unique_names
 from separatrix.discovery.refit import Fitted
@@ -60,9 +60,7 @@ def investigate(
     if foretold is not None:
         _prepare_held_out(foretold, data, model, fitted, scales.mass)
     bench = Bench(data, foretold, scales, options)
-    decision = decide(bench, fitted)
-    if options.partial and decision.outcome == "not-in-catalogue":
-        decision = name_in_part(bench, decision)
+    decision = decide_in_part(bench, fitted) if options.partial else decide(bench, fitted)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)
