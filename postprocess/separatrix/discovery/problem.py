@@ -247,14 +247,14 @@ class Problem:
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):
-                chain[row, j] = self._ratio_slope(one, number, chosen) * one.slope(values[j])
+                chain[row, j] = self._ratio_slope(one, values[j], number, chosen) * one.slope(values[j])
         return active, given, chain
 
-    def _ratio_slope(self, one: Free, number: int, chosen: dict[str, float]) -> float:
+    def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
         """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
         ratio = chosen["drive.ratio"]
         if one.path == "nuisance:clock" and one.record == number:
-            return ratio
+            return ratio / (1 + value)
         if one.path not in ("restoring.stiffness", "restoring.moment", "body.mass"):
             return 0.0
         step = 1e-5 * abs(chosen[one.path])
