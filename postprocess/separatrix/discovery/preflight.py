@@ -40,11 +40,6 @@ class Prepared:
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
 
-    def note(self, text: str) -> None:
-        """Keep a remark once."""
-        if text not in self.notes:
-            self.notes.append(text)
-
     @property
     def period_samples(self) -> float | None:
         """Samples per drive period."""
