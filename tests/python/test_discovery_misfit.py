@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A record that the machine misses is never passed over, and noise is doubted only where the samples say so."""
+"""A record that the machine misses is never passed over, and noise is doubted where the samples say so."""
 
 from types import SimpleNamespace
 

@@ -60,7 +60,8 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
         size, freedom = found[number]
         if size < _TOO_LITTLE and freedom > _ENOUGH:
             notes.append(
-                f"{_stated(one)} scatter by only {one.sigma * np.sqrt(size):.3g} m: what is smaller than the stated noise is overlooked"
+                f"{_stated(one)} scatter by only {one.sigma * np.sqrt(size):.3g} m: "
+                "what is smaller than the stated noise is overlooked"
             )
     return notes
 
