@@ -179,7 +179,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   bool turns = layer && any(due & ~hit);
   if (turns) {
     turn = turn_in_layer(m, due & ~hit, g);
-    plain = hit ? plain : turn.sound;
+    plain = hit ? plain : turn.sound & (magnitude(turn.x) < m.domain);
     gap = hit ? gap : g.direction * (barrier - turn.x);
   }
   mask rare = due & ~plain;
@@ -195,7 +195,8 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   g.up_hits = up ? g.hits : g.up_hits;
   g.down_span = down ? g.span : g.down_span;
   g.down_hits = down ? g.hits : g.down_hits;
-  g.flights = due ? g.flights + 1.0 : g.flights;
+  // The event loop flies three times: to the edge of the layer, in and out.
+  g.flights = due ? g.flights + (turns ? (hit ? all(1) : all(3)) : all(1)) : g.flights;
   g.impacts = struck ? g.impacts + 1.0 : g.impacts;
   g.speed_sum = struck ? g.speed_sum + w : g.speed_sum;
   g.last_speed = struck ? w : g.last_speed;
@@ -236,6 +237,7 @@ template <bool damping> inline void take_stops(const lane_machine &m, mask sent,
   mask section = stopped & (g.until >= m.period);
   g.x = stopped ? k.x : g.x;
   g.v = stopped ? k.v : g.v;
+  g.flights = stopped ? g.flights + 1.0 : g.flights;
   g.time = stopped ? (section ? vec{} : g.until) : g.time;
   g.start = section ? g.start - m.period : g.start;
 }
@@ -256,6 +258,7 @@ inline void pass_sections(const lane_machine &m, int first, mask stops, lane_gro
     }
   }
   g.passed = passing ? g.passed + 1.0 : g.passed;
+  g.flights = passing ? g.flights + 1.0 : g.flights;
   g.sections = passing ? g.sections - 1.0 : g.sections;
   g.x = passing ? k.x : g.x;
   g.v = passing ? k.v : g.v;
@@ -295,6 +298,7 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
     vec barrier = upward ? all(m.upper) : all(m.lower);
     if (any(seek))
       left = look_ahead<damping, false>(m, seek, upward, barrier, g);
+    left = left | (flying & (g.flights >= g.budget));
     mask stops = flying & ~left & (g.start + g.span >= g.until);
     g.status = stops ? all(lane_stopped) : g.status;
     flying = flying & ~left & ~stops;
@@ -320,6 +324,7 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
     vec barrier = upward ? all(m.upper) : all(m.lower);
     if (any(seek))
       left = look_ahead<false, true>(m, seek, upward, barrier, g);
+    left = left | (flying & (g.flights >= g.budget));
     g.status = left ? all(lane_left) : g.status;
     flying = g.status == lane_flying;
     mask stops = flying & (g.start + g.span >= g.until), due = flying & ~stops & (g.hits > 0.5);

@@ -68,6 +68,8 @@ template <class T> struct lane_fields {
   T found, span, hits, end_x, end_v, end_a, end_j, end_re, end_im;
   // Counts and extremes since the caller last took them away.
   T flights, impacts, speed_sum, last_speed, margin;
+  // Flights after which the lane is left to the scalar code.
+  T budget;
   // From here on with a Stribeck layer only. Sections that the lane passes over before it stops at one, and
   // that it has passed.
   T sections, passed;

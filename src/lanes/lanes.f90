@@ -17,7 +17,7 @@ module lanes
   implicit none
   private
 
-  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, section_state, take_counts, fly_lanes
+  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, passed_section, take_counts, fly_lanes
 
   integer, parameter, public :: lane_count = 16
   !> Sections that a lane can pass over in one go.
@@ -60,8 +60,8 @@ module lanes
     real(c_double), dimension(lane_count) :: status = lane_idle, until = 0, time = 0, x = 0, v = 0, start = 0, &
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
-      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, passed = 0, &
-      skip = 0, reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
+      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), &
+      budget = huge(1.0_c_double), sections = 0, passed = 0, skip = 0, reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
     real(c_double), dimension(lane_count, most_sections) :: section_x = 0, section_v = 0
   end type lane_batch_t
 
@@ -238,14 +238,14 @@ contains
   end subroutine lane_state
 
   !> The body in a lane on the section number `section` that the lane passed over.
-  pure subroutine section_state(batch, lane, section, state)
+  pure subroutine passed_section(batch, lane, section, state)
     type(lane_batch_t), intent(in) :: batch
     integer, intent(in) :: lane, section
     type(state_t), intent(out) :: state
     state%x = batch%section_x(lane, section)
     state%v = batch%section_v(lane, section)
     state%mode = merge(mode_slip_minus, mode_slip_plus, state%v < 0)
-  end subroutine section_state
+  end subroutine passed_section
 
   !> Moves what a lane has counted to a tally.
   pure subroutine take_counts(batch, lane, tally)

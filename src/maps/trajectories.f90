@@ -7,10 +7,10 @@ module trajectories
   use attractors, only: attractor_t
   use kinds, only: wp
   use lanes, only: fly_lanes, lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_state, lane_stopped, &
-    most_sections, occupy_lane, section_state, take_counts
+    most_sections, occupy_lane, passed_section, take_counts
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus
-  use status, only: reason_event_budget
+  use status, only: reason_left_domain
   use trajectory, only: begin_course, conclude, course_t, go_past_turn, go_to_stop, outcome_t, pass_stop, phase_over, &
     phase_window, run_trajectory, sections_ahead, span_t
   implicit none
@@ -111,6 +111,7 @@ contains
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
     batch%until(lane) = course%until
+    batch%budget(lane) = real(journey%moving%options%event_budget - course%tally%events, wp)
     if (journey%flow%in_step) return
     batch%sections(lane) = min(most_sections, sections_ahead(journey%moving, journey%span, course))
     batch%passed(lane) = 0
@@ -130,12 +131,12 @@ contains
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
     associate (course => passenger%course)
       do section = 1, int(batch%passed(lane))
-        call section_state(batch, lane, section, course%state)
+        call passed_section(batch, lane, section, course%state)
         call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
       end do
       call lane_state(batch, lane, course%state)
       call take_counts(batch, lane, course%tally)
-      if (course%tally%events > journey%moving%options%event_budget) course%reason = reason_event_budget
+      if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
         if (.not. journey%flow%in_step) then
