@@ -101,8 +101,8 @@ contains
     real(wp), intent(in) :: x, v, crank_angle
     type(course_t), intent(out) :: course
     course%strobe_t = start_strobe(moving, [x, v, crank_angle])
-    call reset_tally(course%tally, course%state)
-    if (.not. span%duration - span%window > 0) call open_window(course)
+    call reset_tally(course%tally, course%state, allocated(moving%pair))
+    if (.not. span%duration - span%window > 0) call open_window(moving, course)
     call set_stop(moving, span, course)
   end subroutine begin_course
 
@@ -221,7 +221,7 @@ contains
     select case (course%phase)
     case (phase_transient)
       if (ended) call note_state(course, outcome)
-      if (.not. ended) call open_window(course)
+      if (.not. ended) call open_window(moving, course)
     case (phase_window)
       outcome%window = features_over(moving, course%tally, span%window/moving%machine%period)
       call note_state(course, outcome)
@@ -244,14 +244,15 @@ contains
   end subroutine note_state
 
   !> Starts the statistics window.
-  pure subroutine open_window(course)
+  pure subroutine open_window(moving, course)
+    type(motion_t), intent(in) :: moving
     type(course_t), intent(inout) :: course
     course%phase = phase_window
     course%impacts = course%impacts + course%tally%impacts
     course%last_impact_speed = latest_impact_speed(course)
     course%grazing_margin = min(course%grazing_margin, course%tally%grazing_margin)
     course%tally%wants_v_max = .true.
-    call reset_tally(course%tally, course%state)
+    call reset_tally(course%tally, course%state, allocated(moving%pair))
   end subroutine open_window
 
   pure real(wp) function latest_impact_speed(course) result(speed)
