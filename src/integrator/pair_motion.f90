@@ -106,6 +106,9 @@ contains
       if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (any(state%y /= state%y)) reason = reason_not_finite
       if (.not. abs(state%y(at_x2)) <= moving%options%domain) reason = reason_left_domain
+      ! A motion that is given may well run away.
+      if (moving%machine%drive /= driven_by_motion .and. .not. abs(state%y(at_x1)) <= moving%options%domain) &
+        reason = reason_left_domain
       stalls = merge(0, stalls + 1, state%time > before)
     end do
   end subroutine advance_pair
