@@ -157,10 +157,8 @@ contains
       if (course%until >= moving%machine%period) then
         course%elapsed = course%elapsed + (moving%machine%period - course%since)
         call note_section(moving, catalogue, slipped .or. course%since > 0, course, outcome)
-        course%since = 0
       else
         course%elapsed = phase_end
-        course%since = course%until
       end if
     end if
     ended = course%reason /= 0 .or. (course%captured > 0 .and. (span%stop_when_captured .or. &
