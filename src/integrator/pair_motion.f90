@@ -107,8 +107,9 @@ contains
       if (any(state%y /= state%y)) reason = reason_not_finite
       if (.not. abs(state%y(at_x2)) <= moving%options%domain) reason = reason_left_domain
       ! A motion that is given may well run away.
-      if (moving%machine%drive /= driven_by_motion .and. .not. abs(state%y(at_x1)) <= moving%options%domain) &
-        reason = reason_left_domain
+      if (moving%machine%drive /= driven_by_motion) then
+        if (.not. abs(state%y(at_x1)) <= moving%options%domain) reason = reason_left_domain
+      end if
       stalls = merge(0, stalls + 1, state%time > before)
     end do
   end subroutine advance_pair
