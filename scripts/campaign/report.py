@@ -41,9 +41,10 @@ def scores_of(folders: object, numbers: Sequence[int]) -> tuple[list[Score], int
 
 
 def versions(folders: object, found: list[Score]) -> str:
-    """Commits whose workflow gave the verdicts."""
-    commits = [json.loads(folders.result(one.number).read_text())["commit"] for one in found]
-    return ", ".join(f"{name} ({commits.count(name)})" for name in dict.fromkeys(commits))
+    """Commits whose workflow gave the verdicts, and the libraries that it computed with."""
+    results = [json.loads(folders.result(one.number).read_text()) for one in found]
+    made_by = [f"{one['commit']} with library {one.get('library', 'unknown')}" for one in results]
+    return ", ".join(f"{name} ({made_by.count(name)})" for name in dict.fromkeys(made_by))
 
 
 def percent(share: float) -> str:

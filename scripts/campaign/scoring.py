@@ -55,8 +55,8 @@ class Score:
 
     @property
     def alarm(self) -> bool:
-        """Whether effects of the catalogue were reported, one or several."""
-        return self.answer in ("named", "ambiguous")
+        """Whether anything was said to be missing."""
+        return self.answer in ("named", "ambiguous", "not-in-catalogue")
 
     @property
     def strong(self) -> bool:
@@ -96,7 +96,9 @@ def score(truth: dict, result: dict) -> Score:
         "outside": answer == "not-in-catalogue",
     }.get(truth["kind"], one_answer and contains)
     in_catalogue = truth["kind"] in ("single", "pair")
-    part = truth["kind"] == "pair" and answer == "named" and next(iter(sets)) < names
+    # one name only is a name, also where the verdict doubts it
+    alone = len(sets) == 1
+    part = truth["kind"] == "pair" and alone and next(iter(sets)) < names
     errors, covered = precision(truth, verdict) if right and in_catalogue else ((), ())
     held_out = verdict.get("gap", {}).get("held_out")
     return Score(
@@ -116,7 +118,7 @@ def score(truth: dict, result: dict) -> Score:
         decided=one_answer,
         right=right,
         contains=contains,
-        wrong_name=one_answer and not right and not part,
+        wrong_name=(one_answer or alone) and not contains and not part,
         errors=errors,
         covered=covered,
         removed=removed(held_out) if one_answer else math.nan,
@@ -139,7 +141,7 @@ def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: b
         return answer
     if contains:
         return "right name" if answer == "named" else "equivalent set" if one_answer else "set with the truth"
-    if answer == "ambiguous":
+    if len(sets) != 1:
         return "set without the truth"
     return "one of the pair" if part else "+".join(sorted(next(iter(sets))))
 
@@ -147,16 +149,17 @@ def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: b
 def precision(truth: dict, verdict: dict) -> tuple[tuple[float, ...], tuple[bool, ...]]:
     """Relative errors of the size of each effect, and whether its interval has the truth.
 
-    A parameter whose truth is 0, and one that the fit keeps, has no relative error.
+    A parameter whose truth is 0, and one that was not fitted, has no relative error. One that ended at its
+    bound has no interval, which cannot have the truth.
     """
     errors, covered = [], []
     for path, value in truth["parameters"].items():
         found = verdict.get("parameters", {}).get(path)
-        if found is None or value == 0 or not found.get("standard_error"):
+        if found is None or value == 0:
             continue
         errors.append(abs(found["value"] / value - 1))
-        low, high = found["interval_95"]
-        covered.append(low <= value <= high)
+        ends = found["interval_95"]
+        covered.append(ends is not None and ends[0] <= value <= ends[1])
     return tuple(errors), tuple(covered)
 
 

@@ -14,7 +14,7 @@ module trajectory
   implicit none
   private
 
-  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, conclude
+  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, conclude
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -130,16 +130,23 @@ contains
     call advance(moving, course%state, course%until, course%tally, course%reason, slip_speed=speed)
   end subroutine go_past_turn
 
-  !> Sections to come where nothing is due but the question whether the motion has been captured, and no answer stops it.
+  !> Sections to come where nothing is due but the question whether the motion has been captured.
   pure integer function sections_ahead(moving, span, course)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(course_t), intent(in) :: course
     sections_ahead = 0
-    if (span%stop_when_captured .or. course%phase == phase_extension .or. course%until < moving%machine%period) return
+    if (course%until < moving%machine%period .or. course%since > 0) return
     ! One is left out in case that rounding shifts the last.
     sections_ahead = max(0, int((end_of_phase(span, course%phase) - course%elapsed)/moving%machine%period) - 2)
   end function sections_ahead
+
+  !> Whether a course is over as soon as it is captured.
+  pure logical function ends_captured(span, course)
+    type(span_t), intent(in) :: span
+    type(course_t), intent(in) :: course
+    ends_captured = span%stop_when_captured .or. course%phase == phase_extension
+  end function ends_captured
 
   !> What is due at a stop, the state being there: has the motion been captured, is a phase over, where to stop next.
   !> `slipped` tells whether the body moved since the last stop.
@@ -161,8 +168,7 @@ contains
         course%elapsed = phase_end
       end if
     end if
-    ended = course%reason /= 0 .or. (course%captured > 0 .and. (span%stop_when_captured .or. &
-                                                                course%phase == phase_extension))
+    ended = course%reason /= 0 .or. (course%captured > 0 .and. ends_captured(span, course))
     if (ended .or. course%elapsed >= phase_end) call end_phase(moving, span, size(catalogue) > 0, ended, course, outcome)
     if (course%phase /= phase_over) call set_stop(moving, span, course)
   end subroutine pass_stop

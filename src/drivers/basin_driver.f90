@@ -24,7 +24,7 @@ module basin_driver
   use refined_tile, only: layers_of, pilot_share
   use pair, only: is_pair
   use session, only: describe_file, identity_of, open_session, session_t
-  use shard, only: describe_shard, finish_shard, shard_path
+  use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
   use status, only: last_reason, exit_done, reason_settled
   use text, only: to_text
@@ -109,6 +109,7 @@ contains
     if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema, &
                                                pack_catalogues(work%catalogues, spread(.true., 1, size(work%catalogues))))
     call open_tiles(session, path, schema, dimensions, tile, file)
+    if (command%search_only) call finish_search(session, file)
     call run_tiles(session, file, work, complete)
     if (command%shard > 0 .and. complete) call finish_shard(session, file)
     call end_basin(session, work, file, complete)
@@ -291,6 +292,7 @@ contains
   subroutine report_catalogue(session, work)
     type(session_t), intent(inout) :: session
     type(basin_work_t), intent(in) :: work
+    character(len=:), allocatable :: source
     integer :: i, k, last
     if (size(work%catalogues) == 0) then
       call session%journal%line('catalogue', 'no start is an axis: every point has its own attractor, unlabelled')
@@ -300,8 +302,10 @@ contains
     do i = 1, size(work%catalogues)
       last = max(last, maxval([0, work%catalogues(i)%attractors%id]))
     end do
+    source = ' discovered'
+    if (len(session%command%catalogue) > 0) source = ' taken from '//session%command%catalogue
     call session%journal%line('catalogue', counted(last, 'attractor')//' in '//counted(size(work%catalogues), 'slice')// &
-      ' discovered', '"attractors": '//to_text(last))
+      source, '"attractors": '//to_text(last))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
       associate (a => work%catalogues(1)%attractors(k))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from program import CASE, listing
 from separatrix.discovery.cli import main
-from separatrix.discovery.records import read_record
+from separatrix.discovery.records import make_record, read_record, unique_names
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -50,6 +50,10 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         head[0] = "# units: s, furlong"
     elif kind == "clipped":
         x = np.minimum(x, 0.9)
+    elif kind == "still drive":
+        head.append("# drive_frequency_rad_s: 0")
+    elif kind == "negative noise":
+        head.append("# sensor_noise_sigma_m_s: -1")
     elif kind == "short":
         t, x = t[:40], x[:40]
     return t, x, head
@@ -65,6 +69,8 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         ("unit", ["furlong", "expected"]),
         ("clipped", ["clipped"]),
         ("short", ["40 samples"]),
+        ("still drive", ["'drive_frequency_rad_s' is 0"]),
+        ("negative noise", ["'sensor_noise_sigma_m_s' is -1"]),
     ],
 )
 def test_faults_are_refused_with_their_place(tmp_path, kind, words):
@@ -106,6 +112,25 @@ def test_units_and_hdf5(tmp_path):
     stored = read_record(tmp_path / "record.h5")
     assert np.array_equal(stored.x, wanted.x)
     assert stored.header["drive_ratio"] == 1.2
+
+
+def test_a_body_at_rest_may_show_one_value(tmp_path):
+    """A coarse sensor shows one value, or two of its steps."""
+    t, x = rows()
+    x[:] = 0.5
+    for count in (0, 200):
+        x[:count] = 0.51
+        path = write(tmp_path / "rest.csv", t, x)
+        assert np.array_equal(read_record(path, at_rest=True).x, x)
+    with pytest.raises(SeparatrixError, match="constant"):
+        read_record(write(tmp_path / "rest.csv", t, 0 * x))
+
+
+def test_records_get_names_of_their_own(tmp_path):
+    names = ["a", "a", "a_2", "b", "a"]
+    records = [make_record(name, dict(zip("tx", rows(), strict=True))) for name in names]
+    unique_names(records)
+    assert [one.name for one in records] == ["a", "a_3", "a_2", "b", "a_4"]
 
 
 @pytest.mark.parametrize("fault", ["nan", "other machine", "coarse", "no such file"])

@@ -63,6 +63,13 @@ _GAIN = (
 )
 _SHIFT = "where the position of the barrier is fitted, a shifted sensor is a constant force"
 
+
+def _asymmetry(scales: Scales) -> dict[str, list[float]]:
+    """Both parts of friction that differs with the direction; the dry part within the machine's friction."""
+    dry = {"coulomb": [min(0.02 * scales.force, 0.5 * scales.friction)]} if scales.friction > 0 else {}
+    return dry | {"viscous": [0.02 * scales.force / scales.speed]}
+
+
 CATALOGUE: tuple[Effect, ...] = (
     Effect("viscous", lambda s: {"damping": [0.02 * s.force / s.speed]}, ("damping",)),
     Effect("coulomb", lambda s: {"force": [0.02 * s.force]}, ("force",)),
@@ -82,7 +89,7 @@ CATALOGUE: tuple[Effect, ...] = (
     ),
     Effect(
         "asymmetric_friction",
-        lambda s: {"coulomb": [0.02 * s.force], "viscous": [0.02 * s.force / s.speed]},
+        _asymmetry,
         ("coulomb", "viscous"),
         equivalent={"offset_force": _SLIDING, "sensor_bias": _SHIFT, "sensor_gain": _GAIN},
     ),

@@ -13,6 +13,7 @@ from separatrix.discovery.catalogue import BY_NAME
 from separatrix.discovery.extend import write_all
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.discovery.wording import with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import SeparatrixError
 from separatrix.version import __version__
@@ -74,8 +75,7 @@ def summary(verdict: dict) -> list[str]:
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):
-            unit = "" if found["unit"] == "1" else f" {found['unit']}"
-            lines.append(f"  {path} = {found['value']:.4g} +- {found['standard_error']:.2g}{unit}")
+            lines.append(f"  {path} = {with_error(found, 4)}")
     for use, gap in verdict["gap"].items():
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"

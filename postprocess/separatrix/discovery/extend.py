@@ -14,6 +14,7 @@ from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.verdict import Findings
+from separatrix.discovery.wording import with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
 
@@ -29,6 +30,9 @@ def write_all(folder: Path, verdict: dict, findings: Findings) -> list[Path]:
             if findings.decision.accepted:
                 made.append(work / "extended.toml")
                 made[-1].write_text(extended_case(verdict, findings), encoding="utf-8")
+            else:
+                # that of an earlier run would look like one of this
+                (folder / "extended.toml").unlink(missing_ok=True)
             for path in made:
                 path.replace(folder / path.name)
     except OSError as error:
@@ -66,8 +70,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
     for path in fitted.model.parameters:
         found = verdict["parameters"].get(path)
         if found:
-            unit = "" if found["unit"] == "1" else f" {found['unit']}"
-            lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
+            lines.append(f"# {path} = {with_error(found, 6)}")
     return "\n".join([*lines, machine_text(fitted)])
 
 
@@ -155,7 +158,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             length = inside.shape[1]
             group["residual"] = fit.evaluation.residual[rows, :length][inside]
             group["good"] = fit.good[rows]
-            group.attrs["crank_angle"] = problem.crank_angle(number, fit.values, float(prepared.record.t[0]))
+            group.attrs["crank_angle"] = float(problem.crank_angle(number, fit.values, prepared.record.t[0]))
             impacts = fit.evaluation.impacts[number]
             group["impacts"] = np.zeros((0, 5)) if impacts is None else impacts
             group["impacts"].attrs["columns"] = "segment time speed_before speed_after side"
