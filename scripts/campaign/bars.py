@@ -60,8 +60,8 @@ def bars(found: list[Score]) -> list[list[str]]:
 
 
 def lead(strong: list[Score], method: str) -> list[str]:
-    """Points by which more single effects are named rightly than by a baseline, of all asked."""
-    single = [one for one in strong if one.kind == "single" and method in one.baselines_right]
+    """Points by which more effects are named rightly than by a baseline, of all that it has a term for."""
+    single = [one for one in strong if one.comparable and method in one.baselines_right]
     ours, theirs = rate([one.right for one in single]), rate([one.baselines_right[method] for one in single])
     points = 100 * (ours.share - theirs.share)
     low, high = (100 * end for end in difference(ours, theirs))

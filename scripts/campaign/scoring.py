@@ -7,6 +7,16 @@ from dataclasses import dataclass
 
 EQUIVALENT = frozenset({"offset_force", "asymmetric_friction", "sensor_bias", "sensor_gain"})
 """One motion while the body slides and scale, friction and barrier are free: only a set is right."""
+HAVE_A_TERM = EQUIVALENT | {
+    "viscous",
+    "coulomb",
+    "quadratic_drag",
+    "stribeck",
+    "position_dependent_friction",
+    "cubic_spring",
+    "drive_ripple",
+}
+"""Effects that the baselines can name: they have the force as a term, or a constant for the set."""
 STRONG = 5.0
 """d' from which on the bars count."""
 SEPARABLE = 3.0
@@ -62,6 +72,11 @@ class Score:
     def strong(self) -> bool:
         """Whether the bars on names count for it."""
         return self.in_catalogue and self.d_prime >= STRONG
+
+    @property
+    def comparable(self) -> bool:
+        """Whether the baselines could have named it."""
+        return self.kind == "single" and self.truth in HAVE_A_TERM
 
     @property
     def separable(self) -> bool:

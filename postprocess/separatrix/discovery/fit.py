@@ -39,11 +39,9 @@ class Reduced:
     matrix: np.ndarray
     gradient: np.ndarray
 
-    def total(self, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Sum over the segments, each counted `weights` times."""
-        if weights is None:
-            return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
-        return np.tensordot(weights, self.matrix, 1), np.tensordot(weights, self.gradient, 1)
+    def total(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sum over the segments."""
+        return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
 
 
 @dataclass

@@ -124,6 +124,7 @@ def _records(findings: Findings) -> list[dict]:
                     "memory": one.memory,
                     "resolution": one.resolution,
                     "drive_frequency": one.frequency,
+                    "drive_scale": one.drive_scale,
                     "phase_known": one.phase_known,
                 }
             )

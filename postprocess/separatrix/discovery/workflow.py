@@ -11,7 +11,7 @@ import numpy as np
 from separatrix.discovery.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
-from separatrix.discovery.machine import record_nuisances, with_values
+from separatrix.discovery.machine import on_other_records, with_values
 from separatrix.discovery.options import Options
 from separatrix.discovery.partial import decide_in_part
 from separatrix.discovery.preflight import prepare
@@ -71,13 +71,7 @@ def investigate(
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
     """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
     free = with_values(fitted.problem.free, fitted.fit.values)
-    shared = [one for one in free if one.record is None]
-    own = (
-        record_nuisances([one.phase_known for one in held_out.prepared])
-        if held_out.prepared[0].frequency
-        else []
-    )
-    whole = shared + own
+    whole = on_other_records(free, held_out.prepared)
     find_phases(held_out, model, whole)
     problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0, 1])
     measure_noise(held_out, problem, fit, mass)
