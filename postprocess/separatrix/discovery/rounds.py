@@ -97,7 +97,9 @@ def run_round(
     known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick, known.get(name))
+        fitted = refit(
+            bench.training, base, candidates[name], screened, rival, options.quick, known.get(name)
+        )
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted, foretold)))
@@ -144,7 +146,7 @@ def _cross(
 
 def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
-    order = sorted(screened.names, key=lambda name: -screened.gain[name])
+    order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
     if base.fit.reduced_chi2 > _BAD and not options.quick:
         return order
     return [
