@@ -43,6 +43,8 @@ def rescued(
     places = np.tile(np.repeat(np.arange(len(guesses)), len(_TRIED)), suspects.size)
     begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
     promising = _promising(copies.evaluate(fit.values, begin, derivatives=False), tries)
+    if not promising.size:
+        return fit.starts, improved
     rows, begin = rows[promising], begin[promising]
     found, cost = solve_starts(copies.of_segments(promising), fit.values, begin)
     starts = fit.starts.copy()
