@@ -98,7 +98,9 @@ def run_round(
     known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick, known.get(name))
+        fitted = refit(
+            bench.training, base, candidates[name], screened, rival, options.quick, known.get(name)
+        )
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted, foretold)))
