@@ -145,7 +145,8 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
         if root.size:
             squares = np.sum((draws[:, first:last] @ root.T) ** 2, axis=1)
             lowest = np.minimum(lowest, chi2.sf(squares, root.shape[0]))
-    return float(np.log1p(-_TAIL) / np.log1p(-np.quantile(lowest, _TAIL)))
+    tests = np.log1p(-_TAIL) / np.log1p(-np.quantile(lowest, _TAIL))
+    return float(np.clip(tests, 1, edges[-1]))
 
 
 def project(
