@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from program import CASE
-from separatrix.discovery import motion
+from separatrix.discovery import comparison
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
 from separatrix.library import Model
@@ -305,13 +305,13 @@ def test_maps_before_and_after(
     make(tmp_path, "named")
     (tmp_path / "base.toml").write_text(CASE)
     (tmp_path / "extended.toml").write_text(CASE + "[effect.restitution_slope]\nslope = 0.06\n")
-    flown, fly = [], motion.impact_speeds
+    flown, fly = [], comparison.impact_speeds
 
     def kept(program: Path, case: Path, *more: object) -> np.ndarray:
         flown.append(Model.read(case).parameters["drive.cosine[1]"].value)
         return fly(program, case, *more)
 
-    monkeypatch.setattr(motion, "impact_speeds", kept)
+    monkeypatch.setattr(comparison, "impact_speeds", kept)
     html, _ = write_report(tmp_path, tmp_path / "base.toml")
     # half of the drive, as the record says
     assert flown == pytest.approx(2 * [0.5 * Model.from_text(CASE).parameters["drive.cosine[1]"].value])

@@ -49,13 +49,6 @@ class Problem:
         self.amplitudes = drive_amplitudes(model)
         self._parts = [self._part(number) for number in range(len(prepared))]
 
-    def with_free(self, free: list[Free]) -> "Problem":
-        """The same segments with other free parameters."""
-        other = object.__new__(Problem)
-        other.__dict__.update(self.__dict__)
-        other.free = free
-        return other
-
     def of_segments(self, rows: np.ndarray) -> "Problem":
         """The same problem with these segments only; a segment may come several times."""
         old = self.segments

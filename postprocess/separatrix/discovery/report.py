@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from separatrix import style
 from separatrix.discovery import figures, where_figures
-from separatrix.discovery.motion import compare
+from separatrix.discovery.comparison import compare
 from separatrix.discovery.options import Options
 from separatrix.discovery.pages import Picture, Section, write_html, write_pdf
 from separatrix.discovery.story import names, sections
