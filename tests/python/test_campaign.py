@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
 import pytest
 
@@ -220,6 +221,24 @@ def test_a_parameter_at_its_bound_is_not_covered(campaign):
     assert one.errors == pytest.approx((0, 1))
 
 
+def test_the_clearest_region_is_judged(campaign):
+    where = [
+        {"map": "drive phase", "force": 0.5, "error": 0.2},
+        {"map": "time since the last impact", "force": -3.0, "error": 0.1},
+    ]
+    region = campaign[1].region
+    assert region(["restitution_slope"], where) is True
+    assert region(["drive_ripple"], where) is False
+    assert region(["sensor_bias"], where) is None
+    assert region(["restitution_slope"], []) is None
+
+
+def test_a_decoy_that_could_be_named_counts(campaign):
+    said = verdict("none", decoys={"tested": 9, "accepted": True})
+    assert campaign[1].score(truth([], "none"), said).decoy
+    assert not campaign[1].score(truth([], "none"), verdict("none")).decoy
+
+
 def test_removed_excess(campaign):
     assert campaign[1].removed({"before": 3.0, "after": 1.5}) == pytest.approx(0.75)
     assert campaign[1].removed({"before": 3.0, "after": 0.9}) == 1
@@ -246,9 +265,11 @@ def test_the_baselines_name_what_is_large(campaign, tmp_path, name, size):
     import effects
     import records
 
-    number = next(n for n in range(200) if design.plan(SEED, n)[0] == "none")
-    case = design.draw(SEED, number)
-    case.level, case.colour, case.velocity, case.crank_angle = 1e-4, "white", True, True
+    # the filter rounds the jump of dry friction and raises a false alarm, not in a viscous machine
+    regime = "damped" if size > 0 else "viscous"
+    drawn = (design.draw(SEED, n) for n in range(400) if design.plan(SEED, n)[0] == "none")
+    case = next(one for one in drawn if one.regime == regime)
+    case.level, case.colour, case.velocity, case.crank_angle = 1e-4 if size > 0 else 1e-2, "white", True, True
     for experiment in (*case.training, case.held_out):
         experiment.samples_per_period = 400
     if size > 0:
@@ -256,11 +277,13 @@ def test_the_baselines_name_what_is_large(campaign, tmp_path, name, size):
         case.machine = case.hidden[0].on(case.base)
     records.write_case(tmp_path, tmp_path / "truth.json", case)
     training = [tmp_path / name for name in records.TRAINING]
+    known = set(baselines.terms(tomllib.loads((tmp_path / records.BASE).read_text()), training).names)
+    # a constant stands for the sensor; the friction that the base machine has is none of the terms
+    others = {"sensor_bias", "sensor_gain", "viscous", "coulomb"}
+    assert known - others == campaign[1].HAVE_A_TERM - others
     found = baselines.verdicts(tmp_path / records.BASE, training, 1)
-    if size > 0:
-        assert set(found.values()) == {name}
-    else:
-        assert set(found) == {"STLSQ", "ensemble SINDy"}
+    assert set(found) == {"STLSQ", "ensemble SINDy"}
+    assert set(found.values()) == {name}
 
 
 @pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--many", 64), ("--cases", 64)])

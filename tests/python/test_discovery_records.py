@@ -8,8 +8,10 @@ import h5py
 import numpy as np
 import pytest
 from program import CASE, listing
+from separatrix.discovery import cli
 from separatrix.discovery.cli import main
 from separatrix.discovery.records import make_record, read_record, unique_names
+from separatrix.discovery.results import FILES
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -156,6 +158,38 @@ def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault)
     assert main([str(word) for word in arguments]) == (66 if fault == "no such file" else 65)
     assert "separatrix-discover: " in capsys.readouterr().err
     assert listing(tmp_path) == before
+
+
+@pytest.mark.parametrize("earlier", [True, False])
+def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys, earlier):
+    """Neither half of a new result nor a mixture with an old one."""
+    out = tmp_path / "folder" / "out"
+    if earlier:
+        out.mkdir(parents=True)
+        for name in (*FILES, "notes.txt"):
+            (out / name).write_text("of an earlier run")
+    before = listing(tmp_path)
+
+    def write(folder: Path, *_: object) -> None:
+        (folder / "verdict.json").write_text("new")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
+    verdict |= {"reasons": [], "separating_experiment": "", "warnings": []}
+    monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
+    monkeypatch.setattr(cli, "write_results", write)
+    monkeypatch.setattr(cli, "write_report", fail)
+    arguments = ["base.toml", "record.csv", "--out", str(out), "-q"]
+    assert main(arguments) == 73
+    assert f"{out}: No space left" in capsys.readouterr().err
+    assert listing(tmp_path) == before
+    assert out.parent.exists() == earlier
+    monkeypatch.setattr(cli, "write_report", lambda *_: None)
+    assert main(arguments) == 0
+    left = {path.name: path.read_text() for path in out.iterdir()}
+    assert left == {"verdict.json": "new"} | ({"notes.txt": "of an earlier run"} if earlier else {})
 
 
 def test_usage(capsys):

@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from program import CASE
+from separatrix.discovery import comparison
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.library import Model
 
 SECTIONS = [
     "verdict", "compared", "gap", "where", "missing", "confusable", "residuals", "impacts", "held-out",
@@ -130,7 +132,7 @@ def verdict(outcome: str) -> dict:
         "records": [
             {
                 "name": name, "use": use, "samples": 600, "sigma": 1e-3, "memory": 0.0, "resolution": 0.0,
-                "drive_frequency": RATE, "phase_known": True,
+                "drive_frequency": RATE, "drive_scale": 0.5, "phase_known": True,
             }
             for name, use in (("f0", "training"), ("f1", "held out"))
         ],
@@ -303,7 +305,16 @@ def test_maps_before_and_after(
     make(tmp_path, "named")
     (tmp_path / "base.toml").write_text(CASE)
     (tmp_path / "extended.toml").write_text(CASE + "[effect.restitution_slope]\nslope = 0.06\n")
+    flown, fly = [], comparison.impact_speeds
+
+    def kept(program: Path, case: Path, *more: object) -> np.ndarray:
+        flown.append(Model.read(case).parameters["drive.cosine[1]"].value)
+        return fly(program, case, *more)
+
+    monkeypatch.setattr(comparison, "impact_speeds", kept)
     html, _ = write_report(tmp_path, tmp_path / "base.toml")
+    # half of the drive, as the record says
+    assert flown == pytest.approx(2 * [0.5 * Model.from_text(CASE).parameters["drive.cosine[1]"].value])
     page = Page(html.read_text())
     assert {"bifurcation", "impact-speeds"} <= {name for name, _ in page.pictures}
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The base machine fitted honestly: noise measured, phases found, several starts."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
@@ -118,11 +116,3 @@ def copy_noise(source: Data, target: Data) -> None:
     memory = float(np.mean([one.memory for one in source.prepared]))
     for one in target.prepared:
         one.memory = memory
-
-
-def with_fitted_values(base: Fitted) -> list[Free]:
-    """What is free in the base, with the fitted values."""
-    return [
-        replace(one, value=float(value))
-        for one, value in zip(base.problem.free, base.fit.values, strict=True)
-    ]

@@ -47,13 +47,8 @@ class Effect:
     linear: tuple[str, ...] = ()
     positive: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    sensor: bool = False
     # effects that are the same motion, and when
     equivalent: dict[str, str] = field(default_factory=dict)
-
-    def paths(self, scales: Scales) -> list[str]:
-        """Paths of its parameters."""
-        return [f"effect.{self.name}.{key}" for key in self.starts(scales)]
 
 
 _FAR = 20.0
@@ -134,17 +129,15 @@ CATALOGUE: tuple[Effect, ...] = (
         "sensor_bias",
         lambda s: {"bias": [0.01 * s.length]},
         ("bias",),
-        sensor=True,
         equivalent={"offset_force": _SHIFT, "asymmetric_friction": _SHIFT, "sensor_gain": _GAIN},
     ),
     Effect(
         "sensor_gain",
         lambda s: {"gain": [0.01]},
         ("gain",),
-        sensor=True,
         equivalent={"offset_force": _GAIN, "asymmetric_friction": _GAIN, "sensor_bias": _GAIN},
     ),
-    Effect("sensor_delay", lambda s: {"delay": [0.2 * s.interval]}, ("delay",), sensor=True),
+    Effect("sensor_delay", lambda s: {"delay": [0.2 * s.interval]}, ("delay",)),
 )
 
 BY_NAME = {effect.name: effect for effect in CATALOGUE}

@@ -55,14 +55,14 @@ class Ceiling:
         return min(self.families, key=lambda one: one.p)
 
 
-def ceiling(problem: Problem, fit: Fit, mass: float, inflation: float = 1.0) -> Ceiling:
+def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
     """Try every family on the residuals of a fit."""
     families = []
     for name, columns in _families(problem, fit, mass).items():
         gain, rank = _gain(fit, columns)
-        families.append(Family(name, gain, rank, float(chi2.sf(gain / inflation, rank)) if rank else 1.0))
+        families.append(Family(name, gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     gain, rank = _piecewise_gain(problem, fit, mass)
-    families.append(Family("pieces", gain, rank, float(chi2.sf(gain / inflation, rank)) if rank else 1.0))
+    families.append(Family("pieces", gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     return Ceiling(families)
 
 
@@ -102,7 +102,7 @@ def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int
 
 
 def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
-    state = motion(problem, fit)
+    state = scaled_motion(problem, fit)
     good = problem.segments.inside & fit.good[:, None]
     x, v, phase, time = state["x"], state["v"], state["phase"], state["time"]
     sign = np.sign(v)
@@ -132,7 +132,7 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     return made
 
 
-def motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
+def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
     """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
     inside = problem.segments.inside
     x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()

@@ -6,8 +6,8 @@ Only what belongs to the record itself is fitted to it: the starts of its segmen
 clock. The score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted
 parameters.
 
-Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be forgiven
-more; such machines are compared by their squared errors alone.
+Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
+forgiven more; such machines are compared by their squared errors alone.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
 from separatrix.discovery.fit import Fit, minimise
-from separatrix.discovery.machine import Free, record_nuisances
+from separatrix.discovery.machine import Free, on_other_records
 from separatrix.discovery.problem import Problem
 
 # reduced chi^2 above which errors of the machine are larger than the noise
@@ -58,9 +58,8 @@ def predict(
     `guess`: starts of segments that another machine found there, tried too.
     """
     shared = [i for i, one in enumerate(free) if one.record is None]
-    own = record_nuisances([one.phase_known for one in data.prepared]) if data.prepared[0].frequency else []
-    whole = [free[i] for i in shared] + own
-    start = np.concatenate([values[shared], np.zeros(len(own))])
+    whole = on_other_records(free, data.prepared)
+    start = np.concatenate([values[shared], np.zeros(len(whole) - len(shared))])
     fixed = np.arange(len(whole)) < len(shared)
     problem, fit = _fit_own(data, model, whole, start, fixed)
     if guess is not None:
@@ -73,11 +72,11 @@ def predict(
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
-    """What `one` foretells better than `other` by segment, in units of log density; 0 where one of them fails.
+    """What `one` foretells better than `other` by segment, in units of log density; 0 where one fails.
 
-    The difference of the scores. Where both machines miss the records by far more than the noise, their densities mean
-    nothing, and it is the difference of squared errors (the comparison of Diebold and Mariano), both machines
-    taken as fitted.
+    The difference of the scores. Where both machines miss the records by far more than the noise, their
+    densities mean nothing, and it is the difference of squared errors (the comparison of Diebold and
+    Mariano), both machines taken as fitted.
     """
     if min(one.misfit, other.misfit) > _MISFIT:
         parts = 0.5 * (other.fit.chi2 - one.fit.chi2)

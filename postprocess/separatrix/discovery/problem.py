@@ -49,13 +49,6 @@ class Problem:
         self.amplitudes = drive_amplitudes(model)
         self._parts = [self._part(number) for number in range(len(prepared))]
 
-    def with_free(self, free: list[Free]) -> "Problem":
-        """The same segments with other free parameters."""
-        other = object.__new__(Problem)
-        other.__dict__.update(self.__dict__)
-        other.free = free
-        return other
-
     def of_segments(self, rows: np.ndarray) -> "Problem":
         """The same problem with these segments only; a segment may come several times."""
         old = self.segments
@@ -247,14 +240,14 @@ class Problem:
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):
-                chain[row, j] = self._ratio_slope(one, number, chosen) * one.slope(values[j])
+                chain[row, j] = self._ratio_slope(one, values[j], number, chosen) * one.slope(values[j])
         return active, given, chain
 
-    def _ratio_slope(self, one: Free, number: int, chosen: dict[str, float]) -> float:
+    def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
         """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
         ratio = chosen["drive.ratio"]
         if one.path == "nuisance:clock" and one.record == number:
-            return ratio
+            return ratio / (1 + value)
         if one.path not in ("restoring.stiffness", "restoring.moment", "body.mass"):
             return 0.0
         step = 1e-5 * abs(chosen[one.path])

@@ -11,9 +11,9 @@ import numpy as np
 from separatrix.discovery.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
-from separatrix.discovery.machine import record_nuisances, with_values
+from separatrix.discovery.machine import on_other_records, with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.partial import decide_in_part
+from separatrix.discovery.partial import decide_in_part, nearest
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.records import Record, read_record, unique_names
 from separatrix.discovery.refit import Fitted
@@ -60,7 +60,11 @@ def investigate(
     if foretold is not None:
         _prepare_held_out(foretold, data, model, fitted, scales.mass)
     bench = Bench(data, foretold, scales, options)
-    decision = decide_in_part(bench, fitted) if options.partial else decide(bench, fitted)
+    if options.partial:
+        decision = decide_in_part(bench, fitted)
+    else:
+        decision = decide(bench, fitted)
+        decision.reasons += nearest(bench, decision)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)
@@ -71,13 +75,7 @@ def investigate(
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
     """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
     free = with_values(fitted.problem.free, fitted.fit.values)
-    shared = [one for one in free if one.record is None]
-    own = (
-        record_nuisances([one.phase_known for one in held_out.prepared])
-        if held_out.prepared[0].frequency
-        else []
-    )
-    whole = shared + own
+    whole = on_other_records(free, held_out.prepared)
     find_phases(held_out, model, whole)
     problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0, 1])
     measure_noise(held_out, problem, fit, mass)
