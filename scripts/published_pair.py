@@ -88,7 +88,7 @@ def run_tests(build: Path) -> list[list[str]]:
 
 
 def commands_of(commands: list[str]) -> str:
-    """Return the first commands of a section behind a fold; the others differ from them in numbers and laws."""
+    """Return the first commands of a section behind a fold; the others differ in numbers and laws."""
     lines = "\n".join(f"    {command}" for command in commands[:MOST_COMMANDS])
     more = len(commands) - MOST_COMMANDS
     tail = f"\n\n... and {more} with the other laws and numbers of the table." if more > 0 else ""

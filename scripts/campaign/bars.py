@@ -38,6 +38,14 @@ def bars(found: list[Score]) -> list[list[str]]:
         at_least("outside the catalogue, recognised", 0.80, [o.right for o in outside]),
         at_most("outside the catalogue, wrongly named", 0.10, [o.wrong_name for o in outside]),
     ]
+    rows += [
+        at_most("a decoy could be named, all cases", 0.02, [o.decoy for o in found]),
+        at_least(
+            "region of the effect, d' >= 5, rightly named",
+            0.90,
+            [o.region for o in strong if o.region is not None],
+        ),
+    ]
     precise = [one for one in found if one.right and one.in_catalogue and one.d_prime >= PRECISE]
     errors = [error for one in precise for error in one.errors]
     median = statistics.median(errors) if errors else math.nan

@@ -25,6 +25,25 @@ PRECISE = 10.0
 ANSWERS = ("named", "ambiguous", "none", "not-in-catalogue")
 
 
+SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
+PLANE, PHASE, IMPACT = "position and velocity", "drive phase", "time since the last impact"
+REGIONS = {
+    "viscous": {SPEED, PLANE},
+    "coulomb": {SPEED, REVERSAL, PLANE},
+    "quadratic_drag": {SPEED, PLANE},
+    "stribeck": {SPEED, REVERSAL, PLANE},
+    "static_excess": {REVERSAL},
+    "dahl": {REVERSAL, PLANE},
+    "position_dependent_friction": {PLANE},
+    "cubic_spring": {PLACE, PLANE},
+    "restitution_slope": {IMPACT},
+    "compliant_contact": {IMPACT},
+    "second_barrier": {PLACE, PLANE},
+    "drive_ripple": {PHASE},
+}
+"""Maps that an effect shows in; what acts in the whole motion or in the sensor has none."""
+
+
 @dataclass(frozen=True)
 class Score:
     """One case, judged."""
@@ -54,6 +73,10 @@ class Score:
     covered: tuple[bool, ...]
     removed: float
     """Share of the held-out excess that the verdict removed; NaN without excess or name."""
+    decoy: bool
+    """A decoy could have been named."""
+    region: bool | None
+    """The clearest region is one where the effect acts; None without region or rule."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -137,6 +160,8 @@ def score(truth: dict, result: dict) -> Score:
         errors=errors,
         covered=covered,
         removed=removed(held_out) if one_answer else math.nan,
+        decoy=bool(verdict.get("decoys", {}).get("accepted")),
+        region=region(truth["names"], verdict.get("where", [])) if one_answer and right else None,
         seconds=result["seconds"],
         baselines=result.get("baselines", {}),
         baselines_right={
@@ -146,6 +171,14 @@ def score(truth: dict, result: dict) -> Score:
             for method, named in result.get("baselines", {}).items()
         },
     )
+
+
+def region(names: list[str], where: list[dict]) -> bool | None:
+    """Whether the clearest flagged region lies in a map where one of the effects shows."""
+    if not where or not any(name in REGIONS for name in names):
+        return None
+    clearest = max(where, key=lambda one: abs(one["force"] / one["error"]))
+    return any(clearest["map"] in REGIONS.get(name, ()) for name in names)
 
 
 def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: bool, part: bool) -> str:

@@ -101,8 +101,8 @@ contains
     real(wp), intent(in) :: x, v, crank_angle
     type(course_t), intent(out) :: course
     course%strobe_t = start_strobe(moving, [x, v, crank_angle])
-    call reset_tally(course%tally, course%state)
-    if (.not. span%duration - span%window > 0) call open_window(course)
+    call reset_tally(course%tally, course%state, allocated(moving%pair))
+    if (.not. span%duration - span%window > 0) call open_window(moving, course)
     call set_stop(moving, span, course)
   end subroutine begin_course
 
@@ -164,10 +164,8 @@ contains
       if (course%until >= moving%machine%period) then
         course%elapsed = course%elapsed + (moving%machine%period - course%since)
         call note_section(moving, catalogue, slipped .or. course%since > 0, course, outcome)
-        course%since = 0
       else
         course%elapsed = phase_end
-        course%since = course%until
       end if
     end if
     ended = course%reason /= 0 .or. (course%captured > 0 .and. ends_captured(span, course))
@@ -227,7 +225,7 @@ contains
     select case (course%phase)
     case (phase_transient)
       if (ended) call note_state(course, outcome)
-      if (.not. ended) call open_window(course)
+      if (.not. ended) call open_window(moving, course)
     case (phase_window)
       outcome%window = features_over(moving, course%tally, span%window/moving%machine%period)
       call note_state(course, outcome)
@@ -250,14 +248,15 @@ contains
   end subroutine note_state
 
   !> Starts the statistics window.
-  pure subroutine open_window(course)
+  pure subroutine open_window(moving, course)
+    type(motion_t), intent(in) :: moving
     type(course_t), intent(inout) :: course
     course%phase = phase_window
     course%impacts = course%impacts + course%tally%impacts
     course%last_impact_speed = latest_impact_speed(course)
     course%grazing_margin = min(course%grazing_margin, course%tally%grazing_margin)
     course%tally%wants_v_max = .true.
-    call reset_tally(course%tally, course%state)
+    call reset_tally(course%tally, course%state, allocated(moving%pair))
   end subroutine open_window
 
   pure real(wp) function latest_impact_speed(course) result(speed)

@@ -181,7 +181,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   bool turns = layer && any(due & ~hit);
   if (turns) {
     turn = turn_in_layer(m, due & ~hit, g);
-    plain = pick(hit, plain, turn.sound);
+    plain = pick(hit, plain, turn.sound & (magnitude(turn.x) < m.domain));
     gap = pick(hit, gap, g.direction * (barrier - turn.x));
   }
   mask rare = due & ~plain;
@@ -197,7 +197,8 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   put(g.up_hits, up, g.hits);
   put(g.down_span, down, g.span);
   put(g.down_hits, down, g.hits);
-  put(g.flights, due, g.flights + 1.0);
+  // The event loop flies to the edge of the layer, in and out.
+  put(g.flights, due, g.flights + (turns ? pick(hit, 1, 3) : vec(1)));
   put(g.impacts, struck, g.impacts + 1.0);
   put(g.speed_sum, struck, g.speed_sum + w);
   put(g.last_speed, struck, w);
@@ -264,6 +265,7 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
       vec barrier = pick(upward, m.upper, m.lower);
       if (any(seek))
         left = look_ahead<damping, false>(m, seek, upward, barrier, g);
+      left = left | (flying & (g.flights >= g.budget));
       flying = flying & ~left & (g.start + g.span < g.until);
       if (any(flying))
         left = left | take_events<damping, false>(m, flying, upward, barrier, g);
@@ -288,6 +290,7 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
     vec barrier = pick(upward, m.upper, m.lower);
     if (any(seek))
       left = look_ahead<false, true>(m, seek, upward, barrier, g);
+    left = left | (flying & (g.flights >= g.budget));
     flying = flying & ~left;
     mask stops = flying & (g.start + g.span >= g.until), due = flying & ~stops & (g.hits > 0.5);
     if (!any(due) && any(stops)) {

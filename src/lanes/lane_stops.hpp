@@ -30,8 +30,10 @@ inline void take_stops(const lane_machine &m, mask there, const lane_batch &batc
   kinematics k = evaluate<damping>(m, g, g.until - g.start);
   mask section = there & (g.until >= m.period);
   vec captor = captors(batch, k.x, k.v);
-  mask passing = section & (g.sections > 0.5) & (g.flights <= g.budget) & ((captor < 0.5) | (g.leaves < 0.5));
+  mask passing =
+      section & (g.sections > 0.5) & (magnitude(k.x) <= m.domain) & ((captor < 0.5) | (g.leaves < 0.5));
   passing = batch.complete ? passing : mask{};
+  put(g.flights, there, g.flights + 1.0);
   put(g.x, there, k.x);
   put(g.v, there, k.v);
   put(g.time, there, pick(section, vec{}, g.until));

@@ -66,11 +66,11 @@ template <class T> struct lane_fields {
   // The event found at the end of the flight: 1 = found, when, whether at a barrier, the motion just before
   // it.
   T found, span, hits, end_x, end_v, end_a, end_j, end_re, end_im;
-  // Counts and extremes since the caller last took them away.
+  // Counts and extremes since the caller last took them away. A section ends a flight, too.
   T flights, impacts, speed_sum, last_speed, margin;
-  // Sections that the lane passes before it stops at one, if by then it has no more than so many flights;
-  // whether it stops where it is captured. Time since the start of the trajectory, the attractor that has
-  // captured it (0 = none), and since when (-1 = not).
+  // Sections that the lane passes before it stops at one; the flights after which it is left to the scalar
+  // code; whether it stops where it is captured. Time since the start of the trajectory, the attractor that
+  // has captured it (0 = none), and since when (-1 = not).
   T sections, budget, leaves, elapsed, captor, settled;
   // From here on with a Stribeck layer only. The time since the start of the flight at which the body leaves
   // the layer (`start_v`, ... are those then), and at which it enters it again or hits, with its motion.

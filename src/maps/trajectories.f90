@@ -10,7 +10,7 @@ module trajectories
     lane_stopped, occupy_lane, take_counts
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus
-  use status, only: reason_event_budget
+  use status, only: reason_left_domain
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_turn, go_to_stop, outcome_t, pass_stop, &
     phase_over, phase_window, run_trajectory, sections_ahead, span_t
   implicit none
@@ -129,7 +129,7 @@ contains
     type(lane_batch_t), intent(inout) :: batch
     batch%until(lane) = course%until
     batch%sections(lane) = sections_ahead(journey%moving, journey%span, course)
-    batch%budget(lane) = journey%moving%options%event_budget - course%tally%events
+    batch%budget(lane) = real(journey%moving%options%event_budget - course%tally%events, wp)
     batch%leaves(lane) = merge(1, 0, ends_captured(journey%span, course))
     batch%elapsed(lane) = course%elapsed
     batch%captor(lane) = course%captured
@@ -153,7 +153,7 @@ contains
       outcome%settle_time = batch%settled(lane)
       call lane_state(batch, lane, course%state)
       call take_counts(batch, lane, course%tally)
-      if (course%tally%events > journey%moving%options%event_budget) course%reason = reason_event_budget
+      if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
         if (journey%flow%layered) then

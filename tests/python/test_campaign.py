@@ -221,6 +221,24 @@ def test_a_parameter_at_its_bound_is_not_covered(campaign):
     assert one.errors == pytest.approx((0, 1))
 
 
+def test_the_clearest_region_is_judged(campaign):
+    where = [
+        {"map": "drive phase", "force": 0.5, "error": 0.2},
+        {"map": "time since the last impact", "force": -3.0, "error": 0.1},
+    ]
+    region = campaign[1].region
+    assert region(["restitution_slope"], where) is True
+    assert region(["drive_ripple"], where) is False
+    assert region(["sensor_bias"], where) is None
+    assert region(["restitution_slope"], []) is None
+
+
+def test_a_decoy_that_could_be_named_counts(campaign):
+    said = verdict("none", decoys={"tested": 9, "accepted": True})
+    assert campaign[1].score(truth([], "none"), said).decoy
+    assert not campaign[1].score(truth([], "none"), verdict("none")).decoy
+
+
 def test_removed_excess(campaign):
     assert campaign[1].removed({"before": 3.0, "after": 1.5}) == pytest.approx(0.75)
     assert campaign[1].removed({"before": 3.0, "after": 0.9}) == 1

@@ -62,7 +62,8 @@ class Fit:
     @property
     def converged(self) -> bool:
         """Certificate: along every direction the minimum is within half a standard error."""
-        return bool(self.decrement < max(_NEAR, 1e-4 * self.total) and np.isfinite(self.decrement))
+        small = self.decrement < max(_NEAR, 1e-4 * self.total) and np.isfinite(self.decrement)
+        return bool(small and self.good.any())
 
     @property
     def good(self) -> np.ndarray:
@@ -87,8 +88,8 @@ class Fit:
 
     @property
     def like_noise(self) -> bool:
-        """Whether chi^2 is what noise alone would leave, within two standard deviations or 3 %."""
-        return self.reduced_chi2 < 1 + max(_FINE, 2 * np.sqrt(2 / max(1, self.freedom)))
+        """Whether chi^2 is what noise alone would leave, within a standard deviation or 3 %."""
+        return self.freedom > 0 and self.reduced_chi2 < 1 + max(_FINE, np.sqrt(2 / self.freedom))
 
 
 def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:

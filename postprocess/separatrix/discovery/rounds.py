@@ -168,7 +168,7 @@ def _cross(
 
 def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
-    order = sorted(screened.names, key=lambda name: -screened.gain[name])
+    order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
     if base.fit.reduced_chi2 > _BAD and not options.quick:
         return order
     return [

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.decide import Decision
+from separatrix.discovery.decoys import decoys
 from separatrix.discovery.judge import Judged
 from separatrix.discovery.limits import detectable, equivalents, separating_experiment
 from separatrix.discovery.refit import Fitted
@@ -52,6 +53,7 @@ def verdict_of(findings: Findings) -> dict:
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
         "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
+        "decoys": decoys(first, bench.options),
         "candidates": [_candidate(one) for one in first.judged],
         "ceiling": {
             one.name: {"gain": one.gain, "rank": one.rank, "p": one.p}
