@@ -6,8 +6,8 @@ Only what belongs to the record itself is fitted to it: the starts of its segmen
 clock. The score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted
 parameters.
 
-Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be forgiven
-more; such machines are compared by their squared errors alone.
+Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
+forgiven more; such machines are compared by their squared errors alone.
 """
 
 from dataclasses import dataclass
@@ -72,11 +72,11 @@ def predict(
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
-    """What `one` foretells better than `other` by segment, in units of log density; 0 where one of them fails.
+    """What `one` foretells better than `other` by segment, in units of log density; 0 where one fails.
 
-    The difference of the scores. Where both machines miss the records by far more than the noise, their densities mean
-    nothing, and it is the difference of squared errors (the comparison of Diebold and Mariano), both machines
-    taken as fitted.
+    The difference of the scores. Where both machines miss the records by far more than the noise, their
+    densities mean nothing, and it is the difference of squared errors (the comparison of Diebold and
+    Mariano), both machines taken as fitted.
     """
     if min(one.misfit, other.misfit) > _MISFIT:
         parts = 0.5 * (other.fit.chi2 - one.fit.chi2)

@@ -59,7 +59,7 @@ def detection(one: Judged, tested: float, inflation: float) -> float:
 
 
 def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
-    """Lower and upper 5 % bound of the score gained in each held-out record, over its misfit, by block bootstrap."""
+    """Lower and upper 5 % bound of the gain in each held-out record, over the misfit, by block bootstrap."""
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
     for number in np.unique(one.prediction.record):
@@ -113,10 +113,7 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     lowest, highest = options.drive_scales
     for i, value in enumerate(fit.values):
         if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
-            return (
-                False,
-                "its velocity is beyond the usual speed of the records, where it is Coulomb friction",
-            )
+            return False, "its velocity is above the usual speed, where it is Coulomb friction"
         if free[i].path == "nuisance:drive_scale" and not lowest < value < highest:
             return False, f"it would need a drive {value:.3g} times the stated one"
     return True, ""

@@ -4,10 +4,10 @@
 
 The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by
 one (the first two together, if only that helps) as long as each passes every gate but the adequacy, which
-here is not to be had; the verdict says that it is not complete. Among wrong machines everything is significant in
-training, so held-out records choose: of the candidates that foretell no worse than the best, the
-one with the fewest parameters is taken, and each effect must close a share of the gap there that no other
-effect closes.
+here is not to be had; the verdict says that it is not complete. Among wrong machines everything is
+significant in training, so held-out records choose: of the candidates that foretell no worse than the best,
+the one with the fewest parameters is taken, and each effect must close a share of the gap there that no
+other effect closes.
 """
 
 from collections.abc import Iterable
@@ -24,12 +24,14 @@ from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 
 _PAIRS = 12
 _LEADERS = 2
+# share of what free forces close that a force of one thing must close to be most of it
+_MOST = 0.5
 # share of the gap on held-out records that an effect must close to be worth a name
 _LEAST = 0.1
 
 
 def decide_in_part(bench: Bench, base: Fitted) -> Decision:
-    """The strict decision on one effect, else the effects that help on every record, though more is missing."""
+    """Return the strict decision on one effect, else the effects that help though more is missing."""
     decision = decide(replace(bench, options=replace(bench.options, most_effects=1)), base)
     if decision.outcome != "not-in-catalogue":
         return decision
@@ -51,7 +53,6 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
     whole.gates, whole.p = last.gates, last.p
     whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
     complete = adequate(whole, bench.options)
-    gap = "named in part: what is left is not in the catalogue"
     return replace(
         decision,
         outcome="named",
@@ -60,20 +61,49 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
         alternatives=[],
         rivals=[],
         rounds=rounds,
-        reasons=[] if complete else [f"{gap}; forces that depend on {whole.ceiling.best.name} explain most of it"],
+        reasons=[] if complete else remaining(bench, whole),
     )
+
+
+def remaining(bench: Bench, whole: Judged) -> list[str]:
+    """What is left of the gap with the named effects, in words, by use of the records."""
+    said = ["named in part: what is left is not in the catalogue"]
+    fits = [("fitted", bench.training, whole.fitted, whole.fitted.fit.reduced_chi2)]
+    if whole.prediction is not None:
+        fits.append(("held-out", bench.held_out, whole.prediction, whole.prediction.reduced_chi2))
+    for use, data, found, left in fits:
+        families = ceiling(found.problem, found.fit, bench.scales.mass).families
+        free = next(one for one in families if one.name == "pieces")
+        best = max((one for one in families if one is not free), key=lambda one: one.gain)
+        names = ", ".join(one.record.name for one in data.prepared)
+        what = (
+            f"forces that depend on {best.name} would close most of it"
+            if best.gain > _MOST * free.gain
+            else "no force that depends on speed, place and time alone closes most of it, "
+            "as where the body or its drive is flexible"
+        )
+        said.append(f"a gap remains on the {use} record {names}, reduced chi^2 {left:.4g}: {what}")
+    return said
+
+
+def nearest(bench: Bench, decision: Decision) -> list[str]:
+    """Say which single effect a decision in part would name, where the strict one names none."""
+    if decision.outcome != "not-in-catalogue":
+        return []
+    found = _next(bench, decision.rounds[0])
+    return [f"{found.name} passes every gate but the adequacy: --partial names it"] if found else []
 
 
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
-    pool = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base, bench.options)[0]]
+    pool = [one for one in found.judged if settled(one) and admissible(one, found.base, bench.options)[0]]
     return _passing(bench, found, pool)
 
 
 def _pair(bench: Bench, found: Round) -> Judged | None:
     """Two effects that pass only together: each alone drives the base to where it should not be."""
     seconds = []
-    for one in [one for one in found.judged if one.fitted.fit.converged][:_LEADERS]:
+    for one in [one for one in found.judged if settled(one)][:_LEADERS]:
         # some effects need another one: presliding needs dry friction
         seconds.append(run_round(bench, one.fitted, one.prediction, 0.9, 0.95))
     singles = [one for second in seconds for one in second.judged]
@@ -85,7 +115,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
         fitted = fit_pair(bench, found, one, other)
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if _both_clear(one, found, bench.options)]
+    pairs = [one for one in pairs if settled(one) and _both_clear(one, found, bench.options)]
     best = _passing(bench, found, pairs)
     return best if best is not None and _all_needed(bench, found, best) else None
 
@@ -98,20 +128,25 @@ def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
     return all(clear) and admissible(pair, found.base, options)[0]
 
 
+def settled(one: Judged) -> bool:
+    """Whether a further step promises less than one residual: what sticks has kinks where no step is exact."""
+    fit = one.fitted.fit
+    return fit.converged or fit.decrement < fit.reduced_chi2
+
+
 def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
     if not pool:
         return None
     best, rivals = preferred(pool, bench.options)
     pass_gates(bench, best, found.base, rivals, found.screened.tests)
+    best.gates["converged"] = settled(best)
     best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
     return best if all(best.gates.values()) else None
 
 
 def preferred(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
-    """Return the simplest candidate that foretells no worse than the best, and those that are as simple and as
-    good.
-    """
+    """Return the simplest candidate that foretells no worse than the best, and those as simple and good."""
     leader = max(pool, key=lambda one: one.evidence)
     close = [leader, *(one for one in pool if one is not leader and not _clearly(leader, one, options))]
     fewest = min(one.parameters for one in close)

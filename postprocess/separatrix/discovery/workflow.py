@@ -13,7 +13,7 @@ from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
 from separatrix.discovery.machine import on_other_records, with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.partial import decide_in_part
+from separatrix.discovery.partial import decide_in_part, nearest
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.records import Record, read_record, unique_names
 from separatrix.discovery.refit import Fitted
@@ -60,7 +60,11 @@ def investigate(
     if foretold is not None:
         _prepare_held_out(foretold, data, model, fitted, scales.mass)
     bench = Bench(data, foretold, scales, options)
-    decision = decide_in_part(bench, fitted) if options.partial else decide(bench, fitted)
+    if options.partial:
+        decision = decide_in_part(bench, fitted)
+    else:
+        decision = decide(bench, fitted)
+        decision.reasons += nearest(bench, decision)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)
