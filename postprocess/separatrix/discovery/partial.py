@@ -52,7 +52,7 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
     whole = over_base(bench, base, rounds[0].foretold, last)
     whole.gates, whole.p = last.gates, last.p
     whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
-    complete, _ = adequate(whole, base, bench.options)
+    complete = adequate(whole, bench.options)
     return replace(
         decision,
         outcome="named",
@@ -96,7 +96,7 @@ def nearest(bench: Bench, decision: Decision) -> list[str]:
 
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
-    pool = [one for one in found.judged if settled(one) and admissible(one, found.base)[0]]
+    pool = [one for one in found.judged if settled(one) and admissible(one, found.base, bench.options)[0]]
     return _passing(bench, found, pool)
 
 
@@ -115,17 +115,17 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
         fitted = fit_pair(bench, found, one, other)
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if settled(one) and _both_clear(one, found)]
+    pairs = [one for one in pairs if settled(one) and _both_clear(one, found, bench.options)]
     best = _passing(bench, found, pairs)
     return best if best is not None and _all_needed(bench, found, best) else None
 
 
-def _both_clear(pair: Judged, found: Round) -> bool:
+def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
     """Whether every parameter of both effects is inside its bounds and differs from nothing."""
     fit = pair.fitted.fit
     errors = np.sqrt(np.diag(pair.fitted.covariance))
     clear = [not fit.at_bound[i] and abs(fit.values[i]) > 1.96 * errors[i] for i in pair.fitted.added]
-    return all(clear) and admissible(pair, found.base)[0]
+    return all(clear) and admissible(pair, found.base, options)[0]
 
 
 def settled(one: Judged) -> bool:

@@ -40,11 +40,6 @@ class Fitted:
     tries: int = 1
 
     @property
-    def paths(self) -> list[str]:
-        """Paths of the parameters of the effect that was added last."""
-        return [self.problem.free[i].path for i in self.added]
-
-    @property
     def covariance(self) -> np.ndarray:
         """Of all free parameters, starts projected out, enlarged where the fit is worse than the noise."""
         matrix = self.fit.reduced.matrix[self.fit.good].sum(axis=0)
