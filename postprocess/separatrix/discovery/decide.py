@@ -19,6 +19,7 @@ from separatrix.discovery.judge import (
     stable,
 )
 from separatrix.discovery.machine import with_values
+from separatrix.discovery.misfit import missed
 from separatrix.discovery.refit import Fitted, refit, shared_values
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.screen import screen, signature
@@ -166,6 +167,15 @@ def _equivalent(one: Judged, other: Judged) -> bool:
 
 def _without_name(bench: Bench, decision: Decision) -> Decision:
     """Nothing in the catalogue helps: either there is no gap, or the catalogue lacks what makes it."""
+    fits = [(bench.training, decision.rounds[0].base)]
+    if bench.held_out is not None and decision.foretold is not None:
+        fits.append((bench.held_out, decision.foretold))
+    left = [one for data, fitted in fits for one in missed(data, fitted.fit, bench.options)]
+    if left:
+        decision.outcome = "not-in-catalogue"
+        decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
+    elif fits[0][1].fit.reduced_chi2 > bench.options.adequate_chi2:
+        decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
     if decision.base_ceiling.p < bench.options.gap_share * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(

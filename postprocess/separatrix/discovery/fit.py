@@ -58,12 +58,14 @@ class Fit:
     iterations: int
     at_bound: np.ndarray
     movable: np.ndarray
+    # in a minimum that is known not to be the lowest
+    caught: bool = False
 
     @property
     def converged(self) -> bool:
         """Certificate: along every direction the minimum is within half a standard error."""
         small = self.decrement < max(_NEAR, 1e-4 * self.total) and np.isfinite(self.decrement)
-        return bool(small and self.good.any())
+        return bool(small and self.good.any() and not self.caught)
 
     @property
     def good(self) -> np.ndarray:

@@ -129,7 +129,7 @@ def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
 
 
 def settled(one: Judged) -> bool:
-    """Whether a further step promises less than one residual: what sticks has kinks where no step is exact."""
+    """Whether a step promises less than one residual: what sticks has kinks where no step is exact."""
     fit = one.fitted.fit
     return fit.converged or fit.decrement < fit.reduced_chi2
 

@@ -24,6 +24,8 @@ _BEATEN = 15.0
 _SPARED = 3
 # share of segments that one fit may follow more than another without being better
 _FEW = 0.1
+# log-likelihood by which a machine that contains the base may be worse than it
+_WORSE = 1.0
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -93,7 +95,26 @@ def refit(
             break
         if quick and tries == 2:
             break
-    return best
+    return _above_base(data, best, base, candidate)
+
+
+def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
+    """The fit, or one from the base where that is better: a machine that contains the base is no worse.
+
+    What stays worse has not found its minimum, whatever its last step promised.
+    """
+    if not candidate.linear.any() or gain_over(best, base)[0] > -_WORSE:
+        return best
+    values = _base_values(base, candidate)
+    added = np.array(candidate.added)
+    values[added[candidate.linear]] = 0.0
+    problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+    fit = minimise(problem, values, base.fit.starts)
+    found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
+    best = found if _better(found, best) else best
+    if gain_over(best, base)[0] > -_WORSE:
+        return best
+    return replace(best, fit=replace(best.fit, caught=True))
 
 
 def beaten(one: Fitted, rival: Fitted) -> bool:
