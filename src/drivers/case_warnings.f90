@@ -13,6 +13,7 @@ module case_warnings
   use kinds, only: int64, wp
   use motion, only: motion_t
   use pair, only: impact_mass
+  use strobe, only: has_section
   use text, only: to_text
   implicit none
   private
@@ -22,7 +23,8 @@ module case_warnings
 contains
 
   !> One line in the journal for each. Looks at the case itself, not along its axes.
-  subroutine warn_about(the_case, journal)
+  subroutine warn_about(command, the_case, journal)
+    character(len=*), intent(in) :: command
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
     type(grid_t) :: grid
@@ -37,9 +39,14 @@ contains
           call journal%line('warning', 'warning: body.blow_time = '//to_text(machine%blow_time)//' s is after the end, run.'// &
             'duration = '//to_text(the_case%run%duration)//' s: no blow falls')
         end if
+        if ((command == 'basin' .or. command == 'sweep') .and. .not. has_section(moving)) then
+          call journal%line('warning', 'warning: no attractors are looked for: with '//trim(merge('drive.sample_time', &
+            'body.blow        ', machine%sample_time > 0))//' the state at crank angle 0 does not tell what follows. Points '// &
+            'get the regime at the end of their run')
+        end if
       end associate
     end if
-    if (moving%machine%contact%soft) call warn_about_steps(the_case, moving, journal)
+    if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
   !> Says if a body that leans on a soft barrier would use up the steps of a trajectory.

@@ -13,7 +13,7 @@ module shard
   implicit none
   private
 
-  public :: in_shard, shard_path, describe_shard, finish_shard
+  public :: in_shard, shard_path, describe_shard, finish_search, finish_shard
 
   !> The catalogues of all slices as `pack_catalogues` makes them.
   character(len=*), parameter, public :: catalogue_dataset = '/shard/catalogue'
@@ -49,6 +49,18 @@ contains
     call schema%add_variable('catalogue', type_float64, ['packed'], data=packed, group='shard', &
                              long_name='catalogues of all slices')
   end subroutine describe_shard
+
+  !> Leaves the working file without a tile, for its catalogue, and ends the program.
+  subroutine finish_search(session, file)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    type(error_t), allocatable :: error
+    call file%close(session%team, error)
+    call session%stop_if(error)
+    call session%journal%line('shard', 'the attractors are in '//working_path(file%path)// &
+      '; the shares take them with --catalogue, and this one goes on with --resume')
+    call session%end_with(exit_done)
+  end subroutine finish_search
 
   !> Leaves the working file as it is for merge, and ends the program.
   subroutine finish_shard(session, file)

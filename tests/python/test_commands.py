@@ -357,3 +357,19 @@ def test_progress_on_a_terminal_rewrites_its_line(separatrix, tmp_path):
     # The search of the attractors has a line of its own where it takes long.
     assert text.count("\n") == sum(f" {things}, " in text for things in ("slices", "points"))
     assert "ETA" in text
+
+
+def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
+    """A trajectory that ran out of events is neither a motion with impacts nor one without."""
+    write_case(tmp_path)
+    more = ["--set", "integrator.event_budget=3", "--set", "attractors.sample=1", "-o", "out.h5"]
+    said = succeed(separatrix, *KINDS["sweep"], *more, folder=tmp_path).out
+    assert "run up: given up from 0.800000 to 1.40000 as event_budget" in said
+    assert "run down: given up from 0.800000 to 1.40000 as event_budget" in said
+    assert "ended as event_budget: 42 points" in said
+    assert "many starts" not in said
+    assert "neither start nor stop" not in said
+    plain = succeed(separatrix, *KINDS["sweep"], "-o", "plain.h5", folder=tmp_path).out
+    assert "given up" not in plain
+    assert "many starts" in plain
+    assert sum(map(int, re.findall(r"ended as \w+: (\d+) points", plain))) == 42

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from separatrix.discovery.ceiling import Ceiling
-from separatrix.discovery.heldout import Prediction
+from separatrix.discovery.heldout import Prediction, gained
 from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, gain_over
 
@@ -49,8 +49,7 @@ def judged(
     training, _ = gain_over(fitted, base)
     parts = np.zeros(0)
     if prediction is not None:
-        both = prediction.good & foretold.good
-        parts = np.where(both, prediction.score - foretold.score, 0.0)
+        parts = gained(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
     return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
 
@@ -62,12 +61,12 @@ def detection(one: Judged, tested: float, inflation: float) -> float:
 
 
 def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
-    """Lower and upper 5 % bound of the score gained in each held-out record, by block bootstrap."""
+    """Lower and upper 5 % bound of the gain in each held-out record, over the misfit, by block bootstrap."""
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
     for number in np.unique(one.prediction.record):
         parts = one.held_out_parts[one.prediction.record == number]
-        sums = _block_sums(parts, random, options.bootstraps)
+        sums = _block_sums(parts / one.prediction.misfit, random, options.bootstraps)
         bounds[int(number)] = (float(np.quantile(sums, 0.05)), float(np.quantile(sums, 0.95)))
     return bounds
 
@@ -112,10 +111,10 @@ def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):
         return False, "its 95 % intervals contain zero"
-    fastest = float(np.abs(fit.evaluation.v[fit.good]).max(initial=0))
+    usual = float(np.sqrt(np.mean(fit.evaluation.v[fit.good] ** 2))) if fit.good.any() else 0.0
     for i, value in enumerate(fit.values):
-        if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > fastest:
-            return False, "its velocity is beyond all speeds of the records, where it is Coulomb friction"
+        if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
+            return False, "its velocity is above the usual speed, where it is Coulomb friction"
         if free[i].path == "nuisance:drive_scale" and not 0.5 < value < 2:
             return False, f"it would need a drive {value:.3g} times the stated one"
     return True, ""

@@ -74,7 +74,7 @@ def refit(
     """
     best = None
     if known is not None:
-        best = _carried(data, candidate, known)
+        best = carried_on(data, candidate, known)
         if _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
@@ -107,8 +107,8 @@ def beaten(one: Fitted, rival: Fitted) -> bool:
     return bool(parts[_SPARED:].sum() < -2 * _BEATEN)
 
 
-def _carried(data: Data, candidate: Candidate, known: Fitted) -> Fitted:
-    """A fit made with another noise, carried on with the noise of now."""
+def carried_on(data: Data, candidate: Candidate, known: Fitted) -> Fitted:
+    """An earlier fit, carried on with the noise of now."""
     problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
     fit = minimise(problem, known.fit.values, known.fit.starts)
     return Fitted(candidate.names, candidate.model, problem, fit, candidate.added, known.tries)

@@ -160,8 +160,9 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
         if root.size:
             squares = np.sum((draws[:, first:last] @ root.T) ** 2, axis=1)
             lowest = np.minimum(lowest, chi2.sf(squares, root.shape[0]))
-    tests = np.log1p(-_TAIL) / np.log1p(-np.quantile(lowest, _TAIL))
-    return float(np.clip(tests, 1, edges[-1]))
+    # signatures that all but vanish are rounding; there are never more tests than parameters
+    least = max(float(np.quantile(lowest, _TAIL)), np.finfo(float).tiny)
+    return float(np.clip(np.log1p(-_TAIL) / np.log1p(-least), 1.0, edges[-1]))
 
 
 def project(
