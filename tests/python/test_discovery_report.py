@@ -16,6 +16,7 @@ from matplotlib.image import imread
 from program import CASE
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.discovery.story import sections
 
 SECTIONS = [
     "verdict", "compared", "gap", "where", "missing", "confusable", "residuals", "impacts", "held-out",
@@ -93,6 +94,7 @@ def verdict(outcome: str) -> dict:
         }  # fmt: skip
     return {
         "outcome": outcome,
+        "complete": True,
         "effects": effects,
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
         "equivalent": False,
@@ -236,6 +238,13 @@ def test_the_excess_that_was_removed(report: tuple) -> None:
         if removed == 0
         else float(cell.removesuffix(" %")) == pytest.approx(100 * removed, abs=0.06)
     )
+
+
+def test_a_verdict_in_part_says_that_a_gap_remains() -> None:
+    for complete in (True, False):
+        summary = sections(verdict("named") | {"complete": complete})[0].body[0]
+        assert ("a gap remains" in summary) != complete
+        assert ("All gates are passed" in summary) == complete
 
 
 def test_the_words_fit_the_outcome(report: tuple) -> None:

@@ -53,6 +53,7 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
     whole.gates, whole.p = last.gates, last.p
     whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
     complete, _ = adequate(whole, base, bench.options)
+    whole.gates["adequate"] = complete
     return replace(
         decision,
         outcome="named",
@@ -129,7 +130,7 @@ def _both_clear(pair: Judged, found: Round) -> bool:
 
 
 def settled(one: Judged) -> bool:
-    """Whether a further step promises less than one residual: what sticks has kinks where no step is exact."""
+    """Whether a further step promises less than one residual: what sticks has kinks where no step fits."""
     fit = one.fitted.fit
     return fit.converged or fit.decrement < fit.reduced_chi2
 
@@ -139,6 +140,8 @@ def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     if not pool:
         return None
     best, rivals = preferred(pool, bench.options)
+    # the strict decision may have asked for it
+    best.gates.pop("adequate", None)
     pass_gates(bench, best, found.base, rivals, found.screened.tests)
     best.gates["converged"] = settled(best)
     best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
