@@ -37,7 +37,7 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
         return decision
     base = decision.rounds[0].base
     rounds = decision.rounds[:1]
-    accepted = _next(bench, rounds[0]) or _pair(bench, rounds[0])
+    accepted = _first(bench, rounds[0])
     last = None
     while accepted is not None:
         last = accepted
@@ -88,17 +88,26 @@ def remaining(bench: Bench, whole: Judged) -> list[str]:
 
 
 def nearest(bench: Bench, decision: Decision) -> list[str]:
-    """Say which single effect a decision in part would name, where the strict one names none."""
+    """Say which single effect passes where the strict decision names none."""
     if decision.outcome != "not-in-catalogue":
         return []
     found = _next(bench, decision.rounds[0])
-    return [f"{found.name} passes every gate but the adequacy: --partial names it"] if found else []
+    said = "passes every gate but the adequacy; --partial names what helps though a gap remains"
+    return [f"{found.name} {said}"] if found else []
 
 
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
     pool = [one for one in found.judged if settled(one) and admissible(one, found.base)[0]]
     return _passing(bench, found, pool)
+
+
+def _first(bench: Bench, found: Round) -> Judged | None:
+    """One effect, or two where together they foretell clearly better than the one."""
+    single, pair = _next(bench, found), _pair(bench, found)
+    if single is None or pair is None:
+        return single or pair
+    return pair if _adds(pair, single, bench.options) else single
 
 
 def _pair(bench: Bench, found: Round) -> Judged | None:
@@ -167,6 +176,12 @@ def _clearly(one: Judged, other: Judged, options: Options) -> bool:
     return any(low > 0 for low, _ in held_out_bounds(over, options).values())
 
 
+def _adds(one: Judged, other: Judged, options: Options) -> bool:
+    """Whether `one` foretells better than `other` by more than chance and by enough."""
+    closes = one.prediction is None or _closes(other.prediction.reduced_chi2, one.prediction.reduced_chi2)
+    return closes and _clearly(one, other, options)
+
+
 def worth_a_name(one: Judged, found: Round) -> bool:
     """Whether a candidate closes enough of the gap that its base leaves on held-out records."""
     return one.prediction is None or _closes(found.foretold.reduced_chi2, one.prediction.reduced_chi2)
@@ -188,9 +203,7 @@ def _all_needed(bench: Bench, first: Round, one: Judged) -> bool:
             missed[name] = np.inf
             continue
         over = judged(without.fitted, without.prediction, one.fitted, one.prediction)
-        needed = _clearly(one, without, bench.options)
-        if one.prediction is not None:
-            needed = needed and _closes(without.prediction.reduced_chi2, one.prediction.reduced_chi2)
+        needed = _adds(one, without, bench.options)
         missed[name] = over.evidence if needed else -np.inf
     one.gates["drop"] = all(size > 0 for size in missed.values())
     one.fitted = replace(one.fitted, names=tuple(sorted(missed, key=lambda name: -missed[name])))
