@@ -4,7 +4,8 @@
 #
 # sbatch --array=1-8 --ntasks=16 --time=04:00:00 scripts/slurm/array.sh CASE OUTPUT [OPTIONS of separatrix basin]
 #
-# One share of a map for each element of a job array (from 1, without gaps); submit_array.sh also submits the merge.
+# One share of a map for each element of a job array (from 1, without gaps), which takes the attractors that search.sh
+# has found; submit_array.sh submits the search, the array and the merge.
 #SBATCH --job-name=separatrix-share
 #SBATCH --signal=USR1@180
 #SBATCH --requeue
@@ -19,6 +20,13 @@ shift 2
 share=$SLURM_ARRAY_TASK_ID shares=$SLURM_ARRAY_TASK_COUNT
 name=$output.shard-$share-of-$shares
 
+found=$output.shard-1-of-$shares.part
+if [[ ! -e $found ]]; then
+  echo "$found is missing; search.sh makes it" >&2
+  exit 66
+fi
+# The first share is written while the others read its attractors.
+export HDF5_USE_FILE_LOCKING=FALSE
 srun --mpi="${SEPARATRIX_SRUN_MPI:-pmix}" "$separatrix" basin "$case_file" -o "$output" --shard "$share/$shares" --resume \
-  --log "$name.log.jsonl" "$@"
+  --catalogue "$found" --log "$name.log.jsonl" "$@"
 end_job $? "$name.part"

@@ -4,7 +4,7 @@
 #
 # submit_array.sh [OPTIONS of sbatch] -- SHARES CASE OUTPUT [OPTIONS of separatrix basin]
 #
-# A job array of shares, and the merge that waits for all of them.
+# The search for the attractors, then a job array of shares, then the merge; each waits for the one before.
 set -euo pipefail
 options=()
 while (($# > 0)) && [[ $1 != -- ]]; do
@@ -22,7 +22,9 @@ SEPARATRIX_ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 export SEPARATRIX_ROOT
 here=$SEPARATRIX_ROOT/scripts/slurm
 
-array=$(sbatch --parsable --array="1-$shares" "${options[@]}" "$here/array.sh" "$case_file" "$output" "$@")
+search=$(sbatch --parsable "${options[@]}" "$here/search.sh" "$shares" "$case_file" "$output" "$@")
+array=$(sbatch --parsable --dependency="afterok:$search" --kill-on-invalid-dep=yes --array="1-$shares" "${options[@]}" \
+  "$here/array.sh" "$case_file" "$output" "$@")
 merge=$(sbatch --parsable --dependency="afterok:$array" --kill-on-invalid-dep=yes "$here/merge.sh" "$output" "$shares")
-echo "$array $merge"
-echo "job $array computes the shares, job $merge joins them" >&2
+echo "$search $array $merge"
+echo "job $search finds the attractors, job $array computes the shares, job $merge joins them" >&2

@@ -13,7 +13,7 @@ module bindings
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
     c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
-    c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
+    c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
     c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment
 
@@ -199,6 +199,19 @@ module bindings
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: descriptor
     end subroutine c_give_lock
+
+    integer(c_int) function c_open_append(path, descriptor) bind(c, name='separatrix_open_append')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), intent(out) :: descriptor
+    end function c_open_append
+
+    integer(c_int) function c_append(descriptor, text, length) bind(c, name='separatrix_append')
+      import :: c_char, c_int, c_int64_t
+      integer(c_int), value :: descriptor
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_int64_t), value :: length
+    end function c_append
 
     subroutine c_error_text(number, text, size) bind(c, name='separatrix_error_text')
       import :: c_char, c_int

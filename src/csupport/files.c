@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <libgen.h>
+#include <poll.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -137,6 +138,29 @@ void separatrix_give_lock(const char *path, int descriptor) {
     return;
   unlink(path);
   close(descriptor);
+}
+
+/* Opens a file, made if there is none, to write behind what is in it. */
+int separatrix_open_append(const char *path, int *descriptor) {
+  *descriptor = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  return *descriptor < 0 ? errno : 0;
+}
+
+int separatrix_append(int descriptor, const char *text, int64_t length) {
+  while (length > 0) {
+    const ssize_t written = write(descriptor, text, (size_t)length);
+    if (written >= 0) {
+      text += written;
+      length -= written;
+    } else if (errno == EAGAIN) {
+      /* A pipe that is full and does not wait by itself. */
+      struct pollfd room = {.fd = descriptor, .events = POLLOUT};
+      poll(&room, 1, -1);
+    } else if (errno != EINTR) {
+      return errno;
+    }
+  }
+  return 0;
 }
 
 void separatrix_error_text(int number, char *text, int size) {

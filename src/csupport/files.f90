@@ -4,8 +4,8 @@
 !> File operations that Fortran lacks. Errors name the file and the system's reason.
 module files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_error_text, c_file_exists, c_is_special, c_folder_status, c_free_bytes, &
-    c_give_lock, c_publish_file, c_remove_file, c_reserve_file, c_take_lock
+  use bindings, only: c_append, c_error_text, c_file_exists, c_is_special, c_folder_status, c_free_bytes, &
+    c_give_lock, c_open_append, c_publish_file, c_remove_file, c_reserve_file, c_take_lock
   use errors, only: error_t, fail
   use kinds, only: int64
   use status, only: exit_cannot_create, exit_io
@@ -14,7 +14,7 @@ module files
   private
 
   public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
-    take_lock, give_lock
+    take_lock, give_lock, open_append, append_line
 
 contains
 
@@ -87,6 +87,26 @@ contains
     integer, intent(in) :: lock
     call c_give_lock(path//c_null_char, int(lock, c_int))
   end subroutine give_lock
+
+  !> Opens a file, made if there is none, for lines behind what is in it; code 73.
+  subroutine open_append(path, descriptor, error)
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: descriptor
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: opened
+    call test(c_open_append(path//c_null_char, opened), exit_cannot_create, 'cannot write', path, error)
+    descriptor = opened
+  end subroutine open_append
+
+  !> Writes a line to what `open_append` opened, or to stdout (1), at once; code 74. Fortran's own units lose the lines for
+  !> which there is no space without a word. `name` is for the message.
+  subroutine append_line(descriptor, name, line, error)
+    integer, intent(in) :: descriptor
+    character(len=*), intent(in) :: name, line
+    type(error_t), allocatable, intent(out) :: error
+    call test(c_append(int(descriptor, c_int), line//new_line(line), len(line, kind=int64) + 1), exit_io, 'cannot write', &
+              name, error)
+  end subroutine append_line
 
   subroutine test(number, code, action, path, error)
     integer(c_int), intent(in) :: number

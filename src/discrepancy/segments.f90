@@ -13,6 +13,7 @@ module segments
     state_t, tally_t
   use status, only: exit_bad_case
   use variants, only: family_t, of_the_machine, sensor_bias, sensor_delay, sensor_gain, variant_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
   implicit none
   private
 
@@ -156,16 +157,16 @@ contains
   end subroutine fly
 
   pure real(wp) function not_a_number()
-    not_a_number = 0
-    not_a_number = not_a_number/not_a_number
+    not_a_number = ieee_value(1.0_wp, ieee_quiet_nan)
   end function not_a_number
 
   !> Whether a start is finite and not beyond a rigid barrier.
   pure logical function start_allowed(moving, start)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
-    start_allowed = all(abs(start) <= huge(1.0_wp)) .and. start(1) <= moving%machine%contact%upper &
-                    .and. start(1) >= moving%machine%contact%lower
+    start_allowed = all(ieee_is_finite(start))
+    if (start_allowed) start_allowed = start(1) <= moving%machine%contact%upper &
+                                       .and. start(1) >= moving%machine%contact%lower
   end function start_allowed
 
   !> Moves to `until` [s on the clock of the log].

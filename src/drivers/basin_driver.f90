@@ -9,8 +9,9 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_search, only: pack_catalogues, search_catalogues, unpack_catalogues
+  use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
+  use endings, only: report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
   use grid, only: grid_t, point_slice, slice_period, two_axes
@@ -23,9 +24,9 @@ module basin_driver
   use refined_tile, only: layers_of, pilot_share
   use pair, only: is_pair
   use session, only: describe_file, identity_of, open_session, session_t
-  use shard, only: describe_shard, finish_shard, shard_path
+  use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
-  use status, only: last_reason, exit_done, reason_names, reason_settled
+  use status, only: last_reason, exit_done, reason_settled
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
@@ -60,6 +61,7 @@ module basin_driver
     procedure :: compute => compute_basin_points
     procedure :: note => note_basin_point
     procedure :: tell_apart => tell_apart_basin_points
+    procedure :: points_from => basin_points_from
   end type basin_work_t
 
 contains
@@ -80,6 +82,8 @@ contains
     call require_axes(session%the_case, error)
     call session%stop_if(error)
     call prepare_basin(session%the_case, work, tile)
+    call check_slices(work%grid, error)
+    call session%stop_if(error)
     if (command%validate) then
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
@@ -100,8 +104,6 @@ contains
                              command%time_limit, work%catalogues, error)
     end if
     call session%stop_if(error)
-    if (size(work%catalogues) > 0) call points_at_a_time(work%grid, work%span, work%block, error)
-    call session%stop_if(error)
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)
     call report_catalogue(session, work)
@@ -109,6 +111,7 @@ contains
     if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema, &
                                                pack_catalogues(work%catalogues, spread(.true., 1, size(work%catalogues))))
     call open_tiles(session, path, schema, dimensions, tile, file)
+    if (command%search_only) call finish_search(session, file)
     call run_tiles(session, file, work, complete)
     if (command%shard > 0 .and. complete) call finish_shard(session, file)
     call end_basin(session, work, file, complete)
@@ -205,6 +208,15 @@ contains
     call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
   end subroutine compute_basin_points
 
+  subroutine basin_points_from(self, index, points, error)
+    class(basin_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    integer, intent(out) :: points
+    type(error_t), allocatable, intent(out) :: error
+    points = 1
+    if (size(self%catalogues) > 0) call points_at_a_time(self%grid, self%span, index, self%cache, points, error)
+  end subroutine basin_points_from
+
   !> Points of one cell are to have the same attractor, and to settle about equally fast.
   subroutine tell_apart_basin_points(self, index, values, marks, settling, error)
     class(basin_work_t), intent(inout) :: self
@@ -282,6 +294,7 @@ contains
   subroutine report_catalogue(session, work)
     type(session_t), intent(inout) :: session
     type(basin_work_t), intent(in) :: work
+    character(len=:), allocatable :: source
     integer :: i, k, last
     if (size(work%catalogues) == 0) then
       call session%journal%line('catalogue', 'no start is an axis: every point has its own attractor, unlabelled')
@@ -291,8 +304,10 @@ contains
     do i = 1, size(work%catalogues)
       last = max(last, maxval([0, work%catalogues(i)%attractors%id]))
     end do
+    source = ' discovered'
+    if (len(session%command%catalogue) > 0) source = ' taken from '//session%command%catalogue
     call session%journal%line('catalogue', counted(last, 'attractor')//' in '//counted(size(work%catalogues), 'slice')// &
-      ' discovered', '"attractors": '//to_text(last))
+      source, '"attractors": '//to_text(last))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
       associate (a => work%catalogues(1)%attractors(k))
@@ -324,11 +339,7 @@ contains
         to_text(work%regimes(i))//' points)', '"regime": '//json_text(trim(regime_names(i)))//', "percent": '// &
         to_text(share)//', "points": '//to_text(work%regimes(i)))
     end do
-    do i = 0, last_reason
-      if (work%reasons(i) > 0) call session%journal%line('reason', '  ended as '//trim(reason_names(i))//': '// &
-        to_text(work%reasons(i))//' points', '"reason": '//json_text(trim(reason_names(i)))//', "points": '// &
-        to_text(work%reasons(i)))
-    end do
+    call report_reasons(session%journal, work%reasons)
   end subroutine report_shares
 
 end module basin_driver

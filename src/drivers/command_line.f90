@@ -37,7 +37,7 @@ module command_line
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
-    logical :: force = .false., resume = .false., json = .false., quiet = .false.
+    logical :: force = .false., resume = .false., json = .false., quiet = .false., search_only = .false.
     real(wp) :: time_limit = 0
     integer :: ranks_per_node = 0
     !> `verify`: points rerun, and the seed that chooses them.
@@ -106,6 +106,10 @@ contains
       call fail(error, exit_usage, '--csv needs the whole list: give it to merge')
     else if (len(command%catalogue) > 0 .and. command%name /= 'basin') then
       call fail(error, exit_usage, '--catalogue belongs to the command basin')
+    else if (command%search_only .and. (command%name /= 'basin' .or. command%shard == 0)) then
+      call fail(error, exit_usage, '--search-only belongs to basin --shard I/N')
+    else if (command%search_only .and. len(command%catalogue) > 0) then
+      call fail(error, exit_usage, '--search-only searches, --catalogue takes what was found: choose one')
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
@@ -135,8 +139,9 @@ contains
       call fail(error, exit_usage, "-o '"//command%output//"' would replace what is read")
     else if (len(command%log) > 0 .and. any(command%name == [character(len=10) :: 'laws', 'info', 'verify'])) then
       call fail(error, exit_usage, '--log belongs to the commands that compute')
-    else if (len(command%log) > 0 .and. (command%log == command%path .or. command%log == command%list .or. &
-                                         command%log == command%output .or. command%log == command%csv)) then
+    else if (len(command%log) > 0 .and. any([command%path == command%log, command%list == command%log, &
+                                             command%output == command%log, command%csv == command%log, &
+                                             command%record == command%log, command%tile_times == command%log])) then
       call fail(error, exit_usage, "--log '"//command%log//"' is the name of another file of the run")
     else if (len(command%csv) > 0 .and. (command%csv == command%path .or. command%csv == command%list)) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
@@ -175,6 +180,8 @@ contains
       command%force = .true.
     case ('--resume')
       command%resume = .true.
+    case ('--search-only')
+      command%search_only = .true.
     case ('--json')
       command%json = .true.
     case ('-q', '--quiet')
@@ -360,6 +367,7 @@ contains
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
       '  --shard I/N        basin, points: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'//nl// &
       '  --catalogue FILE   basin: takes the attractors from a share of the same map instead of searching them'//nl// &
+      '  --search-only      basin --shard: only makes the file of the share, from which all can take the attractors'//nl// &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &

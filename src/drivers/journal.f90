@@ -3,14 +3,14 @@
 
 !> What a run says while it works: lines on stdout (plain or JSON, rank 0 only) and progress with rate and
 !> ETA on stderr: one line that is rewritten on a terminal, sparse lines in a log. All of it also goes to a file as JSON
-!> lines if one is asked for.
+!> lines if one is asked for. A log that cannot be written does not end the work, but makes it end with code 74.
 module journal
-  use errors, only: error_t, fail
+  use errors, only: error_t
+  use files, only: append_line, open_append
   use kinds, only: int64, wp
-  use status, only: exit_cannot_create
   use system, only: monotonic_seconds, resident_bytes, stderr_is_terminal, utc_now
   use text, only: replace_all, to_text
-  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use, intrinsic :: iso_fortran_env, only: error_unit
   implicit none
   private
 
@@ -18,14 +18,22 @@ module journal
 
   real(wp), parameter :: terminal_interval = 0.5_wp, first_interval = 10, longest_interval = 300
 
+  !> Where lines go: a descriptor of the system, -1 = nowhere.
+  type :: sink_t
+    integer :: descriptor = -1
+    character(len=:), allocatable :: name
+  end type sink_t
+
   type, public :: journal_t
     !> Whether this rank speaks at all, in JSON, and only of errors.
     logical :: active = .true., json = .false., quiet = .false.
     real(wp) :: started = 0
     real(wp) :: next_progress = 0, interval = first_interval
     logical :: terminal = .false., line_open = .false.
-    !> The unit of the file of JSON lines; 0 = none.
-    integer :: copy = 0
+    !> Stdout, and the file of JSON lines.
+    type(sink_t), private :: out, copy
+    !> One of them could not be written.
+    logical :: lost = .false.
     !> Bytes of results that this rank has written.
     integer(int64) :: written = 0
     !> The stretch of work under way.
@@ -50,6 +58,7 @@ contains
     self%active = active
     self%json = json
     self%quiet = quiet
+    self%out = sink_t(1, 'stdout')
     self%started = monotonic_seconds()
     self%terminal = stderr_is_terminal() .and. .not. json
     self%interval = merge(terminal_interval, first_interval, self%terminal)
@@ -61,13 +70,9 @@ contains
     class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    character(len=256) :: message
-    integer :: status
     if (.not. self%active .or. len(path) == 0) return
-    open (newunit=self%copy, file=path, status='unknown', position='append', action='write', iostat=status, iomsg=message)
-    if (status == 0) return
-    self%copy = 0
-    call fail(error, exit_cannot_create, "cannot write the log '"//path//"': "//trim(message))
+    self%copy%name = path
+    call open_append(path, self%copy%descriptor, error)
   end subroutine open_copy
 
   !> One line of the log. `fields`: further members of the JSON object, '"name": value, ...'. `plain` = .false.: left out
@@ -88,26 +93,33 @@ contains
     if (self%quiet .or. .not. shown) return
     call close_line(self)
     if (self%json) then
-      write (output_unit, '(a)') json_line(self, event, message, more)
+      call put(self, self%out, json_line(self, event, message, more))
     else
-      write (output_unit, '(a)') message
+      call put(self, self%out, message)
     end if
-    flush (output_unit)
   end subroutine line
 
-  !> A log that cannot be written does not end the work: it is said once.
   subroutine write_copy(self, event, message, more)
     class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: event, message, more
-    character(len=256) :: reason
-    integer :: status
-    if (self%copy == 0) return
-    write (self%copy, '(a)', iostat=status, iomsg=reason) json_line(self, event, message, more)
-    if (status == 0) flush (self%copy, iostat=status, iomsg=reason)
-    if (status == 0) return
-    self%copy = 0
-    write (error_unit, '(a)') 'separatrix: the log cannot be written any more: '//trim(reason)
+    call put(self, self%copy, json_line(self, event, message, more))
   end subroutine write_copy
+
+  !> One line. After the first that cannot be written, which is said on stderr, the sink is given up.
+  subroutine put(self, sink, text)
+    class(journal_t), intent(inout) :: self
+    type(sink_t), intent(inout) :: sink
+    character(len=*), intent(in) :: text
+    type(error_t), allocatable :: error
+    if (sink%descriptor < 0) return
+    call append_line(sink%descriptor, sink%name, text, error)
+    if (.not. allocated(error)) return
+    sink%descriptor = -1
+    self%lost = .true.
+    call close_line(self)
+    write (error_unit, '(a)') 'separatrix: '//error%message//'; the work goes on without this log'
+    flush (error_unit)
+  end subroutine put
 
   function json_line(self, event, message, more) result(line)
     class(journal_t), intent(in) :: self
@@ -134,7 +146,7 @@ contains
     integer(int64), intent(in) :: done
     real(wp) :: now, rate
     character(len=:), allocatable :: message, fields
-    if (.not. self%active .or. (self%quiet .and. self%copy == 0)) return
+    if (.not. self%active .or. (self%quiet .and. self%copy%descriptor < 0)) return
     now = monotonic_seconds()
     if (now < self%next_progress .or. done <= self%before) return
     if (.not. self%terminal) self%interval = min(2*self%interval, longest_interval)

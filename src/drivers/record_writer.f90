@@ -14,8 +14,9 @@ module record_writer
   use oscillator, only: oscillator_t
   use random, only: uniform
   use sampling, only: sample_positions
-  use status, only: exit_bad_case, exit_io, reason_name
+  use status, only: exit_bad_case, reason_name
   use text, only: to_text
+  use text_table, only: table_t
   implicit none
   private
 
@@ -30,10 +31,11 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     type(error_t), allocatable, intent(out) :: error
+    type(table_t) :: table
     real(wp), allocatable :: times(:), x(:), driver(:), second(:)
-    character(len=256) :: message
     character(len=*), parameter :: row_format = '(*(es23.16, :, ","))'
-    integer :: count, i, unit, status, reason
+    character(len=3*24) :: row
+    integer :: count, i, reason
     count = floor(the_case%run%duration*the_case%record%rate) + 1
     times = [(i/the_case%record%rate, i=0, count - 1)]
     allocate (x(count), driver(count))
@@ -50,22 +52,21 @@ contains
     allocate (second(0))
     if (allocated(moving%pair)) second = driver
     if (moving%machine%drive%interval > 0) second = force_at(moving%machine, start(3), times)
-    open (newunit=unit, file=path, status='replace', action='write', iostat=status, iomsg=message)
+    call table%create(path)
     associate (heading => heading_of(the_case, moving, start))
       do i = 1, size(heading)
-        if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) trim(heading(i))
+        call table%line(trim(heading(i)))
       end do
     end associate
     do i = 1, count
-      if (status /= 0) exit
       if (size(second) > 0) then
-        write (unit, row_format, iostat=status, iomsg=message) times(i), x(i), second(i)
+        write (row, row_format) times(i), x(i), second(i)
       else
-        write (unit, row_format, iostat=status, iomsg=message) times(i), x(i)
+        write (row, row_format) times(i), x(i)
       end if
+      call table%line(trim(row))
     end do
-    if (status == 0) close (unit, iostat=status, iomsg=message)
-    if (status /= 0) call fail(error, exit_io, "'"//path//"': "//trim(message))
+    call table%close(error)
   end subroutine write_record
 
   !> The measured force [N] that drives a machine, at `times` [s since the start at `crank_angle`].

@@ -105,7 +105,7 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
-    call warn_about(self%the_case, self%journal)
+    call warn_about(self%command%name, self%the_case, self%journal)
   end subroutine begin
 
   subroutine unlock(session)
@@ -160,18 +160,24 @@ contains
   end function identity_of
 
   !> Ends the program on all ranks. Rank 0 returns the code, and as the last: mpirun ends the other processes by force as soon
-  !> as one has returned another code than 0.
+  !> as one has returned another code than 0. Code 74 where all went well but for the log.
   subroutine end_with(self, code)
     class(session_t), intent(inout) :: self
     integer, intent(in) :: code
+    integer :: last
     logical :: first, others
     first = self%team%is_root()
     others = self%team%size() > 1
+    last = code
+    if (code == exit_done .and. self%journal%lost) then
+      last = exit_io
+      call self%journal%error('the run is complete, its log is not')
+    end if
     call unlock(self)
     call self%team%close()
     if (.not. first) call exit_program(exit_done)
-    if (others .and. code /= exit_done) call sleep_microseconds(farewell_us)
-    call exit_program(code)
+    if (others .and. last /= exit_done) call sleep_microseconds(farewell_us)
+    call exit_program(last)
   end subroutine end_with
 
   !> Ends the program if any rank has an error. Collective.

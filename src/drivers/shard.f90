@@ -13,19 +13,24 @@ module shard
   implicit none
   private
 
-  public :: in_shard, shard_path, describe_shard, finish_shard
+  public :: in_shard, share_of, shard_path, describe_shard, finish_search, finish_shard
 
   !> The catalogues of all slices as `pack_catalogues` makes them.
   character(len=*), parameter, public :: catalogue_dataset = '/shard/catalogue'
 
 contains
 
-  !> Whether share `number` of `shares` has the tile: every `shares`-th, so that each share has its part of the hard
-  !> regions. Without shares (0) all tiles are of this run.
+  !> The share that has a tile: of `shares` every one has each `shares`-th, so that it has its part of the hard regions.
+  pure integer function share_of(tile, shares)
+    integer, intent(in) :: tile, shares
+    share_of = 1 + modulo(tile - 1, shares)
+  end function share_of
+
+  !> Whether share `number` of `shares` has the tile. Without shares (0) all tiles are of this run.
   pure logical function in_shard(tile, number, shares)
     integer, intent(in) :: tile, number, shares
     in_shard = shares == 0
-    if (shares > 0) in_shard = modulo(tile - 1, shares) == number - 1
+    if (shares > 0) in_shard = share_of(tile, shares) == number
   end function in_shard
 
   !> The name from which that of a share's working file is made.
@@ -49,6 +54,18 @@ contains
     call schema%add_variable('catalogue', type_float64, ['packed'], data=packed, group='shard', &
                              long_name='catalogues of all slices')
   end subroutine describe_shard
+
+  !> Leaves the working file without a tile, for its catalogue, and ends the program.
+  subroutine finish_search(session, file)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    type(error_t), allocatable :: error
+    call file%close(session%team, error)
+    call session%stop_if(error)
+    call session%journal%line('shard', 'the attractors are in '//working_path(file%path)// &
+      '; the shares take them with --catalogue, and this one goes on with --resume')
+    call session%end_with(exit_done)
+  end subroutine finish_search
 
   !> Leaves the working file as it is for merge, and ends the program.
   subroutine finish_shard(session, file)

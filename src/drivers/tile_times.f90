@@ -3,12 +3,12 @@
 
 !> The table of --tile-times: which rank computed which tile when.
 module tile_times
-  use errors, only: error_t, fail
+  use errors, only: error_t
   use kinds, only: wp
   use scheduler, only: scheduler_t
   use session, only: session_t
-  use status, only: exit_io
   use text, only: to_text
+  use text_table, only: table_t
   implicit none
   private
 
@@ -36,17 +36,15 @@ contains
     integer, intent(in) :: tiles(:), rank(:)
     real(wp), intent(in) :: entries(:, :)
     type(error_t), allocatable, intent(out) :: error
-    character(len=256) :: message
-    integer :: unit, status, i
-    open (newunit=unit, file=path, status='replace', action='write', iostat=status, iomsg=message)
-    if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) 'tile,rank,begin,end,questions'
+    type(table_t) :: table
+    integer :: i
+    call table%create(path)
+    call table%line('tile,rank,begin,end,questions')
     do i = 1, size(rank)
-      if (status /= 0) exit
-      write (unit, '(a)', iostat=status, iomsg=message) to_text(tiles(nint(entries(1, i))))//','//to_text(rank(i))// &
-        ','//to_text(entries(2, i), 9)//','//to_text(entries(3, i), 9)//','//to_text(nint(entries(4, i)))
+      call table%line(to_text(tiles(nint(entries(1, i))))//','//to_text(rank(i))//','//to_text(entries(2, i), 9)//','// &
+                      to_text(entries(3, i), 9)//','//to_text(nint(entries(4, i))))
     end do
-    if (status == 0) close (unit, iostat=status, iomsg=message)
-    if (status /= 0) call fail(error, exit_io, "'"//path//"': "//trim(message))
+    call table%close(error)
   end subroutine write_rows
 
 end module tile_times

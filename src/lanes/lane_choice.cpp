@@ -4,6 +4,27 @@
 // Which kernel this processor gets. All give the same bits.
 #include "lane_types.hpp"
 
+#include <cfenv>
+
+namespace {
+
+// Lanes that a step does not concern hold any value, so that exceptions say nothing: a build that traps them
+// goes on.
+struct untrapped {
+  std::fenv_t held;
+  const bool trapping = fegetexcept() != 0;
+  untrapped() {
+    if (trapping)
+      std::feholdexcept(&held);
+  }
+  ~untrapped() {
+    if (trapping)
+      std::fesetenv(&held);
+  }
+};
+
+} // namespace
+
 extern "C" {
 
 void separatrix_fly_sse2(const lane_machine *, lane_batch *);
@@ -24,6 +45,7 @@ int separatrix_lane_width(void) {
 }
 
 void separatrix_fly_lanes(int width, const lane_machine *machine, lane_batch *batch) {
+  const untrapped around;
   if (width >= 8)
     separatrix_fly_avx512(machine, batch);
   else if (width >= 4)

@@ -12,6 +12,7 @@ from collections import Counter
 
 import life
 import pytest
+from program import STARTS
 
 SEED = 20261123
 LAYERS = ["romio321", "ompio"]
@@ -180,21 +181,35 @@ def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, f
 
 def test_a_trajectory_beyond_the_limit(separatrix, faulty_calls, tmp_path):
     life.write_case(tmp_path)
-    for name, number in [("t.h5", errno.ENOSPC), ("t.csv", errno.ENOSPC)]:
-        fault = {
-            **os.environ,
-            "LD_PRELOAD": str(faulty_calls),
-            "FAULT_NAME": name,
-            "FAULT_AT": "1",
-            "FAULT_DO": str(number),
-        }
-        ended = subprocess.run(
-            [separatrix, "trajectory", "case.toml", "-o", "t.h5", "--csv", "t.csv", "--force"],
-            cwd=tmp_path,
-            env=fault,
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
+    command = ["trajectory", "case.toml", "-o", "t.h5", "--csv", "t.csv", "--record", "record.csv", "--force"]
+    for name in ("t.h5", "t.csv", "record.csv"):
+        ended = without_space(separatrix, faulty_calls, tmp_path, name, command)
         assert ended.returncode in (73, 74), (name, ended)
-        assert f"{name}" in ended.stderr
+        assert name in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("times.csv", ["basin", "case.toml", "-o", "m.h5", "--tile-times", "times.csv"]),
+        ("p.csv", ["points", "case.toml", "--list", "starts.csv", "-o", "p.h5", "--csv", "p.csv"]),
+    ],
+)
+def test_a_table_beyond_the_limit(separatrix, faulty_calls, tmp_path, name, command):
+    life.write_case(tmp_path)
+    (tmp_path / "starts.csv").write_text(STARTS)
+    ended = without_space(separatrix, faulty_calls, tmp_path, name, command)
+    assert ended.returncode == 74 and name in ended.stderr, ended
+
+
+def without_space(program, faulty_calls, folder, name, command):
+    """Run a command for whose file `name` there is no space."""
+    fault = {
+        "LD_PRELOAD": str(faulty_calls),
+        "FAULT_NAME": name,
+        "FAULT_AT": "1",
+        "FAULT_DO": str(errno.ENOSPC),
+    }
+    return subprocess.run(
+        [program, *command], cwd=folder, env=os.environ | fault, capture_output=True, text=True, timeout=60
+    )

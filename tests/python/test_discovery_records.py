@@ -8,8 +8,10 @@ import h5py
 import numpy as np
 import pytest
 from program import CASE, listing
+from separatrix.discovery import cli
 from separatrix.discovery.cli import main
-from separatrix.discovery.records import read_record
+from separatrix.discovery.records import make_record, read_record, unique_names
+from separatrix.discovery.results import FILES
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -50,6 +52,10 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         head[0] = "# units: s, furlong"
     elif kind == "clipped":
         x = np.minimum(x, 0.9)
+    elif kind == "still drive":
+        head.append("# drive_frequency_rad_s: 0")
+    elif kind == "negative noise":
+        head.append("# sensor_noise_sigma_m_s: -1")
     elif kind == "short":
         t, x = t[:40], x[:40]
     return t, x, head
@@ -65,6 +71,8 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         ("unit", ["furlong", "expected"]),
         ("clipped", ["clipped"]),
         ("short", ["40 samples"]),
+        ("still drive", ["'drive_frequency_rad_s' is 0"]),
+        ("negative noise", ["'sensor_noise_sigma_m_s' is -1"]),
     ],
 )
 def test_faults_are_refused_with_their_place(tmp_path, kind, words):
@@ -108,6 +116,25 @@ def test_units_and_hdf5(tmp_path):
     assert stored.header["drive_ratio"] == 1.2
 
 
+def test_a_body_at_rest_may_show_one_value(tmp_path):
+    """A coarse sensor shows one value, or two of its steps."""
+    t, x = rows()
+    x[:] = 0.5
+    for count in (0, 200):
+        x[:count] = 0.51
+        path = write(tmp_path / "rest.csv", t, x)
+        assert np.array_equal(read_record(path, at_rest=True).x, x)
+    with pytest.raises(SeparatrixError, match="constant"):
+        read_record(write(tmp_path / "rest.csv", t, 0 * x))
+
+
+def test_records_get_names_of_their_own(tmp_path):
+    names = ["a", "a", "a_2", "b", "a"]
+    records = [make_record(name, dict(zip("tx", rows(), strict=True))) for name in names]
+    unique_names(records)
+    assert [one.name for one in records] == ["a", "a_3", "a_2", "b", "a_4"]
+
+
 @pytest.mark.parametrize("fault", ["nan", "other machine", "coarse", "no such file"])
 def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault):
     library = build_dir / "lib" / "libseparatrix.so"
@@ -131,6 +158,38 @@ def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault)
     assert main([str(word) for word in arguments]) == (66 if fault == "no such file" else 65)
     assert "separatrix-discover: " in capsys.readouterr().err
     assert listing(tmp_path) == before
+
+
+@pytest.mark.parametrize("earlier", [True, False])
+def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys, earlier):
+    """Neither half of a new result nor a mixture with an old one."""
+    out = tmp_path / "folder" / "out"
+    if earlier:
+        out.mkdir(parents=True)
+        for name in (*FILES, "notes.txt"):
+            (out / name).write_text("of an earlier run")
+    before = listing(tmp_path)
+
+    def write(folder: Path, *_: object) -> None:
+        (folder / "verdict.json").write_text("new")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
+    verdict |= {"reasons": [], "separating_experiment": "", "warnings": []}
+    monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
+    monkeypatch.setattr(cli, "write_results", write)
+    monkeypatch.setattr(cli, "write_report", fail)
+    arguments = ["base.toml", "record.csv", "--out", str(out), "-q"]
+    assert main(arguments) == 73
+    assert f"{out}: No space left" in capsys.readouterr().err
+    assert listing(tmp_path) == before
+    assert out.parent.exists() == earlier
+    monkeypatch.setattr(cli, "write_report", lambda *_: None)
+    assert main(arguments) == 0
+    left = {path.name: path.read_text() for path in out.iterdir()}
+    assert left == {"verdict.json": "new"} | ({"notes.txt": "of an earlier run"} if earlier else {})
 
 
 def test_usage(capsys):

@@ -4,11 +4,12 @@
 
 import json
 import os
+import subprocess
 from pathlib import Path
 
 import h5py
 import pytest
-from program import run, succeed, write_case
+from program import differences, run, succeed, write_case
 
 COMMAND = ["basin", "case.toml", "-o", "map.h5", "--log", "run.jsonl"]
 
@@ -60,6 +61,35 @@ def test_a_log_that_cannot_be_written(separatrix, tmp_path):
     outcome = run(separatrix, "basin", "case.toml", "--log", "case.toml", folder=tmp_path)
     assert outcome.code == 64 and "case.toml" in outcome.err
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_log_on_a_full_disk_costs_the_log_alone(mpi_separatrix, tmp_path, ranks):
+    """The work is done, and the code says that not all of what was asked for is there."""
+    write_case(tmp_path)
+    succeed(mpi_separatrix, *COMMAND, folder=tmp_path)
+    full = ["basin", "case.toml", "-o", "full.h5", "--log", "/dev/full"]
+    outcome = run(mpi_separatrix, *full, folder=tmp_path, ranks=ranks)
+    assert outcome.code == 74
+    assert [words in outcome.err for words in ("'/dev/full'", "No space left", "the run is complete")] == [
+        True
+    ] * 3
+    assert "wrote full.h5" in outcome.out
+    assert differences(tmp_path / "map.h5", tmp_path / "full.h5") == []
+    # What is to be resumed stays so.
+    outcome = run(mpi_separatrix, *full, "--force", "--time-limit", "1e-9", folder=tmp_path, ranks=ranks)
+    assert outcome.code == 75 and "complete" not in outcome.err
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_stdout_on_a_full_disk(separatrix, tmp_path, form):
+    write_case(tmp_path)
+    with Path("/dev/full").open("w") as full:
+        command = [separatrix, *COMMAND, *form]
+        ended = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert ended.returncode == 74 and "stdout" in ended.stderr
+    assert [line["event"] for line in events(tmp_path)][-1] == "error"
+    succeed(separatrix, "verify", "map.h5", "--sample", "2", folder=tmp_path)
 
 
 def test_a_file_says_how_it_was_made(mpi_separatrix, tmp_path):

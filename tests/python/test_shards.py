@@ -140,6 +140,38 @@ def test_a_share_takes_the_attractors_of_another(separatrix, folder):
         assert set(np.unique(file["attractor"][()])) <= {0, 1, 7}
 
 
+def test_a_search_for_all_shares(mpi_separatrix, folder):
+    """The first share's file is made for its attractors alone; the shares are begun from it."""
+    for number in (1, 2, 3):
+        (folder / part(number, 3)).unlink()
+    searching = [*COMMAND, "--shard", "1/3", "--search-only"]
+    outcome = succeed(mpi_separatrix, *searching, folder=folder, ranks=2)
+    assert "2 attractors in 1 slice discovered" in outcome.out
+    assert sorted(path.name for path in folder.glob("*.part")) == [part(1, 3)]
+    with h5py.File(folder / part(1, 3)) as file:
+        assert not file["tiles/state"][()].any()
+    # Searched again, as after a kill: the same file.
+    before = listing(folder)
+    assert run(mpi_separatrix, *searching, folder=folder).code == 73
+    succeed(mpi_separatrix, *searching, "--resume", folder=folder)
+    assert listing(folder) == before
+    for number in (2, 1, 3):
+        taking = [*COMMAND, "--shard", f"{number}/3", "--resume", "--catalogue", part(1, 3)]
+        outcome = succeed(mpi_separatrix, *taking, folder=folder, ranks=number - 1)
+        assert f"taken from {part(1, 3)}" in outcome.out
+    succeed(mpi_separatrix, "merge", "map.h5", *(part(i, 3) for i in (1, 2, 3)), folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+
+
+def test_a_search_is_one_of_a_share(separatrix, tmp_path):
+    write_case(tmp_path)
+    for command in ([*COMMAND, "--search-only"], ["sweep", "case.toml", "--search-only"]):
+        assert run(separatrix, *command, folder=tmp_path).code == 64
+    both = [*COMMAND, "--shard", "1/2", "--search-only", "--catalogue", "other.part"]
+    assert run(separatrix, *both, folder=tmp_path).code == 64
+    assert list(listing(tmp_path)) == ["case.toml"]
+
+
 @pytest.mark.parametrize(
     ("source", "change", "code"),
     [

@@ -226,9 +226,11 @@ def test_an_array_of_shares_is_merged(cluster, mpi_separatrix, reference, tmp_pa
         text=True,
     )
     assert ended.returncode == 0, ended.stderr
-    wait_for(cluster, ended.stdout.split()[1], ("COMPLETED",), 120)
+    wait_for(cluster, ended.stdout.split()[2], ("COMPLETED",), 120)
     assert differences(reference, tmp_path / "map.h5") == []
     assert list(tmp_path.glob("*.part")) == []
+    logs = [path.read_text() for path in tmp_path.glob("*.log.jsonl")]
+    assert sorted(" discovered" in log for log in logs) == [False, False, False, True]
 
 
 def test_a_share_comes_again_before_the_merge(cluster, mpi_separatrix, tmp_path):
@@ -242,7 +244,8 @@ def test_a_share_comes_again_before_the_merge(cluster, mpi_separatrix, tmp_path)
         text=True,
     )
     assert ended.returncode == 0, ended.stderr
-    array, merge = ended.stdout.split()
+    _, array, merge = ended.stdout.split()
+    wait_for(cluster, f"{array}_1", ("RUNNING",), 60)
     wait_for_tiles(tmp_path / "map.h5.shard-1-of-2.part", mpi_separatrix, 5)
     subprocess.run(["scancel", "--signal=USR1", f"{array}_1"], env=cluster, check=True)
     wait_for(cluster, f"{array}_1", ("PENDING",), 30)

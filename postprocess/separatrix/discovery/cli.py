@@ -10,9 +10,10 @@ from pathlib import Path
 
 from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.catalogue import BY_NAME
-from separatrix.discovery.extend import write_all
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.discovery.results import FILES, replacing, write_results
+from separatrix.discovery.wording import with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import SeparatrixError
 from separatrix.version import __version__
@@ -40,12 +41,14 @@ def _run(chosen: argparse.Namespace) -> None:
         progress=(lambda stage, done: None) if chosen.quiet else Progress(),
     )
     verdict, findings = investigate(chosen.base, chosen.records, chosen.hold_out, options, chosen.rest)
-    written = write_all(chosen.out, verdict, findings)
-    written += write_report(chosen.out, chosen.base, options)
+    with replacing(chosen.out) as draft:
+        write_results(draft, verdict, findings)
+        write_report(draft, chosen.base, options)
     for line in summary(verdict):
         print(line)
-    for path in written:
-        print(f"wrote {path}")
+    for path in (chosen.out / name for name in FILES):
+        if path.exists():
+            print(f"wrote {path}")
 
 
 class Progress:
@@ -74,8 +77,7 @@ def summary(verdict: dict) -> list[str]:
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):
-            unit = "" if found["unit"] == "1" else f" {found['unit']}"
-            lines.append(f"  {path} = {found['value']:.4g} +- {found['standard_error']:.2g}{unit}")
+            lines.append(f"  {path} = {with_error(found, 4)}")
     for use, gap in verdict["gap"].items():
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"

@@ -28,7 +28,6 @@ class Data:
 
     prepared: list[Prepared]
     smoothed: list[Smoothed]
-    lengths: list[int]
     stages: list[Segments]
 
     @property
@@ -88,7 +87,7 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
         cut([one.record for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
         for share in STAGES
     ]
-    return Data(prepared, smoothed, lengths, stages)
+    return Data(prepared, smoothed, stages)
 
 
 def _correlation_samples(x: np.ndarray) -> int:

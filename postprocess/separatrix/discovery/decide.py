@@ -110,15 +110,21 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
 
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
-    return foremost(converged or found.judged, bench.options.separation)
+    able = [one for one in found.judged if admissible(one, found.base)[0]]
+    return foremost(able or found.judged, bench.options.separation)
 
 
 def foremost(pool: list[Judged], separation: float) -> tuple[Judged, list[Judged]]:
-    """Return the candidate of most evidence, and those that it does not beat clearly for its misfit."""
-    best, *others = sorted(pool, key=lambda one: -one.evidence)
+    """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
+
+    A fit that has not converged may not be named, but what it gained so far may stand against a name.
+    """
+    order = sorted(pool, key=lambda one: -one.evidence)
+    best = next((one for one in order if one.fitted.fit.converged), order[0])
     scale = max(1.0, best.fitted.fit.reduced_chi2)
-    return best, [one for one in others if best.evidence - one.evidence < separation * scale]
+    return best, [
+        one for one in order if one is not best and best.evidence - one.evidence < separation * scale
+    ]
 
 
 def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
@@ -157,7 +163,10 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
 
 
 def _equivalent(one: Judged, other: Judged) -> bool:
-    return other.name in BY_NAME[one.name].equivalent
+    """Whether what two fits do not share is two names of the same motion."""
+    mine, theirs = set(one.fitted.names), set(other.fitted.names)
+    left, right = mine - theirs, theirs - mine
+    return len(left) == len(right) == 1 and right.pop() in BY_NAME[left.pop()].equivalent
 
 
 def _without_name(bench: Bench, decision: Decision) -> Decision:
@@ -186,7 +195,7 @@ def _with_more(
             if made is not None:
                 pairs.append(over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
+    pairs = [one for one in pairs if admissible(one, base)[0]]
     if not pairs:
         return _give_up(decision)
     pair, close = foremost(pairs, bench.options.separation)

@@ -16,7 +16,7 @@ import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
 from separatrix.discovery.fit import Fit, minimise
-from separatrix.discovery.machine import Free, record_nuisances
+from separatrix.discovery.machine import Free, on_other_records
 from separatrix.discovery.problem import Problem
 
 # reduced chi^2 above which errors of the machine are larger than the noise
@@ -58,9 +58,8 @@ def predict(
     `guess`: starts of segments that another machine found there, tried too.
     """
     shared = [i for i, one in enumerate(free) if one.record is None]
-    own = record_nuisances([one.phase_known for one in data.prepared]) if data.prepared[0].frequency else []
-    whole = [free[i] for i in shared] + own
-    start = np.concatenate([values[shared], np.zeros(len(own))])
+    whole = on_other_records(free, data.prepared)
+    start = np.concatenate([values[shared], np.zeros(len(whole) - len(shared))])
     fixed = np.arange(len(whole)) < len(shared)
     problem, fit = _fit_own(data, model, whole, start, fixed)
     if guess is not None:

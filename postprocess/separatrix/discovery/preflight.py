@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of a record before anything is fitted: noise, resolution, drive, delay of channels."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from separatrix.errors import SeparatrixError
 _FOURTH = 70.0
 _FEWEST_PER_PERIOD = 12
 _FEWEST_PERIODS = 2.0
+# largest difference of the intervals of two pieces, over the interval, with a measured force
+_UNEVEN = 1e-2
 # sizes of a record against those of the machine beyond which a unit must be wrong
 _MOST_RATIO = 50.0
 
@@ -54,6 +56,7 @@ class Prepared:
 def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     """Measure what the header does not say, and refuse what cannot be a record of this machine."""
     notes = list(record.warnings)
+    record = _with_its_force(record, model, notes)
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     sigma = _noise(record, rest, resolution, notes)
     if np.std(record.x) < 5 * sigma:
@@ -116,14 +119,10 @@ def _find_drive(prepared: Prepared, model) -> None:
     record = prepared.record
     ratio = model.parameters.get("drive.ratio")
     if ratio is None or not ratio.value:
-        if "drive.interval" in model.parameters and record.force is None:
-            raise SeparatrixError(
-                f"{record.name}: the machine has a measured force, the record has no column 'force'"
-            )
         return
     if record.phi is not None:
-        slope, start = np.polyfit(record.t - record.t[0], np.unwrap(record.phi), 1)
-        prepared.frequency, prepared.phase, prepared.phase_known = float(slope), float(start), True
+        prepared.frequency, prepared.phase = turning(record)
+        prepared.origin, prepared.phase_known = float(record.t[0]), True
     else:
         header = record.header
         if "drive_frequency_rad_s" in header:
@@ -147,6 +146,63 @@ def _find_drive(prepared: Prepared, model) -> None:
         raise SeparatrixError(
             f"{record.name}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
         )
+
+
+def turning(record: Record) -> tuple[float, float]:
+    """Frequency of a measured crank angle [rad/s] and the angle at the first row.
+
+    Each piece is unwrapped by itself; the turns in a gap follow from the frequency within the pieces.
+    """
+    t = record.t - record.t[0]
+    angles = [np.unwrap(record.phi[first:last]) for first, last in record.pieces]
+    above = below = 0.0
+    for (first, last), angle in zip(record.pieces, angles, strict=True):
+        centred = t[first:last] - t[first:last].mean()
+        above += float(centred @ angle)
+        below += float(centred @ centred)
+    slope = above / below
+    ahead = np.concatenate(
+        [angle - slope * t[first:last] for (first, last), angle in zip(record.pieces, angles, strict=True)]
+    )
+    for first, last in record.pieces[1:]:
+        turns = np.round((np.mean(ahead[first:last]) - ahead[first - 1]) / (2 * np.pi))
+        ahead[first:last] -= 2 * np.pi * turns
+    more, start = np.polyfit(t, ahead, 1)
+    return slope + float(more), float(start)
+
+
+def even_interval(record: Record) -> float:
+    """Time between the samples of a record within its pieces [s]."""
+    steps = sum(last - 1 - first for first, last in record.pieces)
+    return float(sum(record.t[last - 1] - record.t[first] for first, last in record.pieces) / steps)
+
+
+def _with_its_force(record: Record, model, notes: list[str]) -> Record:
+    """The record with a force where the machine has one; all pieces must be sampled at one rate."""
+    wanted = 'law = "measured_force"' in model.to_text({})
+    if record.force is None:
+        if wanted:
+            raise SeparatrixError(
+                f"{record.name}: the machine has a measured force, the record has no column 'force'"
+            )
+        return record
+    if not wanted:
+        notes.append("the machine has no measured force: column 'force' is not used")
+        return replace(record, force=None)
+    usual = None
+    for first, last in record.pieces:
+        steps = last - 1 - first
+        # shorter ones are not fitted
+        if steps < _FEWEST_PER_PERIOD:
+            continue
+        interval = float((record.t[last - 1] - record.t[first]) / steps)
+        usual = usual or interval
+        if abs(interval - usual) > usual * max(_UNEVEN, 1 / steps):
+            raise SeparatrixError(
+                f"{record.name}, from row {first + 1}: samples every {interval:.6g} s, before every "
+                f"{usual:.6g} s: a measured force needs one rate"
+            )
+    return record
 
 
 def _check_size(prepared: Prepared, model) -> None:

@@ -4,13 +4,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.trial import try_first
 
 CHANNELS = ("x", "v", "a", "force", "phi")
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
@@ -60,20 +61,26 @@ class Record:
         return float(self.t[-1] - self.t[0])
 
 
-def read_record(path: Path) -> Record:
-    """Read and check one record; whatever is wrong is refused with file, row and reason."""
+def read_record(path: Path, at_rest: bool = False) -> Record:
+    """Read and check one record; whatever is wrong is refused with file, row and reason.
+
+    `at_rest`: of a body that does not move, whose positions may all be the same.
+    """
     path = Path(path)
     if not path.is_file():
         raise SeparatrixError(f"{path}: no such file", NO_INPUT)
     with path.open("rb") as file:
         is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
     header, columns, first_row = _read_hdf5(path) if is_hdf5 else _read_csv(path)
-    return _checked(path, header, columns, first_row)
+    return _checked(path, header, columns, first_row, at_rest)
 
 
-def make_record(name: str, columns: dict[str, np.ndarray], header: dict | None = None) -> Record:
+def make_record(
+    name: str, columns: dict[str, np.ndarray], header: dict | None = None, at_rest: bool = False
+) -> Record:
     """Check arrays that did not come from a file as if they had."""
-    return _checked(Path(name), {key: str(value) for key, value in (header or {}).items()}, columns, None)
+    texts = {key: str(value) for key, value in (header or {}).items()}
+    return _checked(Path(name), texts, columns, None, at_rest)
 
 
 def _read_csv(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], int]:
@@ -126,16 +133,16 @@ def _numbers(path: Path, number: int, text: str, names: list[str]) -> list[float
 
 
 def _read_hdf5(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], None]:
+    try_first(path, lambda: _texts(h5py.File(path)))
     try:
         with h5py.File(path) as file:
-            header = {key: _text(value) for key, value in file.attrs.items()}
+            header, units = _texts(file)
             columns = {
                 name: np.asarray(file[name][()], float)
                 for name in ("t", *CHANNELS)
                 if isinstance(file.get(name), h5py.Dataset)
             }
-            units = [_text(file[name].attrs["units"]) for name in ("t", "x") if "units" in file[name].attrs]
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
         raise SeparatrixError(f"{path}: not a record that can be read: {error}") from None
     missing = [name for name in ("t", "x") if name not in columns]
     if missing:
@@ -147,19 +154,29 @@ def _read_hdf5(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], None]
     return header, columns, None
 
 
+def _texts(file: h5py.File) -> tuple[dict[str, str], list[str]]:
+    header = {key: _text(value) for key, value in file.attrs.items()}
+    found = [file[name].attrs for name in ("t", "x") if name in file]
+    return header, [_text(attributes["units"]) for attributes in found if "units" in attributes]
+
+
 def _text(value: object) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def _checked(
-    path: Path, header: dict[str, str], columns: dict[str, np.ndarray], first_row: int | None
+    path: Path,
+    header: dict[str, str],
+    columns: dict[str, np.ndarray],
+    first_row: int | None,
+    at_rest: bool = False,
 ) -> Record:
     def where(row: int) -> str:
         return f"{path}, row {row + 1}" if first_row is None else f"{path}:{first_row + row}"
 
     warnings: list[str] = []
     numbers = _header_numbers(path, header)
-    _scale(path, header, numbers, columns, warnings)
+    _scale(path, header, columns, warnings)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -180,10 +197,11 @@ def _checked(
         raise SeparatrixError(
             f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
-    if np.ptp(x) == 0:
-        raise SeparatrixError(f"{path}: 'x' is constant")
     pieces = _pieces(t, usual, where, warnings)
-    _check_clipping(x, numbers, where, warnings)
+    if not at_rest:
+        if np.ptp(x) == 0:
+            raise SeparatrixError(f"{path}: 'x' is constant")
+        _check_clipping(x, where, warnings)
     unknown = [name for name in columns if name not in ("t", *CHANNELS)]
     if unknown:
         warnings.append(f"columns that are not used: {', '.join(unknown)}")
@@ -200,18 +218,16 @@ def _header_numbers(path: Path, header: dict[str, str]) -> dict[str, float]:
             raise SeparatrixError(f"{path}: '{key}' is '{header[key]}', expected a number") from None
         if not np.isfinite(numbers[key]):
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}")
-    for key in ("sampling_rate_hz", "drive_ratio", "drive_scale"):
+    for key in ("sampling_rate_hz", "drive_ratio", "drive_frequency_rad_s", "drive_scale"):
         if key in numbers and numbers[key] <= 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected more than 0")
-    for key in ("sensor_noise_sigma_m", "sensor_resolution_m"):
+    for key in ("sensor_noise_sigma_m", "sensor_noise_sigma_m_s", "sensor_resolution_m"):
         if key in numbers and numbers[key] < 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected at least 0")
     return numbers
 
 
-def _scale(
-    path: Path, header: dict[str, str], numbers: dict, columns: dict[str, np.ndarray], warnings: list[str]
-) -> None:
+def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> None:
     """Turn time and position into s and m; the other channels and the header are in SI."""
     if "units" not in header:
         warnings.append("no 'units': read as s, m")
@@ -236,7 +252,7 @@ def _pieces(t: np.ndarray, usual: float, where, warnings: list[str]) -> list[tup
     return list(pairwise(edges))
 
 
-def _check_clipping(x: np.ndarray, numbers: dict, where, warnings: list[str]) -> None:
+def _check_clipping(x: np.ndarray, where, warnings: list[str]) -> None:
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself."""
     grid = resolution_of(x)
     for name, extreme in (("largest", x.max()), ("smallest", x.min())):
@@ -273,8 +289,11 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def unique_names(records: Iterable[Record]) -> None:
     """Number the records whose files have the same name."""
-    seen: dict[str, int] = {}
+    records = list(records)
+    taken = {record.name for record in records}
+    seen: set[str] = set()
     for record in records:
-        seen[record.name] = seen.get(record.name, 0) + 1
-        if seen[record.name] > 1:
-            record.name = f"{record.name}_{seen[record.name]}"
+        if record.name in seen:
+            record.name = next(name for k in count(2) if (name := f"{record.name}_{k}") not in taken)
+            taken.add(record.name)
+        seen.add(record.name)

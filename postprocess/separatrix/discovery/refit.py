@@ -20,6 +20,8 @@ _BAD = 1.3
 _HOPELESS = 4.0
 # log-likelihood by which a candidate is out of the race
 _BEATEN = 15.0
+# share of segments that one fit may follow more than another without being better
+_FEW = 0.1
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -70,7 +72,7 @@ def refit(
     """
     best = None
     if known is not None:
-        best = _carried(data, candidate, known)
+        best = carried_on(data, candidate, known)
         if _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
@@ -81,12 +83,11 @@ def refit(
         problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
         fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        if best is None or gain_over(found, best)[0] > 0:
+        if best is None or _better(found, best):
             best = found
         best.tries = tries
-        if best.fit.converged and best.fit.like_noise and (quick or kind != "far"):
-            break
-        if kind == "linear" and base.fit.reduced_chi2 < _BAD and _delivers(best, base, candidate, screened):
+        promised = base.fit.reduced_chi2 < _BAD and kind == "linear"
+        if (promised or best.fit.like_noise) and _delivers(best, base, candidate, screened):
             break
         if settled and gain_over(best, rival)[0] < -_BEATEN:
             break
@@ -95,19 +96,28 @@ def refit(
     return best
 
 
-def _carried(data: Data, candidate: Candidate, known: Fitted) -> Fitted:
-    """A fit made with another noise, carried on with the noise of now."""
+def carried_on(data: Data, candidate: Candidate, known: Fitted) -> Fitted:
+    """An earlier fit, carried on with the noise of now."""
     problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
     fit = minimise(problem, known.fit.values, known.fit.starts)
     return Fitted(candidate.names, candidate.model, problem, fit, candidate.added, known.tries)
 
 
-def _delivers(found: Fitted, base: Fitted, candidate: Candidate, screened: Screened) -> bool:
+def _delivers(found: Fitted, base: Fitted, candidate: Candidate, screened: Screened | None) -> bool:
     """Whether a fit gained what the screen promised, as far as the base is good enough for a promise."""
     if not found.fit.converged:
         return False
-    promised = 0.0 if base.fit.reduced_chi2 > _BAD else screened.gain.get(candidate.names[-1], 0.0)
+    believed = screened is not None and base.fit.reduced_chi2 < _BAD
+    promised = screened.gain.get(candidate.names[-1], 0.0) if believed else 0.0
     return gain_over(found, base)[0] >= _DELIVERED * promised
+
+
+def _better(one: Fitted, other: Fitted) -> bool:
+    """Whether a fit follows clearly more segments, or as many and those more closely."""
+    counts = [fitted.fit.good.sum() for fitted in (one, other)]
+    if abs(counts[0] - counts[1]) > _FEW * max(counts):
+        return bool(counts[0] > counts[1])
+    return gain_over(one, other)[0] > 0
 
 
 def _try(
@@ -135,7 +145,7 @@ def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fit
     fit = minimise(one.problem, values, other.fit.starts, most=15)
     fit = polished(data, one.problem, fit, data.last, 8, guesses=(one.fit.starts,))
     found = Fitted(one.names, one.model, one.problem, fit, one.added, one.tries + 1)
-    return found if gain_over(found, one)[0] > 0 else one
+    return found if _better(found, one) else one
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:

@@ -24,7 +24,8 @@ def suspicious(fit: Fit) -> np.ndarray:
     reduced = fit.chi2 / np.maximum(1, fit.counts)
     usual = max(1.0, float(np.median(reduced[fit.good]))) if fit.good.any() else 1.0
     suspects = np.flatnonzero((reduced > _SUSPECT * usual) | ~fit.good)
-    return suspects[np.argsort(-reduced[suspects])][:_MOST_SEGMENTS]
+    badness = np.where(fit.evaluation.failed, np.inf, reduced)
+    return suspects[np.argsort(-badness[suspects], kind="stable")][:_MOST_SEGMENTS]
 
 
 def rescued(
@@ -44,7 +45,8 @@ def rescued(
     begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
     promising = _promising(copies.evaluate(fit.values, begin, derivatives=False), tries)
     if not promising.size:
-        return fit.starts, improved
+        # from none of the tries can the segments be flown
+        return fit.starts.copy(), improved
     rows, begin = rows[promising], begin[promising]
     found, cost = solve_starts(copies.of_segments(promising), fit.values, begin)
     starts = fit.starts.copy()

@@ -13,7 +13,7 @@ from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, crossed, gain_over, refit
+from separatrix.discovery.refit import Fitted, carried_on, crossed, gain_over, refit
 from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
@@ -26,6 +26,8 @@ _BAD = 1.3
 _CROSSED = 4
 _WORTH_CROSSING = 5.0
 _SHARE = 0.3
+# behind the best by less than so many separations: fitted to the end
+_NEAR = 3.0
 
 
 @dataclass
@@ -36,7 +38,7 @@ class Bench:
     held_out: Data | None
     scales: Scales
     options: Options
-    # why some candidates make no sense for this machine
+    # why some candidates make no sense for this machine, as the first round found
     absent: dict[str, str] = field(default_factory=dict)
 
     def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
@@ -76,6 +78,7 @@ def run_round(
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
+    absent: dict[str, str] = {}
     for effect in CATALOGUE:
         if effect.name in base.names or (options.candidates and effect.name not in options.candidates):
             continue
@@ -83,14 +86,15 @@ def run_round(
             continue
         made = candidate(base.model, free, base.names, effect.name, bench.scales)
         if isinstance(made, str):
-            bench.absent.setdefault(effect.name, made)
+            absent[effect.name] = made
         else:
             candidates[effect.name] = made
     options.progress(f"screening {len(candidates)} effects", first)
-    signatures = [signature(base.problem, base.fit, one) for one in candidates.values()]
-    signatures = [one for one in signatures if one is not None]
-    for name in set(candidates) - {one.name for one in signatures}:
-        bench.absent.setdefault(name, "it changes nothing in these records")
+    shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
+    signatures = [one for one in shown.values() if one is not None]
+    absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
+    if not base.names:
+        bench.absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
     screened = screen(base.fit, signatures)
     chosen = choose(base, screened, options)
     found: list[Judged] = []
@@ -105,6 +109,7 @@ def run_round(
             rival = fitted
         found.append(judged(base, foretold, fitted, bench.foretell(fitted, foretold)))
     found.sort(key=lambda one: -one.evidence)
+    _carry_on(bench, base, foretold, candidates, found)
     _cross(bench, base, foretold, candidates, found)
     foretold, found = _fair(bench, base, foretold, found)
     return Round(base, foretold, candidates, signatures, screened, found)
@@ -121,6 +126,22 @@ def _fair(
         return foretold, found
     again = [judged(base, fairer, one.fitted, one.prediction) for one in found]
     return fairer, sorted(again, key=lambda one: -one.evidence)
+
+
+def _carry_on(
+    bench: Bench,
+    base: Fitted,
+    foretold: Prediction | None,
+    candidates: dict[str, Candidate],
+    found: list[Judged],
+) -> None:
+    """Fit those near the best to their end, however little effort they were thought worth before."""
+    for place, one in enumerate(found):
+        near = found[0].evidence - one.evidence < _NEAR * bench.options.separation
+        if near and not one.fitted.fit.converged:
+            fitted = carried_on(bench.training, candidates[one.name], one.fitted)
+            found[place] = judged(base, foretold, fitted, bench.foretell(fitted, one.prediction))
+    found.sort(key=lambda one: -one.evidence)
 
 
 def _cross(
@@ -147,7 +168,7 @@ def _cross(
 
 def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
-    order = sorted(screened.names, key=lambda name: -screened.gain[name])
+    order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
     if base.fit.reduced_chi2 > _BAD and not options.quick:
         return order
     return [

@@ -7,6 +7,7 @@ of the base machine can imitate is projected out; the rest decides whether the e
 whether it can be told from another (cosines) and how much of the residual it takes (score).
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,8 @@ from separatrix.discovery.problem import Problem
 _SEED = 22
 _DRAWS = 4000
 _TAIL = 0.05
+# share of a signature below which nothing is left of it
+_NOTHING = 1e-7
 
 
 @dataclass
@@ -45,8 +48,14 @@ class Screened:
     live: dict[str, np.ndarray]
     origin: dict[str, np.ndarray]
     cosines: np.ndarray
+    # what the base leaves of each signature
+    shares: dict[str, float]
     # as many independent tests would be as likely to raise a false alarm
     tests: float
+
+    def seen(self, name: str) -> bool:
+        """Whether something of a signature is left beside the base."""
+        return self.shares[name] > _NOTHING
 
     def cosine(self, one: str, other: str) -> float:
         """Largest cosine between what is left of two signatures."""
@@ -126,8 +135,14 @@ def screen(fit: Fit, signatures: list[Signature]) -> Screened:
             cosines[i, j] = cosines[j, i] = min(1.0, float(size))
     live = {one.name: one.live for one in signatures}
     origin = {one.name: one.origin for one in signatures}
-    tests = _independent_tests(left, edges, roots) if len(names) > 1 else float(len(names))
-    return Screened(names, gain, step, error, live, origin, cosines, tests)
+    # what the base can do itself is no candidate
+    raw = np.diag(matrix)[p:]
+    share = np.where(raw > 0, np.diag(left) / np.where(raw > 0, raw, 1), 0)
+    own = [float(share[first:last].max(initial=0)) for first, last in itertools.pairwise(edges)]
+    shares = dict(zip(names, own, strict=True))
+    tested = [root if size > _NOTHING else root[:0] for root, size in zip(roots, own, strict=True)]
+    tests = _independent_tests(left, edges, tested) if len(names) > 1 else float(len(names))
+    return Screened(names, gain, step, error, live, origin, cosines, shares, tests)
 
 
 def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarray]) -> float:
@@ -141,12 +156,13 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
     half = vectors * np.sqrt(np.maximum(values, 0))
     draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, size.size)) @ half.T * size
     lowest = np.ones(_DRAWS)
-    for first, last, root in zip(edges[:-1], edges[1:], roots, strict=True):
+    for (first, last), root in zip(itertools.pairwise(edges), roots, strict=True):
         if root.size:
             squares = np.sum((draws[:, first:last] @ root.T) ** 2, axis=1)
             lowest = np.minimum(lowest, chi2.sf(squares, root.shape[0]))
-    tests = np.log1p(-_TAIL) / np.log1p(-np.quantile(lowest, _TAIL))
-    return float(np.clip(tests, 1, edges[-1]))
+    # signatures that all but vanish are rounding; there are never more tests than parameters
+    least = max(float(np.quantile(lowest, _TAIL)), np.finfo(float).tiny)
+    return float(np.clip(np.log1p(-_TAIL) / np.log1p(-least), 1.0, edges[-1]))
 
 
 def project(

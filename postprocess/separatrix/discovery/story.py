@@ -4,7 +4,7 @@
 
 from separatrix.discovery.options import Options
 from separatrix.discovery.pages import Section, Table
-from separatrix.discovery.wording import digits_of, number, probability, with_unit, words
+from separatrix.discovery.wording import digits_of, interval, number, probability, with_unit, words
 
 GATES = {
     "converged": "the fit converged",
@@ -60,9 +60,9 @@ def _summary(verdict: dict) -> Section:
     for path, one in verdict["parameters"].items():
         if path.startswith("effect."):
             digits = digits_of(one["value"], one["standard_error"])
-            low, high = (number(bound, digits) for bound in one["interval_95"])
+            known = "" if one["interval_95"] is None else "95 % interval "
             lines.append(
-                f"{path} = {with_unit(one['value'], one['unit'], digits)}, 95 % interval {low} to {high}."
+                f"{path} = {with_unit(one['value'], one['unit'], digits)}, {known}{interval(one, digits)}."
             )
     for use, one in verdict["gap"].items():
         change = (
@@ -260,13 +260,12 @@ def _parameters(verdict: dict) -> Section:
     rows = []
     for path, one in verdict["parameters"].items():
         digits = digits_of(one["value"], one["standard_error"])
-        low, high = (number(bound, digits) for bound in one["interval_95"])
         rows.append(
             [
                 path,
                 number(one["value"], digits),
-                number(one["standard_error"], 2),
-                f"{low} to {high}",
+                "-" if one["standard_error"] is None else number(one["standard_error"], 2),
+                interval(one, digits),
                 "" if one["unit"] == "1" else one["unit"],
             ]
         )

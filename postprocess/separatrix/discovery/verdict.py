@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.decide import Decision
+from separatrix.discovery.decoys import decoys
 from separatrix.discovery.judge import Judged
 from separatrix.discovery.limits import detectable, equivalents, separating_experiment
 from separatrix.discovery.refit import Fitted
@@ -52,6 +53,7 @@ def verdict_of(findings: Findings) -> dict:
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
         "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
+        "decoys": decoys(first, bench.options),
         "candidates": [_candidate(one) for one in first.judged],
         "ceiling": {
             one.name: {"gain": one.gain, "rank": one.rank, "p": one.p}
@@ -124,6 +126,7 @@ def _records(findings: Findings) -> list[dict]:
                     "memory": one.memory,
                     "resolution": one.resolution,
                     "drive_frequency": one.frequency,
+                    "drive_scale": one.drive_scale,
                     "phase_known": one.phase_known,
                 }
             )
@@ -133,14 +136,19 @@ def _records(findings: Findings) -> list[dict]:
 def _parameters(fitted: Fitted) -> dict:
     errors = np.sqrt(np.diag(fitted.covariance))
     found = {}
-    for one, value, error in zip(fitted.problem.free, fitted.fit.values, errors, strict=True):
+    for one, value, error, held in zip(
+        fitted.problem.free, fitted.fit.values, errors, fitted.fit.at_bound, strict=True
+    ):
         if one.is_nuisance and one.record is not None:
             continue
         parameter = fitted.model.parameters.get(one.path)
+        known = error > 0 and not held
+        ends = [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)]
         found[one.path] = {
             "value": one.physical(value),
-            "standard_error": one.slope(value) * float(error),
-            "interval_95": [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)],
+            "standard_error": one.slope(value) * float(error) if known else None,
+            "interval_95": ends if known else None,
+            "note": "" if known else "at its bound" if held else "these records say nothing about it",
             "unit": parameter.unit if parameter else "1",
         }
     return found

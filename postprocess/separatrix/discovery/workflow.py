@@ -11,7 +11,7 @@ import numpy as np
 from separatrix.discovery.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
-from separatrix.discovery.machine import record_nuisances, with_values
+from separatrix.discovery.machine import on_other_records, with_values
 from separatrix.discovery.options import Options
 from separatrix.discovery.partial import decide_in_part, nearest
 from separatrix.discovery.preflight import prepare
@@ -47,7 +47,7 @@ def investigate(
     model = _model(base)
     training, held_out, chosen = _split([_record(one) for one in records], [_record(one) for one in hold_out])
     unique_names([*training, *held_out])
-    still = None if rest is None else _record(rest)
+    still = None if rest is None else _record(rest, at_rest=True)
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[prepare(one, model, still) for one in group] for group in (training, held_out)]
     data = gather(prepared[0], options.segment_periods, options.segment_seconds)
@@ -75,13 +75,7 @@ def investigate(
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
     """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
     free = with_values(fitted.problem.free, fitted.fit.values)
-    shared = [one for one in free if one.record is None]
-    own = (
-        record_nuisances([one.phase_known for one in held_out.prepared])
-        if held_out.prepared[0].frequency
-        else []
-    )
-    whole = shared + own
+    whole = on_other_records(free, held_out.prepared)
     find_phases(held_out, model, whole)
     problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0, 1])
     measure_noise(held_out, problem, fit, mass)
@@ -94,8 +88,8 @@ def _model(base: object):
     return base
 
 
-def _record(one: Path | Record) -> Record:
-    return one if isinstance(one, Record) else read_record(Path(one))
+def _record(one: Path | Record, at_rest: bool = False) -> Record:
+    return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
 def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record], list[Record], str]:
