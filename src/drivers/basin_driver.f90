@@ -9,7 +9,7 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_search, only: pack_catalogues, search_catalogues, unpack_catalogues
+  use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use endings, only: report_reasons
   use errors, only: error_t
@@ -82,6 +82,8 @@ contains
     call require_axes(session%the_case, error)
     call session%stop_if(error)
     call prepare_basin(session%the_case, work, tile)
+    call check_slices(work%grid, error)
+    call session%stop_if(error)
     if (command%validate) then
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)

@@ -178,6 +178,7 @@ contains
     size_3 = sum(e3**2)
     error = 0
     if (size_5 > 0) error = abs(h)*size_5/sqrt(2*(size_5 + 0.01_wp*size_3))
+    if (size_5 /= size_5) error = size_5
   end subroutine try_step
 
   !> Weighted sum of the slopes before stage `i`.

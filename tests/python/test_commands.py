@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import KINDS, STARTS, Outcome, differences, listing, succeed, write_case
+from program import KINDS, STARTS, Outcome, differences, listing, run, succeed, write_case
 
 COMMANDS = ["basin", "sweep", "trajectory", "points", "laws", "info", "verify"]
 OPTIONS = [
@@ -373,3 +373,16 @@ def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
     assert "given up" not in plain
     assert "many starts" in plain
     assert sum(map(int, re.findall(r"ended as \w+: (\d+) points", plain))) == 42
+
+
+def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
+    """The numbers of all attractors are exchanged in one piece, which counts to 2**31 - 1."""
+    write_case(tmp_path)
+    axes = (
+        "axis=[{name='x0', from=0, to=1, count=2}, {name='drive.ratio', from=0.8, to=1.4, count=1300},"
+        " {name='friction.kinetic_coefficient', from=0.1, to=0.3, count=1300}]"
+    )
+    ended = run(separatrix, "basin", "case.toml", "--validate", "--set", axes, folder=tmp_path)
+    assert ended.code == 65
+    assert "'axis.count': found 1690000" in ended.err
+    assert "allowed at most 1643" in ended.err

@@ -18,8 +18,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 OPTIONS = {
-    "emps": ["--segment-seconds", "0.5", "--effects"]
-    + ["asymmetric_friction,position_dependent_friction,quadratic_drag"],
+    "emps": ["--segment-seconds", "0.5", "--effects", "asymmetric_friction,position_dependent_friction"],
     "pendulum_large": [],
     "pendulum_small": ["--segment-seconds", "0.4"],
 }

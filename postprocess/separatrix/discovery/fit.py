@@ -88,10 +88,11 @@ class Fit:
         """Sum of squares per degree of freedom."""
         return self.total / max(1, self.freedom)
 
-    @property
-    def like_noise(self) -> bool:
-        """Whether chi^2 is what noise alone would leave, within a standard deviation or 3 %."""
-        return self.freedom > 0 and self.reduced_chi2 < 1 + max(_FINE, np.sqrt(2 / self.freedom))
+    def like_noise(self, deviations: float) -> bool:
+        """Whether chi^2 is what noise alone would leave, within so many standard deviations or 3 %."""
+        if self.freedom <= 0:
+            return False
+        return self.reduced_chi2 < 1 + max(_FINE, deviations * np.sqrt(2 / self.freedom))
 
 
 def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:
