@@ -280,3 +280,10 @@ def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
     assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err.splitlines() == ["separatrix-discover: interrupted, nothing was written"]
     assert not (tmp_path / "out").exists()
+
+
+def test_the_report_has_its_share_of_the_time(capsys):
+    progress = cli.Progress()
+    progress.began -= 67.0
+    progress("writing the report", 0.9)
+    assert "about 33 s left" in capsys.readouterr().err
