@@ -229,7 +229,7 @@ contains
       bodies%path(:, at_v2) = pressing%side*stretch%path(:, at_rate) + pressing%carried*stretch%path(:, at_v1)
       if (pressing%sense == 0) bodies%path(:, at_v2) = stretch%path(:, at_v1)
     end associate
-    call note_extremes(bodies, last, tally)
+    call note_extremes(moving, damped%pressing%side, bodies, last, tally)
     if (.not. present(log)) return
     log%peak_penetration = max(log%peak_penetration, largest(stretch%path(:, at_p), last))
     log%peak_force = max(log%peak_force, largest(series_of(stretch, damped%force), last))
