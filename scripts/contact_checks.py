@@ -161,11 +161,13 @@ def books(program: Program) -> list[Check]:
         "backlash under a force": ("pair_backlash",),
         "platform with a controller": ("pair_platform", controlled),
         "sampled controller": ("pair_platform", controlled.replace("}", ", sample_time=0.01}")),
+        "bouncing on a linear stop": ("pair_platform", linear),
+        "linear stop that does not pull": ("pair_platform", linear.replace("}", ", tension=0}")),
         "one body, Coulomb friction, impacts": ("trajectory_coulomb_1.05",),
+        "one body on a linear barrier": ("contact_kelvin_voigt",),
     }
     adaptive = {
         "bouncing on a soft stop": ("pair_platform", soft),
-        "bouncing on a linear stop": ("pair_platform", linear),
         "soft backlash under a force": ("pair_backlash", soft.replace("upper=1", "upper=0.1, lower=-0.1")),
         "one body on a soft barrier": ("contact_hunt_crossley",),
         "one body, Stribeck friction, impacts": ("trajectory_stribeck_1.2_impact",),

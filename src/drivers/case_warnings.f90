@@ -13,6 +13,7 @@ module case_warnings
   use kinds, only: int64, wp
   use motion, only: motion_t
   use pair, only: impact_mass
+  use pair_damper, only: is_damper
   use strobe, only: has_section
   use text, only: to_text
   implicit none
@@ -54,14 +55,19 @@ contains
     type(case_t), intent(in) :: the_case
     type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
-    real(wp) :: force, mass, lasts
+    real(wp) :: force, mass, rate, lasts
     mass = moving%machine%mass
     force = moving%machine%force_scale
     if (allocated(moving%pair)) then
       mass = impact_mass(moving%pair%machine)
       force = moving%pair%force_scale
     end if
-    lasts = the_case%integrator%step_budget/steps_per_second(moving%machine%contact, mass, force)
+    rate = steps_per_second(moving%machine%contact, mass, force)
+    if (allocated(moving%pair)) then
+      ! In closed form, one a radian of the fastest motion.
+      if (is_damper(moving%pair)) rate = max(sqrt(moving%machine%contact%stiffness/mass), moving%machine%contact%damping/mass)
+    end if
+    lasts = the_case%integrator%step_budget/rate
     if (lasts >= the_case%run%duration) return
     call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &
       to_text(the_case%integrator%step_budget)//' lasts a body that leans on it about '//to_text(lasts, 2)//' s of '// &

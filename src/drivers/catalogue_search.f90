@@ -20,6 +20,7 @@ module catalogue_search
   use team, only: team_t
   use text, only: to_text
   use trajectory, only: span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none
   private
 
@@ -215,6 +216,7 @@ contains
     position = 0
     do while (position < size(packed))
       whole = position + 2 <= size(packed)
+      if (whole) whole = all(ieee_is_finite(packed(position + 1:position + 2)))
       if (whole) whole = packed(position + 1) >= 1 .and. packed(position + 1) <= size(catalogues) .and. &
         packed(position + 2) >= 0 .and. packed(position + 2) <= (size(packed) - position - 2)/packed_size
       if (.not. whole) then

@@ -15,7 +15,7 @@ module pair_flight
   implicit none
   private
 
-  public :: fly_pair, body_state, driver_of, energy_of
+  public :: fly_pair, body_state, driver_of, energy_of, note_extremes
 
   !> Guards.
   integer, parameter, public :: guard_none = 0, guard_upper = 1, guard_lower = 2, guard_slip = 3, guard_plus = 4, &

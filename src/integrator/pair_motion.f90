@@ -11,6 +11,7 @@ module pair_motion
     mode_upper_barrier, record_event, sticks_in, tally_t, word_period, word_stick
   use pair, only: driven_by_controller, driven_by_motion
   use pair_contact, only: fly_pressed, mode_pressed, touch_stop
+  use pair_damper, only: fly_damped, is_damper
   use pair_flight, only: body_state, driver_of, fly_pair, guard_failed, guard_leave, guard_lower, guard_minus, guard_plus, &
     guard_press, guard_separate, guard_slip, guard_upper
   use pair_impact, only: collide_pair, rest_on_stop
@@ -160,7 +161,9 @@ contains
     mode = state%mode
     slips = .not. sticks_in(mode, .true.)
     presses = state%pressed /= 0
-    if (presses) then
+    if (presses .and. is_damper(moving)) then
+      call fly_damped(moving, state, stop_time, held, fallen, tally, log)
+    else if (presses) then
       call fly_pressed(moving, state, stop_time, held, fallen, tally, log)
     else
       call fly_pair(moving, state, stop_time, held, fallen, tally, log)

@@ -69,12 +69,15 @@ inline mask pick(mask m, mask a, mask b) { return (m & a) | (~m & b); }
 // Replaces a by b where m holds.
 inline void put(vec &a, mask m, vec b) { a = pick(m, b, a); }
 
+// Down to two integers by vectors, so that few have to be taken out one by one.
 inline bool any(mask m) {
+  typedef int64_t two __attribute__((vector_size(16)));
   reg_mask both = m.low | m.high;
-  int64_t bits = 0;
-  for (int i = 0; i < width; i++)
-    bits |= both[i];
-  return bits != 0;
+  two parts[width / 2], bits = {};
+  memcpy(parts, &both, sizeof both);
+  for (const two &part : parts)
+    bits |= part;
+  return (bits[0] | bits[1]) != 0;
 }
 
 inline vec magnitude(vec a) {

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from program import CASE, STARTS, Outcome, run, write_case
 from separatrix import SeparatrixError, open_result
+from separatrix.discovery.records import read_record
 from separatrix.open import reading
 
 CORPUS = Path(__file__).resolve().parents[1] / "faults" / "corpus"
@@ -54,6 +55,12 @@ def test_result_files(separatrix, tmp_path, path):
             result.load()
     except SeparatrixError as error:
         assert str(path) in str(error)
+
+
+@pytest.mark.parametrize("path", sorted(CORPUS.glob("*.record")), ids=lambda path: path.name)
+def test_measured_records(path):
+    with pytest.raises(SeparatrixError, match=path.name):
+        read_record(path)
 
 
 def awkward_cases() -> dict[str, bytes]:

@@ -131,7 +131,8 @@ def test_what_was_not_tested_is_that_of_the_first_round_in_the_order_of_the_cata
         rounds, "candidate", lambda *words: "the machine has no friction" if words[3] == "dahl" else object()
     )
     monkeypatch.setattr(rounds, "signature", lambda *_: None)
-    monkeypatch.setattr(rounds, "screen", lambda *_: SimpleNamespace(names=[]))
+    monkeypatch.setattr(rounds, "screen", lambda *_: None)
+    monkeypatch.setattr(rounds, "choose", lambda *_: [])
     bench = rounds.Bench(None, None, None, Options(candidates=tuple(reversed(names))))
     for added in ((), ("viscous",)):
         base = SimpleNamespace(

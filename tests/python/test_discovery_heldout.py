@@ -44,8 +44,16 @@ def test_of_two_wrong_machines_the_one_with_smaller_errors_wins_however_uncertai
 
 @pytest.mark.parametrize("misfit", [1.0, 1.4])
 def test_a_machine_near_the_noise_is_judged_by_its_predictive_density(misfit):
-    wrong, right = prediction([900.0], [-440.0], 20.0), prediction([50.0], [-27.0], misfit)
-    assert gained(right, wrong) == pytest.approx([413.0])
+    wrong, right = prediction([90.0], [-40.0], 1.3), prediction([50.0], [-27.0], misfit)
+    assert gained(right, wrong) == pytest.approx([13.0])
+
+
+def test_candidates_over_one_base_are_ranked_as_against_each_other():
+    """The density of a wrong base, its parameters hardly known, hides what a right machine gains over it."""
+    base = prediction([9000.0], [-300.0], 600.0)
+    wrong, right = prediction([900.0], [-100.0], 30.0), prediction([50.0], [-27.0], 1.0)
+    assert gained(right, base) - gained(wrong, base) == pytest.approx(gained(right, wrong))
+    assert gained(right, wrong) > 0
 
 
 def test_segments_that_one_machine_cannot_fly_count_for_neither():

@@ -95,3 +95,21 @@ def test_a_machine_under_measured_force_needs_one():
     del columns["force"]
     with pytest.raises(SeparatrixError, match="no column 'force'"):
         prepare(make_record("pushed", columns), Model.from_text(PUSHED))
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "words"),
+    [
+        ("phi", 0, "'phi' advances by 0 rad"),
+        ("v", 0, "'v' is constant"),
+        ("v", 1000, r"'v' is 100\d times the slope of 'x'.*m/s"),
+        ("v", -1, "'v' is not the velocity of 'x'"),
+    ],
+)
+def test_channels_that_cannot_be_what_they_are_called_are_refused(channel, factor, words):
+    t = np.arange(800) / 100
+    x = 0.8 + 0.2 * np.cos(RATE * t)
+    true = {"phi": RATE * t, "v": -0.2 * RATE * np.sin(RATE * t) + 0.01 * np.cos(333 * t)}
+    record = make_record("odd", {"t": t, "x": x, channel: factor * true[channel]}, {"phase": 0})
+    with pytest.raises(SeparatrixError, match=words):
+        prepare(record, Model.from_text(CASE))

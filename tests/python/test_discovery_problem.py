@@ -5,6 +5,8 @@
 import numpy as np
 import pytest
 from program import CASE
+from separatrix.discovery.ceiling import ceiling
+from separatrix.discovery.fit import minimise
 from separatrix.discovery.machine import base_parameters, drive_nuisances
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.problem import Problem
@@ -87,3 +89,12 @@ def test_derivatives_are_central_differences(flown):
         wanted /= 1e-7
         assert smooth.mean() > 0.999
         assert np.abs(found.by_start[good, :, k] - wanted)[smooth].max() < 2e-4 * np.abs(wanted).max()
+
+
+def test_kicks_at_impacts_are_among_what_is_tried(flown):
+    """The barrier is an upper one: the speed falls at its impacts."""
+    problem, values, starts = flown
+    fit = minimise(problem, values, starts, most=0)
+    found = {one.name: one for one in ceiling(problem, fit, 1.0).families}
+    # constant, with speed, its square and cube, and with time and its square
+    assert found["impacts"].rank == 6

@@ -17,6 +17,7 @@ from program import CASE
 from separatrix.discovery import comparison
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.discovery.story import sections
 from separatrix.library import Model
 
 SECTIONS = [
@@ -98,6 +99,7 @@ def verdict(outcome: str) -> dict:
         }  # fmt: skip
     return {
         "outcome": outcome,
+        "complete": True,
         "effects": effects,
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
         "equivalent": False,
@@ -245,6 +247,13 @@ def test_the_excess_that_was_removed(report: tuple) -> None:
         if removed == 0
         else float(cell.removesuffix(" %")) == pytest.approx(100 * removed, abs=0.06)
     )
+
+
+def test_a_verdict_in_part_says_that_a_gap_remains() -> None:
+    for complete in (True, False):
+        summary = sections(verdict("named") | {"complete": complete})[0].body[0]
+        assert ("a gap remains" in summary) != complete
+        assert ("All gates are passed" in summary) == complete
 
 
 def test_the_words_fit_the_outcome(report: tuple) -> None:

@@ -12,7 +12,6 @@ from separatrix.discovery.problem import Problem
 from separatrix.discovery.refit import Fitted
 
 _PHASES = 12
-_DISAGREEMENT = 1.3
 _RENEWED = 0.03
 _RENEWED_MEMORY = 0.06
 # reduced chi^2 above which correlated residuals say more about the model than about the noise
@@ -44,7 +43,7 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
 
 
 def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
-    """Set what the records do not state, and doubt what they state if the samples scatter more.
+    """Set what the records do not state.
 
     The fit must have been made without memory.
     """
@@ -54,10 +53,6 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
-        elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(
-                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
-            )
     if any(one.record.v is not None for one in data.prepared):
         factors, _ = noise_of(problem, fit, 1, mass)
         for number, prepared in enumerate(data.prepared):

@@ -236,7 +236,7 @@ def _starts(effect: Effect, sizes: dict[str, list[float]], added: list[Free]) ->
         fitted = np.log(values) if key in effect.positive else np.array(values)
         choices.append([float(sign * value) for value in fitted for sign in signs])
     found = [np.array(values, float) for values in product(*choices)]
-    # two linear parameters: one sign of each and the opposite is enough
+    # two linear parameters: one sign of the first, both of the second
     return found[:2] if len(effect.linear) == 2 else found
 
 

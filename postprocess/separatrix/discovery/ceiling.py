@@ -152,9 +152,9 @@ def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
 
 
 def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
-    """Changes of the speed after an impact: constant, with the speed before, its square, and with time."""
+    """Changes of the speed after an impact: a cubic of the speed before, and with time and its square."""
     before, at = _impacts(problem, fit)
-    if at.sum() < 4:
+    if np.count_nonzero(at) < 4:
         return None
     speed = before / state["speed"]
     scale = 0.1 * state["speed"]

@@ -19,13 +19,12 @@ from separatrix.discovery.judge import (
     stable,
 )
 from separatrix.discovery.machine import with_values
+from separatrix.discovery.misfit import missed
 from separatrix.discovery.refit import Fitted, refit, shared_values
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.screen import screen, signature
 
 _PAIRS = 6
-_INCLUSION = 0.9
-_HARM = -3.0
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
 _RENEWALS = 3
 _LEADERS = 3
@@ -49,7 +48,6 @@ class Decision:
     equivalent: bool = False
     # whether nothing is left to name
     complete: bool = True
-    shares: list[float] = field(default_factory=list)
 
 
 def decide(bench: Bench, base: Fitted) -> Decision:
@@ -74,8 +72,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     if not (best.gates["detect"] and best.gates["stable"]):
         # what a few segments carry is not detected
         return _without_name(bench, decision)
-    share = _ceiling_of(bench, best, base)
-    decision.shares.append(share)
+    _judge_ceiling(bench, best)
     if best.gates["adequate"]:
         return _conclude(bench, decision, best, rivals)
     return _with_more(bench, decision, base, best, rivals)
@@ -88,7 +85,7 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
     merit of the candidate.
     """
     base = first.base
-    leaders = sorted(first.judged, key=lambda one: -one.training)[:_LEADERS]
+    lowest_misfit = sorted(first.judged, key=lambda one: -one.training)[:_LEADERS]
     best = next((one for one in first.judged if one.fitted.fit.converged), None)
     if best is None:
         return None
@@ -98,7 +95,7 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
         renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
         copy_noise(bench.training, bench.held_out)
     fits = [minimise(base.problem, base.fit.values, base.fit.starts)]
-    for one in leaders:
+    for one in lowest_misfit:
         values = shared_values(base, one.fitted)
         fits.append(minimise(base.problem, values, one.fitted.fit.starts))
     fits = [fit for fit in fits if fit.good.sum() >= fits[0].good.sum()]
@@ -110,7 +107,7 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
 
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    able = [one for one in found.judged if admissible(one, found.base)[0]]
+    able = [one for one in found.judged if admissible(one, found.base, bench.options)[0]]
     return foremost(able or found.judged, bench.options.separation)
 
 
@@ -136,16 +133,15 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
         helps = any(low > 0 for low, _ in bounds)
-        best.gates["hold-out"] = bool(helps and all(high > _HARM for _, high in bounds))
+        best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
     best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best, base)[0]
-    best.gates["stable"] = stable(best, base, options) >= _INCLUSION
+    best.gates["admissible"] = admissible(best, base, options)[0]
+    best.gates["stable"] = stable(best, base, options) >= options.inclusion
 
 
-def _ceiling_of(bench: Bench, one: Judged, base: Fitted) -> float:
+def _judge_ceiling(bench: Bench, one: Judged) -> None:
     one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
-    one.gates["adequate"], share = adequate(one, base, bench.options)
-    return share
+    one.gates["adequate"] = adequate(one, bench.options)
 
 
 def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
@@ -171,7 +167,16 @@ def _equivalent(one: Judged, other: Judged) -> bool:
 
 def _without_name(bench: Bench, decision: Decision) -> Decision:
     """Nothing in the catalogue helps: either there is no gap, or the catalogue lacks what makes it."""
-    if decision.base_ceiling.p < 0.3 * bench.options.detection_level:
+    fits = [(bench.training, decision.rounds[0].base)]
+    if bench.held_out is not None and decision.foretold is not None:
+        fits.append((bench.held_out, decision.foretold))
+    left = [one for data, fitted in fits for one in missed(data, fitted.fit, bench.options)]
+    if left:
+        decision.outcome = "not-in-catalogue"
+        decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
+    elif fits[0][1].fit.reduced_chi2 > bench.options.adequate_chi2:
+        decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
+    if decision.base_ceiling.p < bench.options.gap_share * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
             f"forces that depend on {decision.base_ceiling.best.name} would explain more, no effect does"
@@ -195,20 +200,20 @@ def _with_more(
             if made is not None:
                 pairs.append(over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if admissible(one, base)[0]]
+    pairs = [one for one in pairs if admissible(one, base, bench.options)[0]]
     if not pairs:
         return _give_up(decision)
     pair, close = foremost(pairs, bench.options.separation)
     pass_gates(bench, pair, base, close, second.screened.tests)
     # both must be needed: each over the other alone
+    needed = bench.options.needed * bench.options.separation
     singles = {one.name: one for one in decision.rounds[0].judged}
     for name in pair.fitted.names:
         others = [other for other in pair.fitted.names if other != name]
         without = singles.get(others[0]) if len(others) == 1 else None
-        if without is not None and pair.evidence - without.evidence < 2 * bench.options.separation:
+        if without is not None and pair.evidence - without.evidence < needed:
             pair.gates["drop"] = False
-    share = _ceiling_of(bench, pair, base)
-    decision.shares.append(share)
+    _judge_ceiling(bench, pair)
     if pair.gates["adequate"] and pair.gates.get("drop", True):
         return _conclude(bench, decision, pair, close)
     return _give_up(decision)

@@ -58,12 +58,14 @@ class Fit:
     iterations: int
     at_bound: np.ndarray
     movable: np.ndarray
+    # in a minimum that is known not to be the lowest
+    caught: bool = False
 
     @property
     def converged(self) -> bool:
         """Certificate: along every direction the minimum is within half a standard error."""
         small = self.decrement < max(_NEAR, 1e-4 * self.total) and np.isfinite(self.decrement)
-        return bool(small and self.good.any())
+        return bool(small and self.good.any() and not self.caught)
 
     @property
     def good(self) -> np.ndarray:
@@ -86,10 +88,11 @@ class Fit:
         """Sum of squares per degree of freedom."""
         return self.total / max(1, self.freedom)
 
-    @property
-    def like_noise(self) -> bool:
-        """Whether chi^2 is what noise alone would leave, within a standard deviation or 3 %."""
-        return self.freedom > 0 and self.reduced_chi2 < 1 + max(_FINE, np.sqrt(2 / self.freedom))
+    def like_noise(self, deviations: float) -> bool:
+        """Whether chi^2 is what noise alone would leave, within so many standard deviations or 3 %."""
+        if self.freedom <= 0:
+            return False
+        return self.reduced_chi2 < 1 + max(_FINE, deviations * np.sqrt(2 / self.freedom))
 
 
 def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:

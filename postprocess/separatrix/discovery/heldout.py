@@ -7,7 +7,7 @@ clock. The score of a segment is the logarithm of its predictive density, with t
 parameters.
 
 Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
-forgiven more; such machines are compared by their squared errors alone.
+forgiven more; what is held against such a machine is compared by squared errors alone.
 """
 
 from dataclasses import dataclass
@@ -74,14 +74,13 @@ def predict(
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
     """What `one` foretells better than `other` by segment, in units of log density; 0 where one fails.
 
-    The difference of the scores. Where both machines miss the records by far more than the noise, their
-    densities mean nothing, and it is the difference of squared errors (the comparison of Diebold and
-    Mariano), both machines taken as fitted.
+    The difference of the scores. Where the `other` misses the records by far more than the noise, its density
+    means nothing, and it is the difference of squared errors (the comparison of Diebold and Mariano), both
+    machines taken as fitted. The machine that all candidates are held against chooses the measure, so that
+    what they gain can be compared.
     """
-    if min(one.misfit, other.misfit) > _MISFIT:
-        parts = 0.5 * (other.fit.chi2 - one.fit.chi2)
-    else:
-        parts = one.score - other.score
+    wrong = other.misfit > _MISFIT
+    parts = 0.5 * (other.fit.chi2 - one.fit.chi2) if wrong else one.score - other.score
     return np.where(one.good & other.good, parts, 0.0)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evidence of the candidates and the five gates that a name has to pass."""
+"""Evidence of the candidates and the gates that a name has to pass."""
 
 from dataclasses import dataclass, field
 
@@ -13,8 +13,6 @@ from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, gain_over
 
 _BLOCKS = 2
-# share of the base's segments that a candidate must be able to follow
-_FOLLOWED = 0.9
 
 
 @dataclass
@@ -93,7 +91,7 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     return float(np.mean(sums > one.parameters))
 
 
-def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
+def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     """Signs and bounds: the effect is inside of its own, is not nothing, and leaves the drive sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
     errors = np.sqrt(np.diag(one.fitted.covariance))
@@ -105,25 +103,26 @@ def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
         # the logarithm of a number says by its error whether the number is known at all
         size = 1.0 if free[i].positive else abs(fit.values[i])
         clear.append(size > 1.96 * errors[i] > 0)
-    if fit.good.sum() < _FOLLOWED * max(1, base_good):
+    if fit.good.sum() < options.followed * max(1, base_good):
         return False, "the machine with it cannot follow some segments that the base can"
     if not clear:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):
         return False, "its 95 % intervals contain zero"
     usual = float(np.sqrt(np.mean(fit.evaluation.v[fit.good] ** 2))) if fit.good.any() else 0.0
+    lowest, highest = options.drive_scales
     for i, value in enumerate(fit.values):
         if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
             return False, "its velocity is above the usual speed, where it is Coulomb friction"
-        if free[i].path == "nuisance:drive_scale" and not 0.5 < value < 2:
+        if free[i].path == "nuisance:drive_scale" and not lowest < value < highest:
             return False, f"it would need a drive {value:.3g} times the stated one"
     return True, ""
 
 
-def adequate(one: Judged, base: Fitted, options: Options) -> tuple[bool, float]:
-    """Whether what is left is noise, and the share of the closable gap that is closed."""
+def adequate(one: Judged, options: Options) -> bool:
+    """Whether what is left is noise, or little of a gap that was closed nearly all."""
     gained = max(0.0, 2 * one.training)
     share = gained / max(gained + one.ceiling.closable, 1e-300)
     clean = one.ceiling.p > options.detection_level
-    small = one.fitted.fit.reduced_chi2 <= options.adequate_chi2
-    return bool(small and (clean or (share >= options.adequate_share and one.ceiling.p > 1e-4))), share
+    closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
+    return bool(one.fitted.fit.reduced_chi2 <= options.adequate_chi2 and (clean or closed))

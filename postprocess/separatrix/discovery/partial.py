@@ -37,7 +37,7 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
         return decision
     base = decision.rounds[0].base
     rounds = decision.rounds[:1]
-    accepted = _next(bench, rounds[0]) or _pair(bench, rounds[0])
+    accepted = _first(bench, rounds[0])
     last = None
     while accepted is not None:
         last = accepted
@@ -52,7 +52,8 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
     whole = over_base(bench, base, rounds[0].foretold, last)
     whole.gates, whole.p = last.gates, last.p
     whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
-    complete, _ = adequate(whole, base, bench.options)
+    complete = adequate(whole, bench.options)
+    whole.gates["adequate"] = complete
     return replace(
         decision,
         outcome="named",
@@ -87,17 +88,26 @@ def remaining(bench: Bench, whole: Judged) -> list[str]:
 
 
 def nearest(bench: Bench, decision: Decision) -> list[str]:
-    """Say which single effect a decision in part would name, where the strict one names none."""
+    """Say which single effect passes where the strict decision names none."""
     if decision.outcome != "not-in-catalogue":
         return []
     found = _next(bench, decision.rounds[0])
-    return [f"{found.name} passes every gate but the adequacy: --partial names it"] if found else []
+    said = "passes every gate but the adequacy; --partial names what helps though a gap remains"
+    return [f"{found.name} {said}"] if found else []
 
 
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
-    pool = [one for one in found.judged if settled(one) and admissible(one, found.base)[0]]
+    pool = [one for one in found.judged if settled(one) and admissible(one, found.base, bench.options)[0]]
     return _passing(bench, found, pool)
+
+
+def _first(bench: Bench, found: Round) -> Judged | None:
+    """One effect, or two where together they foretell clearly better than the one."""
+    single, pair = _next(bench, found), _pair(bench, found)
+    if single is None or pair is None:
+        return single or pair
+    return pair if _adds(pair, single, bench.options) else single
 
 
 def _pair(bench: Bench, found: Round) -> Judged | None:
@@ -115,21 +125,21 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
         fitted = fit_pair(bench, found, one, other)
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if settled(one) and _both_clear(one, found)]
+    pairs = [one for one in pairs if settled(one) and _both_clear(one, found, bench.options)]
     best = _passing(bench, found, pairs)
     return best if best is not None and _all_needed(bench, found, best) else None
 
 
-def _both_clear(pair: Judged, found: Round) -> bool:
+def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
     """Whether every parameter of both effects is inside its bounds and differs from nothing."""
     fit = pair.fitted.fit
     errors = np.sqrt(np.diag(pair.fitted.covariance))
     clear = [not fit.at_bound[i] and abs(fit.values[i]) > 1.96 * errors[i] for i in pair.fitted.added]
-    return all(clear) and admissible(pair, found.base)[0]
+    return all(clear) and admissible(pair, found.base, options)[0]
 
 
 def settled(one: Judged) -> bool:
-    """Whether a further step promises less than one residual: what sticks has kinks where no step is exact."""
+    """Whether a further step promises less than one residual: what sticks has kinks where no step fits."""
     fit = one.fitted.fit
     return fit.converged or fit.decrement < fit.reduced_chi2
 
@@ -139,6 +149,8 @@ def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     if not pool:
         return None
     best, rivals = preferred(pool, bench.options)
+    # the strict decision may have asked for it
+    best.gates.pop("adequate", None)
     pass_gates(bench, best, found.base, rivals, found.screened.tests)
     best.gates["converged"] = settled(best)
     best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
@@ -164,6 +176,12 @@ def _clearly(one: Judged, other: Judged, options: Options) -> bool:
     return any(low > 0 for low, _ in held_out_bounds(over, options).values())
 
 
+def _adds(one: Judged, other: Judged, options: Options) -> bool:
+    """Whether `one` foretells better than `other` by more than chance and by enough."""
+    closes = one.prediction is None or _closes(other.prediction.reduced_chi2, one.prediction.reduced_chi2)
+    return closes and _clearly(one, other, options)
+
+
 def worth_a_name(one: Judged, found: Round) -> bool:
     """Whether a candidate closes enough of the gap that its base leaves on held-out records."""
     return one.prediction is None or _closes(found.foretold.reduced_chi2, one.prediction.reduced_chi2)
@@ -185,9 +203,7 @@ def _all_needed(bench: Bench, first: Round, one: Judged) -> bool:
             missed[name] = np.inf
             continue
         over = judged(without.fitted, without.prediction, one.fitted, one.prediction)
-        needed = _clearly(one, without, bench.options)
-        if one.prediction is not None:
-            needed = needed and _closes(without.prediction.reduced_chi2, one.prediction.reduced_chi2)
+        needed = _adds(one, without, bench.options)
         missed[name] = over.evidence if needed else -np.inf
     one.gates["drop"] = all(size > 0 for size in missed.values())
     one.fitted = replace(one.fitted, names=tuple(sorted(missed, key=lambda name: -missed[name])))

@@ -17,6 +17,8 @@ _FEWEST_PERIODS = 2.0
 _UNEVEN = 1e-2
 # sizes of a record against those of the machine beyond which a unit must be wrong
 _MOST_RATIO = 50.0
+# of the velocity over the slope of the position, beyond which its unit must be wrong
+_UNIT = 2.0
 
 
 @dataclass
@@ -40,11 +42,6 @@ class Prepared:
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
 
-    def note(self, text: str) -> None:
-        """Keep a remark once."""
-        if text not in self.notes:
-            self.notes.append(text)
-
     @property
     def period_samples(self) -> float | None:
         """Samples per drive period."""
@@ -56,6 +53,8 @@ class Prepared:
 def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     """Measure what the header does not say, and refuse what cannot be a record of this machine."""
     notes = list(record.warnings)
+    if record.v is not None:
+        _check_velocity(record, notes)
     record = _with_its_force(record, model, notes)
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     sigma = _noise(record, rest, resolution, notes)
@@ -77,8 +76,6 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     prepared.velocity_sigma_stated = "sensor_noise_sigma_m_s" in record.header
     _find_drive(prepared, model)
     _check_size(prepared, model)
-    if record.v is not None:
-        _note_delay(prepared)
     return prepared
 
 
@@ -122,6 +119,11 @@ def _find_drive(prepared: Prepared, model) -> None:
         return
     if record.phi is not None:
         prepared.frequency, prepared.phase = turning(record)
+        if prepared.frequency * record.duration < np.pi:
+            raise SeparatrixError(
+                f"{record.name}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
+                "not the angle of a turning crank"
+            )
         prepared.origin, prepared.phase_known = float(record.t[0]), True
     else:
         header = record.header
@@ -241,9 +243,10 @@ def _is_soft(model) -> bool:
     return "contact.stiffness" in model.parameters
 
 
-def _note_delay(prepared: Prepared) -> None:
-    """Delay of x behind v, from the best overlap of v with the slope of x."""
-    record = prepared.record
+def _check_velocity(record: Record, notes: list[str]) -> None:
+    """Compare v with the slope of x: another quantity, another unit, a delay."""
+    if np.ptp(record.v) == 0:
+        raise SeparatrixError(f"{record.name}: 'v' is constant")
     dt = record.interval
     slope = np.gradient(record.x, record.t)
     shifts = np.arange(-4, 5)
@@ -254,5 +257,11 @@ def _note_delay(prepared: Prepared) -> None:
         raise SeparatrixError(
             f"{record.name}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
         )
+    ratio = float(np.std(record.v[inner]) / np.std(slope[inner]))
+    # noise of either one moves the ratio by no more than the correlation
+    if not overlap[best] / _UNIT < ratio < _UNIT / overlap[best]:
+        raise SeparatrixError(
+            f"{record.name}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s"
+        )
     if shifts[best]:
-        prepared.notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")
+        notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.trial import try_first
 
 CHANNELS = ("x", "v", "a", "force", "phi")
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
@@ -132,16 +133,16 @@ def _numbers(path: Path, number: int, text: str, names: list[str]) -> list[float
 
 
 def _read_hdf5(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], None]:
+    try_first(path, lambda: _texts(h5py.File(path)))
     try:
         with h5py.File(path) as file:
-            header = {key: _text(value) for key, value in file.attrs.items()}
+            header, units = _texts(file)
             columns = {
                 name: np.asarray(file[name][()], float)
                 for name in ("t", *CHANNELS)
                 if isinstance(file.get(name), h5py.Dataset)
             }
-            units = [_text(file[name].attrs["units"]) for name in ("t", "x") if "units" in file[name].attrs]
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
         raise SeparatrixError(f"{path}: not a record that can be read: {error}") from None
     missing = [name for name in ("t", "x") if name not in columns]
     if missing:
@@ -151,6 +152,12 @@ def _read_hdf5(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], None]
     if len(units) == 2:
         header.setdefault("units", ", ".join(units))
     return header, columns, None
+
+
+def _texts(file: h5py.File) -> tuple[dict[str, str], list[str]]:
+    header = {key: _text(value) for key, value in file.attrs.items()}
+    found = [file[name].attrs for name in ("t", "x") if name in file]
+    return header, [_text(attributes["units"]) for attributes in found if "units" in attributes]
 
 
 def _text(value: object) -> str:

@@ -20,8 +20,12 @@ _BAD = 1.3
 _HOPELESS = 4.0
 # log-likelihood by which a candidate is out of the race
 _BEATEN = 15.0
+# segments that may be caught in a wrong minimum
+_SPARED = 3
 # share of segments that one fit may follow more than another without being better
 _FEW = 0.1
+# log-likelihood by which a machine that contains the base may be worse than it
+_WORSE = 1.0
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -36,11 +40,6 @@ class Fitted:
     fit: Fit
     added: tuple[int, ...]
     tries: int = 1
-
-    @property
-    def paths(self) -> list[str]:
-        """Paths of the parameters of the effect that was added last."""
-        return [self.problem.free[i].path for i in self.added]
 
     @property
     def covariance(self) -> np.ndarray:
@@ -76,24 +75,52 @@ def refit(
         if _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
-    settled = rival is not None and rival.fit.converged and rival.fit.like_noise
+    settled = rival is not None and rival.fit.converged and rival.fit.like_noise(2)
     for tries, (kind, start) in enumerate(_starts(candidate, screened), start=1):
         tried = values.copy()
         tried[list(candidate.added)] = start
         problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
+        rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
+        if best is None and settled and beaten(rough, rival):
+            return rough
         fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None or _better(found, best):
             best = found
         best.tries = tries
         promised = base.fit.reduced_chi2 < _BAD and kind == "linear"
-        if (promised or best.fit.like_noise) and _delivers(best, base, candidate, screened):
+        if (promised or best.fit.like_noise(1)) and _delivers(best, base, candidate, screened):
             break
         if settled and gain_over(best, rival)[0] < -_BEATEN:
             break
         if quick and tries == 2:
             break
-    return best
+    return _above_base(data, best, base, candidate)
+
+
+def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
+    """The fit, or one from the base where that is better: a machine that contains the base is no worse.
+
+    What stays worse has not found its minimum, whatever its last step promised.
+    """
+    if not candidate.linear.any() or gain_over(best, base)[0] > -_WORSE:
+        return best
+    values = _base_values(base, candidate)
+    added = np.array(candidate.added)
+    values[added[candidate.linear]] = 0.0
+    problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+    fit = minimise(problem, values, base.fit.starts)
+    found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
+    best = found if _better(found, best) else best
+    if gain_over(best, base)[0] > -_WORSE:
+        return best
+    return replace(best, fit=replace(best.fit, caught=True))
+
+
+def beaten(one: Fitted, rival: Fitted) -> bool:
+    """Whether a fit is far behind even without the segments in which it is furthest behind."""
+    parts = np.sort(gain_over(one, rival)[1])
+    return bool(parts[_SPARED:].sum() < -2 * _BEATEN)
 
 
 def carried_on(data: Data, candidate: Candidate, known: Fitted) -> Fitted:

@@ -13,7 +13,7 @@ from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, carried_on, crossed, gain_over, refit
+from separatrix.discovery.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
@@ -105,14 +105,23 @@ def run_round(
         fitted = refit(
             bench.training, base, candidates[name], screened, rival, options.quick, known.get(name)
         )
+        # what is far behind a machine that leaves only noise and foretells need not foretell
+        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
+        found.append(judged(base, foretold, fitted, told))
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
-        found.append(judged(base, foretold, fitted, bench.foretell(fitted, foretold)))
     found.sort(key=lambda one: -one.evidence)
     _carry_on(bench, base, foretold, candidates, found)
     _cross(bench, base, foretold, candidates, found)
     foretold, found = _fair(bench, base, foretold, found)
     return Round(base, foretold, candidates, signatures, screened, found)
+
+
+def _out_of_race(fitted: Fitted, found: list[Judged], rival: Fitted | None) -> bool:
+    first = next((one for one in found if one.fitted is rival), None)
+    return bool(
+        first is not None and first.held_out >= 0 and rival.fit.like_noise(2) and beaten(fitted, rival)
+    )
 
 
 def _fair(

@@ -45,7 +45,12 @@ def names(verdict: dict) -> str:
 def _summary(verdict: dict) -> Section:
     others = ", ".join(_pair(name) for name in verdict["alternatives"])
     said = {
-        "named": f"The base machine lacks: {names(verdict)}. All gates are passed.",
+        "named": f"The base machine lacks: {names(verdict)}. "
+        + (
+            "All gates are passed."
+            if verdict["complete"]
+            else "All gates but the adequacy are passed: a gap remains that the catalogue does not name."
+        ),
         "ambiguous": f"Something is missing that looks like {names(verdict)}, "
         + (f"but {others} would do about as well." if others else "but not every gate is passed."),
         "none": "No effect is missing that these records could show.",

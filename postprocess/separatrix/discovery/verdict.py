@@ -10,6 +10,7 @@ from separatrix.discovery.decide import Decision
 from separatrix.discovery.decoys import decoys
 from separatrix.discovery.judge import Judged
 from separatrix.discovery.limits import detectable, equivalents, separating_experiment
+from separatrix.discovery.misfit import doubted_noise, too_quiet
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.rounds import Bench, Round
 from separatrix.discovery.where import Map, sentences, where_maps
@@ -98,6 +99,12 @@ def _warnings(findings: Findings) -> list[str]:
         for one in (data.prepared if data else ())
         for note in one.notes
     ]
+    best = findings.decision.accepted[0] if findings.decision.accepted else None
+    fits = [(bench.training, best.fitted if best else findings.base)]
+    if bench.held_out is not None:
+        fits.append((bench.held_out, best.prediction if best else findings.decision.foretold))
+    for data, fitted in fits:
+        notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")
@@ -109,7 +116,10 @@ def _warnings(findings: Findings) -> list[str]:
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     if contact and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
-        notes.append(f"no impacts are seen in the records; the fitted machine has {hits}")
+        why = (
+            ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][1].fit) else ""
+        )
+        notes.append(f"no impacts are seen in the records{why}; the fitted machine has {hits}")
     return notes
 
 

@@ -28,6 +28,8 @@
 // fuzz_targets.f90: exit code and length of the message of a reader.
 extern "C" void fuzz_target(int target, const char *bytes, int64_t length, const char *path,
                             int64_t path_length, int *code, int *message_length);
+// fuzz_library.cpp: the same for libseparatrix.
+extern "C" int fuzz_library(const char *bytes, int64_t length, int *message_length);
 extern "C" void fuzz_make_working(const char *path, int64_t path_length);
 
 namespace {
@@ -36,7 +38,9 @@ constexpr std::size_t most_text = 16384;
 constexpr std::size_t most_binary = 1 << 20;
 constexpr int longest_seconds = 10;
 
-const std::vector<std::string> target_names = {"case", "override", "points", "info", "verify", "resume"};
+const std::vector<std::string> target_names = {"case",   "override", "points", "info",
+                                               "verify", "resume",   "force",  "library"};
+constexpr int target_points = 2, target_resume = 5, target_force = 6, target_library = 7;
 
 // Whether the block at an address has been reached; the code ends before this address.
 constexpr std::size_t map_size = 1 << 26;
@@ -104,7 +108,7 @@ std::map<int, long> codes;
 // Runs one input; returns whether it reached new blocks.
 bool run(int target, const std::string &input, const std::string &scratch, Current &current) {
   current.set(input);
-  if (target >= 2) {
+  if (target >= target_points && target <= target_force) {
     std::filesystem::remove(scratch); // for HDF5 the same file would be one that it knows
     std::ofstream file(scratch, std::ios::binary | std::ios::trunc);
     file.write(input.data(), static_cast<std::streamsize>(input.size()));
@@ -116,8 +120,11 @@ bool run(int target, const std::string &input, const std::string &scratch, Curre
   const itimerval none = {{0, 0}, {0, 0}};
   setitimer(ITIMER_REAL, &limit, nullptr);
   running = tracing = true;
-  fuzz_target(target, input.data(), static_cast<int64_t>(input.size()), scratch.data(),
-              static_cast<int64_t>(scratch.size()), &code, &message_length);
+  if (target == target_library)
+    code = fuzz_library(input.data(), static_cast<int64_t>(input.size()), &message_length);
+  else
+    fuzz_target(target, input.data(), static_cast<int64_t>(input.size()), scratch.data(),
+                static_cast<int64_t>(scratch.size()), &code, &message_length);
   running = tracing = false;
   setitimer(ITIMER_REAL, &none, nullptr);
   ++codes[code];
@@ -193,15 +200,15 @@ int main(int count, char **arguments) {
     return 64;
   const std::filesystem::path work = arguments[3];
   const double seconds = std::stod(arguments[5]); // at most half of it for the seeds
-  const bool text = target <= 2;
+  const bool text = target <= target_points || target >= target_force;
   const std::size_t most = text ? most_text : most_binary;
   Mutator mutator(std::stoull(arguments[7]), text);
   Current current(work / "current");
-  const std::string scratch = work / (target == 5 ? "input.h5.part" : "input");
+  const std::string scratch = work / (target == target_resume ? "input.h5.part" : "input");
   std::signal(SIGALRM, on_alarm);
   std::atexit(on_exit);
   __sanitizer_set_death_callback(give_up);
-  if (target == 5)
+  if (target == target_resume)
     make_working(work / "seed.h5");
 
   reached = reinterpret_cast<unsigned char *>(map_file(work / "reached", map_size));
@@ -213,7 +220,7 @@ int main(int count, char **arguments) {
   for (const auto &entry : std::filesystem::directory_iterator(arguments[2]))
     if (entry.file_size() <= most)
       corpus.push_back(read_file(entry.path()));
-  if (target == 5)
+  if (target == target_resume)
     corpus.push_back(read_file(work / "seed.h5.part"));
   std::sort(corpus.begin(), corpus.end());
   for (std::size_t i = corpus.size(); i > 1; --i)

@@ -9,7 +9,8 @@ module fuzz_targets
   use case_type, only: case_t
   use command_line, only: command_t
   use contact_law, only: contact_t
-  use errors, only: error_t
+  use errors, only: error_t, fail
+  use force_record, only: read_force
   use grid, only: grid_t, slice_motion
   use hdf5, only: h5close_f
   use info_driver, only: run_info
@@ -19,12 +20,13 @@ module fuzz_targets
   use motion, only: motion_t
   use point_list, only: point_list_t, read_point_list
   use serial_team, only: serial_team_t
+  use status, only: exit_bad_case
   use verify_driver, only: run_verify
   implicit none
   private
 
   integer, parameter :: target_case = 0, target_override = 1, target_points = 2, target_info = 3, target_verify = 4, &
-    target_resume = 5
+    target_resume = 5, target_force = 6
 
   !> The case that overrides are put on.
   character(len=*), parameter :: nl = new_line('a')
@@ -58,9 +60,11 @@ contains
       call read_verify(text_of(path), error)
     case (target_resume)
       call read_working(text_of(path), error)
+    case (target_force)
+      call read_forces(text_of(path), error)
     end select
     ! After an error the program ends, and leaves objects open that would keep the next file from being read anew.
-    if (which >= target_info) call h5close_f(ignored)
+    if (which >= target_info .and. which <= target_resume) call h5close_f(ignored)
     code = 0
     message_length = 0
     if (.not. allocated(error)) return
@@ -103,6 +107,17 @@ contains
     contact%upper = 1.1_wp
     call read_point_list(path, 1.2_wp, contact, list, error)
   end subroutine read_points
+
+  !> The record of a force, as a case names it.
+  subroutine read_forces(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: interval
+    real(wp), allocatable :: force(:)
+    character(len=:), allocatable :: problem
+    call read_force(path, interval, force, problem)
+    if (allocated(problem)) call fail(error, exit_bad_case, problem)
+  end subroutine read_forces
 
   subroutine read_verify(path, error)
     character(len=*), intent(in) :: path

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""fuzz_figures.py SEEDS WORK --seconds S --seed N: the reader of the figures under changed inputs.
+"""fuzz_python.py TARGET SEEDS WORK --seconds S --seed N: the package's readers under changed inputs.
 
-A file that is not refused has every variable read and decoded. Only the package's own exception may come out.
+TARGET is `figures`, result files of which every variable is read and decoded, or `records`, measured records
+in CSV and HDF5. Only the package's own exception may come out.
 """
 
 import json
@@ -13,9 +14,11 @@ import sys
 import time
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 from separatrix import SeparatrixError, decode_flags, open_result, table
+from separatrix.discovery.records import read_record
 from separatrix.open import reading
 
 LONGEST_SECONDS = 10
@@ -23,8 +26,9 @@ LONGEST_SECONDS = 10
 
 def main() -> int:
     """Read seeds, then changed ones, until the time is over."""
-    seeds_folder, work = Path(sys.argv[1]), Path(sys.argv[2])
-    seconds, seed = float(sys.argv[4]), int(sys.argv[6])
+    target, seeds_folder, work = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+    seconds, seed = float(sys.argv[5]), int(sys.argv[7])
+    reader = {"figures": read_result, "records": read_record}[target]
     chance = random.Random(seed)
     seeds = [path.read_bytes() for path in sorted(seeds_folder.iterdir())]
     codes: Counter[int] = Counter()
@@ -35,11 +39,11 @@ def main() -> int:
         if deadline - time.monotonic() < seconds / 2:
             break
         inputs += 1
-        codes[read(data, work, inputs)] += 1
+        codes[read(reader, data, work, inputs)] += 1
     while time.monotonic() < deadline:
         inputs += 1
-        codes[read(change(chance.choice(seeds), chance), work, inputs)] += 1
-    print(json.dumps({"target": "figures", "inputs": inputs, "codes": {str(k): v for k, v in codes.items()}}))
+        codes[read(reader, change(chance.choice(seeds), chance), work, inputs)] += 1
+    print(json.dumps({"target": target, "inputs": inputs, "codes": {str(k): v for k, v in codes.items()}}))
     return 0
 
 
@@ -64,21 +68,26 @@ def change(data: bytes, chance: random.Random) -> bytes:
     return bytes(changed)
 
 
-def read(data: bytes, work: Path, number: int) -> int:
+def read_result(path: Path) -> None:
+    """Everything in a result file."""
+    with reading(path), open_result(path) as result:
+        for variable in result.variables.values():
+            if variable.size < 2**24:
+                variable.load()
+        table(result, "catalogue").load()
+        for name in ("regime", "reason"):
+            if name in result:
+                decode_flags(result[name])
+
+
+def read(reader: Callable[[Path], object], data: bytes, work: Path, number: int) -> int:
     """Read one input; 0, or the exit code that the command would end with."""
     (work / "current").write_bytes(struct.pack("<QQ", len(data), number) + data)
     path = work / "input.h5"
     path.write_bytes(data)
     signal.alarm(LONGEST_SECONDS)
     try:
-        with reading(path), open_result(path) as result:
-            for variable in result.variables.values():
-                if variable.size < 2**24:
-                    variable.load()
-            table(result, "catalogue").load()
-            for name in ("regime", "reason"):
-                if name in result:
-                    decode_flags(result[name])
+        reader(path)
     except SeparatrixError as error:
         return error.code
     finally:
