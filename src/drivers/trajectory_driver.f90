@@ -26,6 +26,7 @@ module trajectory_driver
   use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
   use text, only: to_text
   use text_table, only: table_t
+  use written_check, only: check_written
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
   private
@@ -90,6 +91,7 @@ contains
       end if
     end if
     call session%stop_if(error)
+    call check_written(session, path)
     call report(session, moving, outcome, log)
     call report_files(session, command, path)
     call session%end_with(exit_done)

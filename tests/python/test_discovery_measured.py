@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 OPTIONS = {
-    "emps": ["--segment-seconds", "0.5", "--effects", "asymmetric_friction,position_dependent_friction"],
+    "emps": ["--segment-seconds", "0.5", "--effects", "asymmetric_friction"],
     "pendulum_large": [],
     "pendulum_small": ["--segment-seconds", "0.4"],
 }
@@ -55,7 +55,7 @@ def test_the_positioning_system_lacks_asymmetric_friction_and_remains_flexible(r
     # the authors: 166.7 and 240.4 N s/m
     viscous = verdict["parameters"]["effect.asymmetric_friction.viscous"]["value"]
     assert viscous == pytest.approx((166.7 - 240.4) / 2, rel=0.05)
-    assert verdict["errors"]["emps"][1] < 3.15 < 4.0 < verdict["errors"]["emps"][0]
+    assert verdict["errors"]["emps"][1] <= 3.1 < 4.0 < verdict["errors"]["emps"][0]
     assert verdict["errors"]["emps_pulses"][1] < 5.4 < verdict["errors"]["emps_pulses"][0]
     assert any("emps_pulses" in reason and "flexible" in reason for reason in verdict["reasons"])
 
