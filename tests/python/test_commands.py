@@ -237,6 +237,16 @@ def test_verify(separatrix, results, kind):
         assert facts["x_deviation"] < 1e-6
 
 
+def test_verify_runs_each_point_of_a_small_map_once(separatrix, tmp_path):
+    write_case(tmp_path)
+    small = [word for place in (1, 2) for word in ("--set", f"axis[{place}].count=3")]
+    succeed(separatrix, "basin", "case.toml", "-o", "map.h5", *small, folder=tmp_path)
+    for sample, said in ((200, "  all 9 points"), (9, "  all 9 points"), (8, "  8 points")):
+        text = succeed(separatrix, "verify", "map.h5", "--sample", sample, folder=tmp_path).out
+        assert f"{said} run again: 0 differ" in text
+        assert ("95 % confidence" in text) == (sample == 8)
+
+
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_points_to_a_table_and_back(mpi_separatrix, tmp_path, ranks):
     write_case(tmp_path)
