@@ -183,7 +183,7 @@ def main() -> int:
     """Run or summarise; return the exit code."""
     parser = argparse.ArgumentParser(prog="discovery_campaign")
     parser.add_argument("--cases", type=int, default=520)
-    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--seed", type=int, default=2027)
     parser.add_argument("--subset", choices=["ci"])
     parser.add_argument("--out", type=Path, default=SOURCE / "out" / "discovery")
     parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "discovery.md")

@@ -8,6 +8,10 @@ string(STRIP "${CMAKE_Fortran_FLAGS} ${CMAKE_Fortran_FLAGS_${build_type}} -ffp-c
 string(STRIP "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_${build_type}} -ffp-contract=off" build_c_flags)
 string(STRIP "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type}} -ffp-contract=off" build_cxx_flags)
 set(build_mpi "none")
+set(build_debug .false.)
+if(build_type STREQUAL "DEBUG")
+  set(build_debug .true.)
+endif()
 set(build_hdf5 "${HDF5_VERSION} (serial)")
 if(SEPARATRIX_MPI)
   string(REGEX REPLACE "[,\n].*" "" build_mpi "${MPI_C_LIBRARY_VERSION_STRING}")
@@ -21,6 +25,7 @@ add_custom_target(separatrix_build_info_source
           "-DSOURCE_DIR=${PROJECT_SOURCE_DIR}" "-DVERSION=${PROJECT_VERSION}"
           "-DCOMPILER=Fortran ${CMAKE_Fortran_COMPILER_ID} ${CMAKE_Fortran_COMPILER_VERSION}, C ${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}, C++ ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}"
           "-DFLAGS=${build_flags}" "-DC_FLAGS=C ${build_c_flags}, C++ ${build_cxx_flags}" "-DMPI=${build_mpi}" "-DHDF5=${build_hdf5}"
+          "-DDEBUG=${build_debug}"
           -P "${CMAKE_CURRENT_LIST_DIR}/write_build_info.cmake"
   BYPRODUCTS "${build_info}"
   COMMENT "Asking for the commit" VERBATIM)

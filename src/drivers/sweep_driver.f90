@@ -29,6 +29,7 @@ module sweep_driver
   use text, only: replace_all, to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
+  use written_check, only: check_written
   implicit none
   private
 
@@ -104,6 +105,7 @@ contains
       call session%provenance%finish(schema)
       if (session%team%is_root()) call write_whole(path, schema, command%force, error)
       call session%stop_if(error)
+      call check_written(session, path)
       call session%journal%line('written', 'wrote '//path)
     end if
     call session%end_with(exit_done)

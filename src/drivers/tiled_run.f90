@@ -25,6 +25,7 @@ module tiled_run
   use text, only: to_text
   use tile_times, only: write_tile_times
   use tiles, only: new_tiling, tiling_t
+  use written_check, only: check_written
   implicit none
   private
 
@@ -234,6 +235,7 @@ contains
     call session%provenance%finish(extra)
     call finalise(file, session%team, extra, error)
     call session%stop_if(error)
+    call check_written(session, file%path)
     call session%journal%line('written', 'wrote '//file%path//' in '// &
       duration_text(monotonic_seconds() - session%journal%started))
   end subroutine finish_tiles

@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The experiment that would tell rivals apart is one experiment: the same drive on both machines."""
+"""The experiment that would tell rivals apart is one experiment; what the base imitates has no size."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fit import minimise
-from separatrix.discovery.limits import distance
-from separatrix.discovery.machine import base_parameters
+from separatrix.discovery.limits import detectable, distance
+from separatrix.discovery.machine import Free, base_parameters
+from separatrix.discovery.options import Options
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.problem import Problem
 from separatrix.discovery.records import make_record
@@ -69,3 +72,24 @@ def test_both_machines_get_the_same_drive_from_the_same_starts():
     assert start[:, 2] == pytest.approx(0.7 + frequency * 0.5 * np.arange(12))
     amplitude = one.model.parameters["drive.cosine[1]"].value
     assert values["drive.cosine[1]"] == other_values["drive.cosine[1]"] == pytest.approx(0.5 * amplitude)
+
+
+@pytest.mark.parametrize(
+    ("seen", "error", "size"), [(True, 0.4, 1.0), (True, 1e9, None), (False, 1e-9, None)]
+)
+def test_an_effect_that_the_base_imitates_has_no_smallest_size(seen, error, size):
+    path = "effect.coulomb.force"
+    parameters = {path: SimpleNamespace(unit="N")}
+    made = SimpleNamespace(
+        free=[Free(path, 0.0, size=0.5)], added=(0,), model=SimpleNamespace(parameters=parameters)
+    )
+    screened = SimpleNamespace(
+        names=["coulomb"], seen=lambda name: seen, live={"coulomb": np.array([True])},
+        error={"coulomb": np.array([error])},
+    )  # fmt: skip
+    found = detectable(
+        SimpleNamespace(options=Options(visible=5.0)),
+        SimpleNamespace(candidates={"coulomb": made}, screened=screened),
+    )["coulomb"]
+    assert found["size"] == (None if size is None else pytest.approx(size))
+    assert ("imitate" in found["reason"]) == (size is None)

@@ -200,3 +200,90 @@ def test_usage(capsys):
     ):
         assert main(arguments) == 64
         assert "separatrix-discover: " in capsys.readouterr().err
+
+
+def test_a_byte_order_mark_is_no_text(tmp_path):
+    path = write(tmp_path / "record.csv", *rows())
+    wanted = read_record(path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert np.array_equal(read_record(path).x, wanted.x)
+    assert read_record(path).header == wanted.header
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("# drive_ration: 1.2", "'drive_ration' is not used: 'drive_ratio'?"),
+        ("# phase: 180", "phase is 180 rad, more than a turn: degrees?"),
+        ("# operator: none", ""),
+    ],
+)
+def test_header_lines_that_look_wrong_are_told(tmp_path, line, words):
+    warnings = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD, line])).warnings
+    assert [words in text for text in warnings] == ([True] if words else [])
+
+
+@pytest.mark.parametrize("size", [0.4, -50.0])
+def test_a_sample_where_no_motion_leads_is_left_out_and_told(tmp_path, size):
+    t, x = rows()
+    x[150] += size
+    record = read_record(write(tmp_path / "record.csv", t, x))
+    assert np.array_equal(record.t, np.delete(t, 150))
+    assert record.pieces == [(0, 150), (150, 399)]
+    assert any(
+        text.startswith(f"{tmp_path}/record.csv:157: ") and "left out" in text for text in record.warnings
+    )
+    x[10:200:19] += size
+    with pytest.raises(SeparatrixError, match=r"record.csv:17: .* 11 such samples"):
+        read_record(write(tmp_path / "record.csv", t, x))
+
+
+def test_impacts_and_steps_of_the_sensor_are_no_stray_samples():
+    t = np.arange(2000) / 100
+    bouncing = np.abs(np.sin(3 * t))
+    for x in (bouncing, np.round(bouncing / 0.2) * 0.2, np.where(t < 19, 0.5, bouncing)):
+        assert make_record("record", {"t": t, "x": x}).t.size == t.size
+
+
+def test_the_same_record_is_not_taken_twice(tmp_path, build_dir, monkeypatch, capsys):
+    library = build_dir / "lib" / "libseparatrix.so"
+    if not library.is_file():
+        pytest.skip(f"{library} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    (tmp_path / "base.toml").write_text(CASE)
+    (tmp_path / "copies").mkdir()
+    first = write(tmp_path / "first.csv", *rows())
+    copy = write(tmp_path / "copies" / "first.csv", *rows())
+    for words in ([first, "--hold-out", first], [first, "--hold-out", copy], [first, copy]):
+        arguments = [tmp_path / "base.toml", *words, "--out", tmp_path / "out", "-q"]
+        assert main([str(word) for word in arguments]) == 64
+        assert f"{words[-1]}: the same record as {first}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    before = listing(tmp_path)
+    for out in ("file", "file/sub"):
+        # were it looked for, the case would be missing: 66
+        assert main(["no.toml", "no.csv", "--out", str(tmp_path / out)]) == 73
+        assert str(tmp_path / "file") in capsys.readouterr().err
+    assert main(["no.toml", "no.csv", "--out", str(tmp_path / "new" / "sub")]) == 66
+    assert listing(tmp_path) == before
+
+
+def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "investigate", interrupt)
+    assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 130
+    assert capsys.readouterr().err.splitlines() == ["separatrix-discover: interrupted, nothing was written"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_report_has_its_share_of_the_time(capsys):
+    progress = cli.Progress()
+    progress.began -= 67.0
+    progress("writing the report", 0.9)
+    assert "about 33 s left" in capsys.readouterr().err

@@ -114,8 +114,12 @@ def verdict(outcome: str) -> dict:
         "p_value": 5.8e-74 if found else None,
         "reasons": [] if outcome in ("named", "none") else ["gate 'separate' was not passed"],
         "detectable": {
-            "cubic_spring": {"size": 4.2252, "path": "effect.cubic_spring.stiffness", "unit": "N/m^3"},
-            "offset_force": {"size": None, "path": "effect.offset_force.force", "unit": "N"},
+            "cubic_spring": {
+                "size": 4.2252, "path": "effect.cubic_spring.stiffness", "unit": "N/m^3", "reason": "",
+            },
+            "offset_force": {
+                "size": None, "path": "effect.offset_force.force", "unit": "N", "reason": "imitated",
+            },
         },
         "confusability": {"names": NAMES, "matrix": [[1.0, 0.31, 0.2], [0.31, 1.0, 0.98], [0.2, 0.98, 1.0]]},
         "separating_experiment": "measure the barrier" if outcome == "ambiguous" else "",
@@ -235,6 +239,7 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
     for row, one in zip(page.tables["effect"], told["detectable"].values(), strict=True):
         assert row[1] == one["path"]
         assert same(row[2].split(" ")[0], one["size"])
+        assert row[3] == one["reason"]
 
 
 def test_the_excess_that_was_removed(report: tuple) -> None:

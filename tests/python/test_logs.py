@@ -81,6 +81,15 @@ def test_a_log_on_a_full_disk_costs_the_log_alone(mpi_separatrix, tmp_path, rank
     assert outcome.code == 75 and "complete" not in outcome.err
 
 
+@pytest.mark.parametrize("command", ["basin", "trajectory", "sweep"])
+def test_a_debug_build_checks_what_it_has_written(separatrix, build_dir, tmp_path, command):
+    write_case(tmp_path)
+    debug = "CMAKE_BUILD_TYPE:STRING=Debug" in (build_dir / "CMakeCache.txt").read_text()
+    coarse = ["--set", "sweep.step=0.3", "--set", "sweep.starts=[0, 0]"]
+    succeed(separatrix, command, "case.toml", *coarse, "--log", "run.jsonl", folder=tmp_path)
+    assert ("checked" in {line["event"] for line in events(tmp_path)}) == debug
+
+
 @pytest.mark.parametrize("form", [[], ["--json"]])
 def test_stdout_on_a_full_disk(separatrix, tmp_path, form):
     write_case(tmp_path)

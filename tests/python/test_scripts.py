@@ -55,6 +55,7 @@ def write_build_info(source_dir, tmp_path, tree) -> str:
         "FLAGS": "-flag " * 30,
         "MPI": "none",
         "HDF5": "1",
+        "DEBUG": ".true.",
     }
     command = ["cmake", *(f"-D{key}={value}" for key, value in options.items())]
     subprocess.run([*command, "-P", str(folder / "write_build_info.cmake")], check=True)

@@ -8,14 +8,16 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.catalogue import BY_NAME
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
-from separatrix.discovery.results import FILES, replacing, write_results
+from separatrix.discovery.results import FILES, replacing, require_writable, write_results
 from separatrix.discovery.wording import with_error
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import SeparatrixError
+from separatrix.errors import INTERRUPTED, SeparatrixError
 from separatrix.version import __version__
 
 
@@ -27,6 +29,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SeparatrixError as error:
         print(f"separatrix-discover: {error}", file=sys.stderr)
         return error.code
+    except KeyboardInterrupt:
+        print("separatrix-discover: interrupted, nothing was written", file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 
@@ -40,6 +45,7 @@ def _run(chosen: argparse.Namespace) -> None:
         candidates=chosen.effects and tuple(chosen.effects),
         progress=(lambda stage, done: None) if chosen.quiet else Progress(),
     )
+    require_writable(chosen.out)
     verdict, findings = investigate(chosen.base, chosen.records, chosen.hold_out, options, chosen.rest)
     with replacing(chosen.out) as draft:
         write_results(draft, verdict, findings)
@@ -51,6 +57,10 @@ def _run(chosen: argparse.Namespace) -> None:
             print(f"wrote {path}")
 
 
+# the report has the last tenth of the steps and takes about a third of the time
+_STEPS, _TIMES = (0.0, 0.9, 1.0), (0.0, 0.67, 1.0)
+
+
 class Progress:
     """A line per stage on stderr, with the time passed and what is left at this rate."""
 
@@ -59,8 +69,9 @@ class Progress:
         self.began = time.monotonic()
 
     def __call__(self, stage: str, done: float) -> None:
-        """Report that `stage` begins, `done` of the whole being over."""
+        """Report that `stage` begins, `done` of the steps being over."""
         passed = time.monotonic() - self.began
+        done = float(np.interp(done, _STEPS, _TIMES))
         left = f", about {passed * (1 - done) / done:.0f} s left" if done > 0.1 and passed > 1 else ""
         print(f"[{100 * done:3.0f} %] {stage} ({passed:.1f} s{left})", file=sys.stderr, flush=True)
 
@@ -93,7 +104,8 @@ def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
-        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
+        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write, "
+        "130 interrupted.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

@@ -15,6 +15,8 @@ _LADDER = 4.0 ** np.arange(-3, 4)
 _RATIOS = np.linspace(0.6, 1.5, 19)
 _PERIODS = 3
 _STEPS = 60
+# usual sizes (some per cent of the machine's own) up to which a linearised size is told
+_BELIEVED = 100.0
 _ADVICE = {
     frozenset(
         ("offset_force", "asymmetric_friction")
@@ -35,22 +37,30 @@ _ADVICE = {
 
 
 def detectable(bench: Bench, found: Round) -> dict[str, dict]:
-    """Smallest size of each effect that these records would have shown at `visible` standard errors."""
+    """Smallest size of each effect that these records would have shown at `visible` standard errors.
+
+    None, with a reason, where no size can be told.
+    """
     sizes = {}
     for name, made in found.candidates.items():
         if name not in found.screened.names:
             continue
         path = made.free[made.added[0]].path
         unit = made.model.parameters[path].unit
-        if found.screened.live[name][:1].any():
-            size = (
-                bench.options.visible * float(found.screened.error[name][0]) * made.free[made.added[0]].size
-            )
+        reason = ""
+        if not found.screened.seen(name):
+            size, reason = None, "the base machine can imitate it"
+        elif found.screened.live[name][:1].any():
+            usual = made.free[made.added[0]].size
+            size = bench.options.visible * float(found.screened.error[name][0]) * usual
+            if size > _BELIEVED * usual:
+                size, reason = None, "the base machine can all but imitate it"
         elif not made.linear.any() and not bench.options.quick:
             size = _by_ladder(bench, found, made)
+            reason = "" if size is not None else "no size that was tried stands out so much"
         else:
             continue
-        sizes[name] = {"size": size, "path": path, "unit": unit}
+        sizes[name] = {"size": size, "path": path, "unit": unit, "reason": reason}
     return sizes
 
 

@@ -37,9 +37,14 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
     return [
         f"{data.prepared[number].record.name} (reduced chi^2 {size:.4g})"
         for number, (size, freedom) in found.items()
-        if size > options.adequate_chi2
+        if size > _limit(data.prepared[number], options)
         and chi2.sf(size * freedom, freedom) < options.detection_level / len(found)
     ]
+
+
+def _limit(one: Prepared, options: Options) -> float:
+    """Reduced chi^2 above which a record is missed: noise that nobody stated is itself an estimate."""
+    return options.adequate_chi2 if one.sigma_stated else options.missed_chi2
 
 
 def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:

@@ -43,6 +43,8 @@ class Options:
     drive_scales: tuple[float, float] = (0.5, 2.0)
     # largest reduced chi^2 and smallest share of the closable gap of an adequate model
     adequate_chi2: float = 1.1
+    # reduced chi^2 above which a record of unstated noise is missed: that noise was estimated from differences
+    missed_chi2: float = 2.0
     adequate_share: float = 0.8
     # p value of what is left below which no share is enough
     adequate_p: float = 1e-4

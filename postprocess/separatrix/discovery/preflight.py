@@ -60,7 +60,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     sigma = _noise(record, rest, resolution, notes)
     if np.std(record.x) < 5 * sigma:
         raise SeparatrixError(
-            f"{record.name}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
+            f"{record.file}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
             "nothing but noise"
         )
     prepared = Prepared(
@@ -121,7 +121,7 @@ def _find_drive(prepared: Prepared, model) -> None:
         prepared.frequency, prepared.phase = turning(record)
         if prepared.frequency * record.duration < np.pi:
             raise SeparatrixError(
-                f"{record.name}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
+                f"{record.file}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
                 "not the angle of a turning crank"
             )
         prepared.origin, prepared.phase_known = float(record.t[0]), True
@@ -141,12 +141,12 @@ def _find_drive(prepared: Prepared, model) -> None:
     samples = prepared.period_samples
     if samples < _FEWEST_PER_PERIOD:
         raise SeparatrixError(
-            f"{record.name}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
+            f"{record.file}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
         )
     periods = record.duration / record.interval / samples
     if periods < _FEWEST_PERIODS:
         raise SeparatrixError(
-            f"{record.name}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
+            f"{record.file}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
         )
 
 
@@ -185,7 +185,7 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
     if record.force is None:
         if wanted:
             raise SeparatrixError(
-                f"{record.name}: the machine has a measured force, the record has no column 'force'"
+                f"{record.file}: the machine has a measured force, the record has no column 'force'"
             )
         return record
     if not wanted:
@@ -201,7 +201,7 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
         usual = usual or interval
         if abs(interval - usual) > usual * max(_UNEVEN, 1 / steps):
             raise SeparatrixError(
-                f"{record.name}, from row {first + 1}: samples every {interval:.6g} s, before every "
+                f"{record.file}, from row {first + 1}: samples every {interval:.6g} s, before every "
                 f"{usual:.6g} s: a measured force needs one rate"
             )
     return record
@@ -223,7 +223,7 @@ def _check_size(prepared: Prepared, model) -> None:
     spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
     if not 1 / _MOST_RATIO < spread / expected < _MOST_RATIO:
         raise SeparatrixError(
-            f"{prepared.record.name}: x ranges over {spread:.3g} m, the machine over {expected:.3g} m: "
+            f"{prepared.record.file}: x ranges over {spread:.3g} m, the machine over {expected:.3g} m: "
             "wrong units, or a record of another machine"
         )
     for path, sign in (("contact.upper", 1), ("contact.lower", -1)):
@@ -234,7 +234,7 @@ def _check_size(prepared: Prepared, model) -> None:
         if np.median(beyond) > 0:
             row = int(np.argmax(beyond))
             raise SeparatrixError(
-                f"{prepared.record.name}: x lies beyond {path} = {barrier.value:g} m most of the time "
+                f"{prepared.record.file}: x lies beyond {path} = {barrier.value:g} m most of the time "
                 f"(row {row + 1}: {prepared.record.x[row]:g} m): a record of another machine"
             )
 
@@ -246,7 +246,7 @@ def _is_soft(model) -> bool:
 def _check_velocity(record: Record, notes: list[str]) -> None:
     """Compare v with the slope of x: another quantity, another unit, a delay."""
     if np.ptp(record.v) == 0:
-        raise SeparatrixError(f"{record.name}: 'v' is constant")
+        raise SeparatrixError(f"{record.file}: 'v' is constant")
     dt = record.interval
     slope = np.gradient(record.x, record.t)
     shifts = np.arange(-4, 5)
@@ -255,13 +255,13 @@ def _check_velocity(record: Record, notes: list[str]) -> None:
     best = int(np.argmax(overlap))
     if overlap[best] < 0.5:
         raise SeparatrixError(
-            f"{record.name}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
+            f"{record.file}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
         )
     ratio = float(np.std(record.v[inner]) / np.std(slope[inner]))
     # noise of either one moves the ratio by no more than the correlation
     if not overlap[best] / _UNIT < ratio < _UNIT / overlap[best]:
         raise SeparatrixError(
-            f"{record.name}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s"
+            f"{record.file}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s"
         )
     if shifts[best]:
         notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from itertools import count, pairwise
 from pathlib import Path
 
@@ -33,6 +34,11 @@ _FEWEST_SAMPLES = 60
 _GAP = 1.5
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.02
+# likeness of a header key to a known one that makes it a misspelling
+_NEAR = 0.7
+# steps to and from a sample, over the usual largest ones and over all others, that no motion makes
+_SPIKE = (5.0, 3.0)
+_MOST_SPIKES = 3
 
 
 @dataclass
@@ -49,6 +55,8 @@ class Record:
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    # as it was given
+    file: str = ""
 
     @property
     def interval(self) -> float:
@@ -89,7 +97,7 @@ def _read_csv(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], int]:
     rows: list[list[float]] = []
     first_row = 0
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         raise SeparatrixError(f"{path}: neither HDF5 nor text: {error.reason}") from None
     for number, line in enumerate(lines, start=1):
@@ -171,11 +179,14 @@ def _checked(
     first_row: int | None,
     at_rest: bool = False,
 ) -> Record:
+    kept = np.arange(columns["t"].size)
+
     def where(row: int) -> str:
-        return f"{path}, row {row + 1}" if first_row is None else f"{path}:{first_row + row}"
+        return f"{path}, row {kept[row] + 1}" if first_row is None else f"{path}:{first_row + kept[row]}"
 
     warnings: list[str] = []
     numbers = _header_numbers(path, header)
+    _doubt_header(header, numbers, warnings)
     _scale(path, header, columns, warnings)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
@@ -191,6 +202,12 @@ def _checked(
         raise SeparatrixError(
             f"{where(row)}: time does not increase ({t[row]:.9g} s after {t[row - 1]:.9g} s)"
         )
+    if not at_rest:
+        spikes = _spikes(x, where, warnings)
+        kept = np.delete(kept, spikes)
+        columns = {name: column[kept] for name, column in columns.items()}
+        t, x = columns["t"], columns["x"]
+        steps = np.diff(t)
     usual = float(np.median(steps))
     rate = numbers.get("sampling_rate_hz")
     if rate is not None and not 0.99 < rate * usual < 1.01:
@@ -206,7 +223,7 @@ def _checked(
     if unknown:
         warnings.append(f"columns that are not used: {', '.join(unknown)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
-    return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, **channels)
+    return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, file=str(path), **channels)
 
 
 def _header_numbers(path: Path, header: dict[str, str]) -> dict[str, float]:
@@ -225,6 +242,17 @@ def _header_numbers(path: Path, header: dict[str, str]) -> dict[str, float]:
         if key in numbers and numbers[key] < 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected at least 0")
     return numbers
+
+
+def _doubt_header(header: dict[str, str], numbers: dict[str, float], warnings: list[str]) -> None:
+    """Warn of keys that look like misspelt ones, and of an angle that looks like degrees."""
+    known = sorted(_NUMBERS | {"units"})
+    for key in header:
+        near = [] if key in known else get_close_matches(key, known, 1, _NEAR)
+        if near:
+            warnings.append(f"header key '{key}' is not used: '{near[0]}'?")
+    if abs(numbers.get("phase", 0.0)) > 2 * np.pi:
+        warnings.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
 
 
 def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> None:
@@ -250,6 +278,23 @@ def _pieces(t: np.ndarray, usual: float, where, warnings: list[str]) -> list[tup
         warnings.append(f"{gaps.size - 3} more gaps")
     edges = [0, *gaps.tolist(), t.size]
     return list(pairwise(edges))
+
+
+def _spikes(x: np.ndarray, where, warnings: list[str]) -> np.ndarray:
+    """Rows of single samples that lie where no motion leads."""
+    steps = np.diff(x)
+    size = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:]))
+    usual = max(float(np.quantile(np.abs(steps), 0.9)), resolution_of(x))
+    rows = np.flatnonzero((steps[:-1] * steps[1:] < 0) & (size > _SPIKE[0] * usual)) + 1
+    others = np.abs(np.delete(steps, np.union1d(rows - 1, rows)))
+    rows = rows[size[rows - 1] > _SPIKE[1] * others.max(initial=0.0)]
+    said = [
+        f"{where(row)}: x is {x[row]:.6g} m between {x[row - 1]:.6g} and {x[row + 1]:.6g} m" for row in rows
+    ]
+    if rows.size > _MOST_SPIKES:
+        raise SeparatrixError(f"{said[0]}; {rows.size} such samples: clean the record")
+    warnings += [f"{text}: left out" for text in said]
+    return rows
 
 
 def _check_clipping(x: np.ndarray, where, warnings: list[str]) -> None:

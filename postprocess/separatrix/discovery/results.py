@@ -50,6 +50,16 @@ def replacing(folder: Path) -> Iterator[Path]:
         raise
 
 
+def require_writable(folder: Path) -> None:
+    """Refuse a folder that no results could be written to, before any work; nothing is left behind."""
+    with suppress(_UndoneError), replacing(folder):
+        raise _UndoneError
+
+
+class _UndoneError(Exception):
+    """A draft that is not wanted."""
+
+
 def write_results(folder: Path, verdict: dict, findings: Findings) -> None:
     """Write verdict.json, details.h5 and, where effects were named, extended.toml."""
     text = json.dumps(plain(verdict), indent=2, allow_nan=False) + "\n"

@@ -277,19 +277,18 @@ def _parameters(verdict: dict) -> Section:
 
 def _detectable(verdict: dict) -> Section:
     rows = [
-        [words(name), one["path"], with_unit(one["size"], one["unit"], 3)]
+        [words(name), one["path"], with_unit(one["size"], one["unit"], 3), one["reason"]]
         for name, one in verdict["detectable"].items()
     ]
     said = (
         f"The size that each effect would need to stand out by {Options().visible:g} standard errors in "
         "these records. "
-        "What is smaller may be there and could not have been seen; unknown: no size of the effect would "
-        "have shown."
+        "What is smaller may be there and could not have been seen."
     )
     return Section(
         "detectable",
         "What could not have been seen",
-        [said, Table(["effect", "parameter", "smallest size"], rows)],
+        [said, Table(["effect", "parameter", "smallest size", "why not known"], rows)],
     )
 
 

@@ -19,7 +19,7 @@ from separatrix.discovery.records import Record, read_record, unique_names
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.rounds import Bench
 from separatrix.discovery.verdict import Findings, verdict_of
-from separatrix.errors import SeparatrixError
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
 
 
@@ -46,6 +46,7 @@ def investigate(
     options = options or Options()
     model = _model(base)
     training, held_out, chosen = _split([_record(one) for one in records], [_record(one) for one in hold_out])
+    _all_different([*training, *held_out])
     unique_names([*training, *held_out])
     still = None if rest is None else _record(rest, at_rest=True)
     options.progress("reading and smoothing the records", 0.0)
@@ -107,6 +108,14 @@ def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record],
     )
 
 
+def _all_different(records: list[Record]) -> None:
+    """Refuse a record that is given twice: it would count twice, or foretell itself."""
+    for place, one in enumerate(records):
+        for other in records[:place]:
+            if np.array_equal(one.x, other.x) and np.array_equal(one.t, other.t):
+                raise SeparatrixError(f"{one.file}: the same record as {other.file}", USAGE)
+
+
 def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
     part = slice(first, last)
     pieces = [
@@ -129,5 +138,6 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         header=header,
         pieces=pieces,
         warnings=list(record.warnings),
+        file=record.file,
         **channels,
     )
