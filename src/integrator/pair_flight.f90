@@ -180,8 +180,12 @@ contains
     type(log_t), intent(inout), optional :: log
     type(pair_state_t) :: sample
     type(book_t) :: book
-    real(wp) :: t
-    call note_extremes(moving, merge(state%touch, 0, begins), stretch, last, tally)
+    real(wp) :: t, place
+    integer :: direction
+    call note_extremes(stretch, last, tally, direction, place)
+    ! Not the stop that the flight begins on.
+    if (begins .and. direction == state%touch) direction = 0
+    if (direction /= 0 .and. .not. moving%machine%carried) call note_miss(moving, direction, place, tally)
     if (.not. present(log)) return
     book = log%book
     call book_stretch(moving, state, stretch, last, log%book)
@@ -211,15 +215,18 @@ contains
     call record_sample(log, body_state(sample), driver_of(sample), now)
   end subroutine record_at
 
-  !> Turning points and largest velocity of m2, which begins on the stop `touch` where that is not 0.
-  pure subroutine note_extremes(moving, touch, stretch, last, tally)
-    type(pair_motion_t), intent(in) :: moving
-    integer, intent(in) :: touch
+  !> Turning points and largest velocity of m2. `turned` is the direction in which it was on its way to a turning point at
+  !> `place` [m], 0 without one.
+  pure subroutine note_extremes(stretch, last, tally, turned, place)
     type(stretch_t), intent(in) :: stretch
     real(wp), intent(in) :: last
     type(tally_t), intent(inout) :: tally
+    integer, intent(out), optional :: turned
+    real(wp), intent(out), optional :: place
     real(wp) :: v(0:order), a(0:order), x, t
     integer :: k, direction
+    if (present(turned)) turned = 0
+    if (present(place)) place = 0
     v = stretch%path(:, at_v2)
     k = findloc(abs(v) > 0, .true., dim=1) - 1
     direction = 0
@@ -229,7 +236,8 @@ contains
       call series_value(stretch%path(:, at_x2), t, x)
       tally%x_max = max(tally%x_max, x)
       tally%x_min = min(tally%x_min, x)
-      if (.not. moving%machine%carried .and. direction /= touch) call note_miss(moving, direction, x, tally)
+      if (present(turned)) turned = direction
+      if (present(place)) place = x
     end if
     if (.not. tally%wants_v_max) return
     a(order) = 0
