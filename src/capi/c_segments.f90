@@ -3,7 +3,7 @@
 
 !> The function of include/separatrix.h that flies segments.
 module c_segments
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
   use c_text, only: answer
   use errors, only: error_t, fail
   use kinds, only: wp
@@ -26,11 +26,11 @@ contains
   integer(c_int) function separatrix_segments(model, chosen_count, chosen, values, segment_count, start, first, times, &
       force_count, force_interval, force, derivatives, tolerance, x, v, jacobian, velocity_jacobian, impacts, steady, &
       reason, impact_capacity, impact_count, impact_segment, impact, message, message_size) bind(c) result(code)
-    type(c_ptr), value :: model
+    type(c_ptr), value :: model, force
     integer(c_int), value :: chosen_count, segment_count, force_count, derivatives, impact_capacity
     integer(c_int), intent(in) :: chosen(chosen_count), first(segment_count + 1)
     real(c_double), value :: force_interval, tolerance
-    real(c_double), intent(in) :: values(chosen_count), start(3, segment_count), times(*), force(force_count)
+    real(c_double), intent(in) :: values(chosen_count), start(3, segment_count), times(*)
     real(c_double), intent(inout) :: x(*), v(*)
     real(c_double), intent(inout) :: jacobian(chosen_count + 3, *), velocity_jacobian(chosen_count + 3, *)
     integer(c_int), intent(inout) :: impacts(segment_count), steady(segment_count), reason(segment_count)
@@ -40,15 +40,20 @@ contains
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
     type(model_t), pointer :: self
+    real(c_double), target :: no_force(0)
+    real(c_double), pointer :: own_force(:)
     type(error_t), allocatable :: error
     type(samples_t) :: samples
     type(report_t) :: report
     integer :: kept
     call c_f_pointer(model, self)
+    ! NULL where there are no samples.
+    own_force => no_force
+    if (c_associated(force)) call c_f_pointer(force, own_force, [force_count])
     impact_count = 0
     call check_samples(segment_count, first, times, error)
     if (.not. allocated(error)) then
-      call fly(self, chosen + 1, values, start, first, times(:first(segment_count + 1)), force_interval, force, &
+      call fly(self, chosen + 1, values, start, first, times(:first(segment_count + 1)), force_interval, own_force, &
                derivatives /= 0, tolerance, samples, report, error)
     end if
     if (.not. allocated(error)) then

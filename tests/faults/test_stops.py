@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A signal or the time limit stops a run with code 75, soon; after a death the others say how to go on."""
 
+import json
 import os
 import random
-import re
 import signal
 import time
 from collections import Counter
@@ -125,10 +125,13 @@ def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, fig
     assert "--resume" in log
     done, _ = life.tiles_of(tmp_path)
     assert done
-    outcome = life.run(
-        mpi_separatrix, *life.RUN, *SLOW, "--resume", "--time-limit", 0.1, folder=tmp_path, ranks=3
-    )
-    assert outcome.code == 75
+    limit, outcome = 0.1, None
+    # On a busy machine the attractors are still searched then.
+    while outcome is None or "tiles were done before" not in outcome.out:
+        again = [*life.RUN, *SLOW, "--resume", "--time-limit", limit]
+        outcome = life.run(mpi_separatrix, *again, folder=tmp_path, ranks=3)
+        assert outcome.code == 75
+        limit *= 2
     assert f"{done} of {life.TILES} tiles were done before" in outcome.out
     assert life.tiles_of(tmp_path)[0] >= done
     figures.update(code=code, end=round(seconds, 2))
@@ -137,7 +140,7 @@ def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, fig
 def test_the_time_limit_is_kept(mpi_separatrix, tmp_path, reference, amount, figures):
     chance = random.Random(SEED)
     codes = Counter()
-    longest = 0.0
+    longest, told = 0.0, 0
     for trial in range(amount(2, 30)):
         folder = tmp_path / str(trial)
         folder.mkdir()
@@ -146,17 +149,21 @@ def test_the_time_limit_is_kept(mpi_separatrix, tmp_path, reference, amount, fig
         command = [*life.RUN, "--time-limit", str(limit), "--json"]
         outcome = life.run(mpi_separatrix, *command, folder=folder, ranks=trial % 4)
         codes[outcome.code] += 1
-        said = [
-            float(value) for value in re.findall(r'"event": "stopped", "seconds": ([0-9.e-]+)', outcome.out)
-        ]
-        if said:
-            longest = max(longest, said[0] - limit)
+        lines = [json.loads(line) for line in outcome.out.splitlines() if line.startswith("{")]
+        stopped = [line["seconds"] for line in lines if line["event"] == "stopped"]
+        if stopped:
+            told += 1
+            longest = max(longest, stopped[0] - limit)
         assert outcome.code in (0, 75)
         life.resume(mpi_separatrix, folder, chance.choice([0, 2])) if outcome.code else None
         assert life.content_hash(folder / life.NAME) == life.content_hash(reference)
     assert codes[75]
+    # The others were stopped in the search for attractors.
+    assert told >= amount(0, 5)
     assert longest < SOON
-    figures.update(seed=SEED, stops=codes.total(), codes=codes, longest_excess=round(longest, 2))
+    figures.update(
+        seed=SEED, stops=codes.total(), codes=codes, with_tiles=told, longest_excess=round(longest, 2)
+    )
 
 
 @pytest.mark.parametrize("dead", [0, 1, 2])

@@ -85,13 +85,14 @@ def read(reader: Callable[[Path], object], data: bytes, work: Path, number: int)
     (work / "current").write_bytes(struct.pack("<QQ", len(data), number) + data)
     path = work / "input.h5"
     path.write_bytes(data)
-    signal.alarm(LONGEST_SECONDS)
+    # Of the processor; the clock may run longer on a busy machine.
+    signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST_SECONDS)
     try:
         reader(path)
     except SeparatrixError as error:
         return error.code
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
     return 0
 
 
