@@ -221,7 +221,7 @@ contains
     type(stretch_t) :: bodies
     type(pair_state_t) :: sample
     type(book_t) :: book
-    real(wp) :: t, margin
+    real(wp) :: t
     bodies = stretch
     associate (pressing => damped%pressing, machine => moving%machine)
       bodies%path(:, at_x2) = pressing%side*stretch%path(:, at_p) + pressing%carried*stretch%path(:, at_x1)
@@ -229,10 +229,7 @@ contains
       bodies%path(:, at_v2) = pressing%side*stretch%path(:, at_rate) + pressing%carried*stretch%path(:, at_v1)
       if (pressing%sense == 0) bodies%path(:, at_v2) = stretch%path(:, at_v1)
     end associate
-    ! A turning point inside a stop misses none.
-    margin = tally%grazing_margin
-    call note_extremes(moving, damped%pressing%side, bodies, last, tally)
-    tally%grazing_margin = margin
+    call note_extremes(bodies, last, tally)
     if (.not. present(log)) return
     log%peak_penetration = max(log%peak_penetration, largest(stretch%path(:, at_p), last))
     log%peak_force = max(log%peak_force, largest(series_of(stretch, damped%force), last))
