@@ -11,6 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from separatrix import open_result, style
+from separatrix.discovery.wording import with_error
 from separatrix.labels import axis_label
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -48,7 +49,7 @@ def main(folder: Path, target: Path) -> None:
             print(f"{effect.name}: {verdict['outcome']}, {', '.join(verdict['effects'])}")
             for path, one in verdict["parameters"].items():
                 if path.startswith("effect."):
-                    print(f"  {path} = {one['value']:.6g} +- {one['standard_error']:.2g} {one['unit']}")
+                    print(f"  {path} = {with_error(one, 6)}")
             print(f"  reduced chi^2 on the held-out record: {gap['before']:.6g} -> {gap['after']:.4g}")
             for column, (label, path) in enumerate(
                 (("wrong", folder / "base.h5"), ("corrected", effect / "extended.h5"))

@@ -7,14 +7,27 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+case "${1:-}" in
+  "") ;;
+  -h | --help)
+    echo "scripts/quickstart.sh: installs what is needed, builds the program and its library in build/, and draws a basin map and a"
+    echo "sweep into out/; it has no options"
+    exit 0
+    ;;
+  *)
+    echo "quickstart: unknown option '$1'; there are none" >&2
+    exit 64
+    ;;
+esac
+
 echo "quickstart: 1/5 what is needed"
 scripts/bootstrap.sh
 # shellcheck source=scripts/environment.sh
 source scripts/environment.sh
 
-echo "quickstart: 2/5 building the program in build/"
+echo "quickstart: 2/5 building the program and its library in build/"
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release
-cmake --build build -j "$(nproc)" --target separatrix
+cmake --build build -j "$(nproc)" --target separatrix separatrix_library
 
 mkdir -p out
 echo "quickstart: 3/5 basin map: where each initial condition ends up (out/basin_coulomb.h5)"

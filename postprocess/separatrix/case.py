@@ -27,6 +27,7 @@ _STOP = {
     "exponent": ("$n$", ""),
     "damping": ("damping", ""),
 }
+_SOFT = {key: _STOP[key] for key in ("stiffness", "exponent", "damping")}
 _START = {"x0": ("$x_0$", "m"), "v0": ("$v_0$", "m/s")}
 _LAW_NAMES = {
     "none": "no",
@@ -66,6 +67,9 @@ def describe_case(result: xr.Dataset) -> list[str]:
     contact = case.get("contact")
     if isinstance(contact, dict):
         values = _values(contact, _CONTACT, "contact", axes)
+        if "stiffness" in contact:
+            soft = _values(contact, _SOFT, "contact", axes)
+            values = [str(contact["law"]).replace("_", "-"), *soft, *values]
         pieces.append(", ".join(values) if values else "no barrier")
     ratio = _drive_ratio(result, case)
     if ratio is not None and "drive_ratio" not in axes:

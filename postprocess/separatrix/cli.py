@@ -5,11 +5,12 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from separatrix import basin, points, style, sweep, trajectory
+from separatrix import basin, contact, points, style, sweep, trajectory
 from separatrix.arguments import Parser, list_of, whole_number
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.labels import plain
@@ -32,7 +33,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except SeparatrixError as error:
             reported = _report(error)
             code = code or reported
+    if options.beside and code == 0:
+        try:
+            for written in make_beside(options):
+                print(written, flush=True)
+        except SeparatrixError as error:
+            return _report(error)
     return code
+
+
+def make_beside(options: argparse.Namespace) -> list[Path]:
+    """Write one figure with the contacts of all files, named after the first; return its paths."""
+    with style.context(), ExitStack() as files:
+        results = []
+        for path in options.files:
+            files.enter_context(reading(path))
+            results.append(files.enter_context(open_result(path)))
+            if "contact_force" not in results[-1]:
+                raise SeparatrixError(f"{path}: --beside is for trajectories with a soft barrier", USAGE)
+        first = options.files[0]
+        target = (options.output or first.parent) / f"{first.name.removesuffix('.h5')}_beside"
+        title = plain(options.title or "Contact forces")
+        return save(contact.beside(results, title), target, options.formats, options.dpi)
 
 
 def make(path: Path, options: argparse.Namespace) -> list[Path]:
@@ -84,6 +106,11 @@ def _parser() -> Parser:
         type=list_of(FORMATS),
         default=["png", "pdf"],
         help="png, pdf, svg [png,pdf]",
+    )
+    parser.add_argument(
+        "--beside",
+        action="store_true",
+        help="trajectories with soft barriers: also one figure of the fastest contact of each",
     )
     parser.add_argument("--title", help="title of the figures [that of the file]")
     parser.add_argument(

@@ -6,6 +6,7 @@ USAGE = 64
 BAD_DATA = 65
 NO_INPUT = 66
 CANNOT_CREATE = 73
+INTERRUPTED = 130
 
 
 class SeparatrixError(Exception):

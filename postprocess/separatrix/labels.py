@@ -50,7 +50,8 @@ def unit(variable: xr.DataArray) -> str:
 def axis_label(variable: xr.DataArray) -> str:
     """Return the label of an axis: what, symbol and unit."""
     name = str(variable.name)
-    text = _SYMBOLS.get(name) or plain(variable.attrs.get("long_name", name.replace("_", " ")))
+    known = variable.attrs.get("label") or _SYMBOLS.get(name)
+    text = known or plain(variable.attrs.get("long_name", name.replace("_", " ")))
     return f"{text} ({unit(variable)})" if unit(variable) else text
 
 

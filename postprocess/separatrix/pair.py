@@ -31,9 +31,13 @@ def history(result: xr.Dataset, title: str) -> Figure:
     both.plot(time, driver, color=DRIVER, linewidth=0.8, linestyle=(0, (4, 2)))
     both.plot(time, driven, color=style.MOTION)
     both.set_ylabel(axis_label(result["x"]))
-    name, distance = _distance(result)
+    name, distance, stops = _distance(result)
     apart.plot(time, distance, color=style.MOTION)
     apart.set_ylabel(f"{name} (m)")
+    grounded = [] if carried_stop(result) else _stops(result)
+    for ax, places in ((both, grounded), (apart, stops)):
+        for place in places:
+            ax.axhline(place, color=style.BARRIER, linewidth=1.2, zorder=1)
     apart.set_xlabel(axis_label(result["time"]))
     both.set_xlim(time[0], time[-1])
     shaded = set()
@@ -43,9 +47,10 @@ def history(result: xr.Dataset, title: str) -> Figure:
     handles = [
         Line2D([], [], color=style.MOTION, label="driven body"),
         Line2D([], [], color=DRIVER, linewidth=0.8, linestyle=(0, (4, 2)), label="driving body"),
+        *([Line2D([], [], color=style.BARRIER, linewidth=1.2, label="barrier")] if _stops(result) else []),
         *(Patch(color=BANDS[mode], label=flag_text(mode)) for mode in BANDS if mode in shaded),
     ]
-    compose(figure, title, caption(result), handles, columns=len(handles))
+    compose(figure, title, caption(result), handles, columns=min(len(handles), 5))
     return figure
 
 
@@ -64,15 +69,50 @@ def shade_modes(ax: Axes, result: xr.Dataset) -> set[str]:
     return seen
 
 
-def _distance(result: xr.Dataset) -> tuple[str, np.ndarray]:
-    """Distance from the stop on the ground, or between the bodies."""
-    body = resolved_case(result).get("body", {})
-    if body.get("law") == "friction_pair":
-        for name in ("upper", "lower"):
-            if f"barrier_{name}" in result.attrs:
-                place = float(result.attrs[f"barrier_{name}"])
-                return "distance from the stop $|X - x_2|$", np.abs(place - result["x"].values)
-    return "$x_2 - x_1$", result["x"].values - result["driver_x"].values
+def _distance(result: xr.Dataset) -> tuple[str, np.ndarray, list[float]]:
+    """Distance from the stop on the ground, or between the bodies, and where the stops are in it."""
+    stops = _stops(result)
+    if stops and not carried_stop(result):
+        return "distance from\nthe stop $|X - x_2|$", np.abs(stops[0] - result["x"].values), [0.0]
+    return "$x_2 - x_1$", result["x"].values - result["driver_x"].values, stops
+
+
+def _stops(result: xr.Dataset) -> list[float]:
+    names = ("barrier_upper", "barrier_lower")
+    return [float(result.attrs[name]) for name in names if name in result.attrs]
+
+
+def carried_stop(result: xr.Dataset) -> bool:
+    """Whether the file is of two bodies and the driving one carries the stops."""
+    return "driver_x" in result and resolved_case(result).get("body", {}).get("law") == "backlash_pair"
+
+
+def relative_to_stop(result: xr.Dataset) -> xr.Dataset:
+    """Return a trajectory with x and v, also of its events, in the coordinate that its barriers bound.
+
+    This is x2 - x1 where the driving body carries them; nothing changes where they are fixed to the ground.
+    """
+    if not carried_stop(result):
+        return result
+    case = resolved_case(result)
+    # a body whose motion is given does not feel an impact, otherwise the momentum of both stays
+    share = case["body"]["driven_mass"] / case["body"]["mass"]
+    if case.get("drive", {}).get("law") in ("velocity", "sine"):
+        share = 0.0
+    before, after = result["event_v_before"], result["event_v_after"]
+    driver_after = result["event_driver_v"] - share * (after - before)
+    seen = result.copy()
+    for name, values in (
+        ("x", result["x"] - result["driver_x"]),
+        ("v", result["v"] - result["driver_v"]),
+        ("event_x", result["event_x"] - result["event_driver_x"]),
+        ("event_v_before", before - result["event_driver_v"]),
+        ("event_v_after", after - driver_after),
+    ):
+        seen[name] = values.assign_attrs(result[name].attrs)
+    seen["x"].attrs["label"] = "relative position $x_2 - x_1$"
+    seen["v"].attrs["label"] = "relative velocity $v_2 - v_1$"
+    return seen
 
 
 def caption(result: xr.Dataset) -> list[str]:

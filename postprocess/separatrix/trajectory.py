@@ -32,9 +32,10 @@ def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
     if "kinetic_energy" in result:
         caption = pair.caption(result) if two_bodies else _caption(result)
         made["energy"] = energy.decomposition(result, title, caption)
+    seen = pair.relative_to_stop(result)
     if "contact_force" in result:
-        made["contact"] = contact.loops(result, title)
-    return {**made, "phase": phase_portrait(result, title)}
+        made["contact"] = contact.loops(seen, title)
+    return {**made, "phase": phase_portrait(seen, title)}
 
 
 def time_history(result: xr.Dataset, title: str) -> Figure:
@@ -48,7 +49,10 @@ def time_history(result: xr.Dataset, title: str) -> Figure:
     start = max(time[0], end - ZOOM_PERIODS * float(result.attrs["drive_period"]))
     last = time >= start
     zoom.plot(time[last], position[last], color=style.MOTION)
-    zoom.plot(time[last], result["drive"].values[last], color="#555555", linewidth=0.7, linestyle=(0, (4, 2)))
+    foot = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (4, 2))}
+    driven = resolved_case(result).get("drive", {}).get("law") != "none"
+    if driven:
+        zoom.plot(time[last], result["drive"].values[last], **foot)
     zoom.set_xlim(start, end)
     marked = False
     for letter, ax in zip("ab", (whole, zoom), strict=True):
@@ -59,9 +63,7 @@ def time_history(result: xr.Dataset, title: str) -> Figure:
         ax.set_ylabel(axis_label(result["x"]))
     handles = [
         Line2D([], [], color=style.MOTION, label="body"),
-        Line2D(
-            [], [], color="#555555", linewidth=0.7, linestyle=(0, (4, 2)), label="foot of the spring $x_A$"
-        ),
+        *([Line2D([], [], **foot, label="foot of the spring $x_A$")] if driven else []),
         *_barrier_handle(result),
     ]
     if marked:
@@ -81,22 +83,29 @@ def _end(result: xr.Dataset) -> float:
 
 
 def phase_portrait(result: xr.Dataset, title: str) -> Figure:
-    """Return velocity against position during the last `window` seconds, impacts as jumps."""
+    """Return velocity against position during the last `window` seconds, impacts as jumps.
+
+    A body that stands still then is shown from its start.
+    """
     figure = style.new_figure(style.SINGLE_COLUMN, 68.0)
     ax = figure.add_subplot()
     window = float(result.attrs["window"])
     start = float(result["time"].values[-1]) - window
+    shown = f"last {window:g} s"
+    if not np.ptp(result["x"].values[result["time"].values >= start]) > 0:
+        start, shown = float(result["time"].values[0]), "from the start to rest"
     position, velocity, jumps = steady_path(result, start)
     ax.plot(position, velocity, color=style.MOTION, linewidth=0.8)
     for x, before, after in jumps[-_MOST_MARKERS:]:
         ax.plot([x, x], [before, after], color=style.IMPACT, linewidth=0.8)
     _draw_barriers(ax.axvline, result, linewidth=2.2)
+    ax.locator_params(axis="x", nbins=6)
     ax.set_xlabel(axis_label(result["x"]))
     ax.set_ylabel(axis_label(result["v"]))
     handles = [Line2D([], [], color=style.MOTION, linewidth=0.8, label="motion"), *_barrier_handle(result)]
     if jumps:
         handles.append(Line2D([], [], color=style.IMPACT, linewidth=0.8, label="impact"))
-    compose(figure, title, [f"last {window:g} s", *_caption(result)], handles, columns=3)
+    compose(figure, title, [shown, *_caption(result)], handles, columns=3)
     return figure
 
 

@@ -15,7 +15,7 @@ from compiled import Compiled, build
 from ours import FULL, ONE_BY_ONE, Maps, Program, Timing, flips, read_points
 from published_case import SEED, SOURCE, TOLERANCE, Outcomes, published_machine, start_points
 from python_peers import Heyoka, Scipy
-from reference_run import Reference
+from reference_run import run_on_all_cores
 
 BATCH = 8
 
@@ -37,10 +37,10 @@ class Sizes:
     gsl: int = 1500
     cvode: int = 100
     scipy: int = 6
-    reference: int = 10000
+    reference: int = 100000
     stopped_reference: int = 4000
     flips: int = 1000
-    stribeck_starts: int = 100000
+    stribeck_starts: int = 30000
 
 
 QUICK = Sizes(
@@ -149,7 +149,7 @@ def contestants(program: Program, build_folder: Path, sizes: Sizes) -> dict[str,
     }
 
 
-def judge(everybody: dict, reference: Reference, program: Program, results: Results) -> None:
+def judge(everybody: dict, library: Path, program: Program, results: Results) -> None:
     """Accuracy of all who ran the Coulomb case."""
     sizes = results.sizes
     print(
@@ -157,7 +157,7 @@ def judge(everybody: dict, reference: Reference, program: Program, results: Resu
         flush=True,
     )
     starts = start_points(sizes.reference)
-    truth = reference.run(starts)
+    truth = run_on_all_cores(library, program.program, starts)
     for name, words in (("full", ()), ("full_single", ONE_BY_ONE)):
         _, path = program.points("coulomb", starts, f"points_{name}", *words)
         results.outcomes[name] = read_points(path)
@@ -169,7 +169,7 @@ def judge(everybody: dict, reference: Reference, program: Program, results: Resu
         count, size = sizes.stopped_reference, everybody[name].sizes[1]
         chosen = np.array(random.Random(SEED).sample(range(size**2), count))
         starts, labels = everybody[name].labels(chosen)
-        wrong = int(np.sum(reference.run(starts).label != labels))
+        wrong = int(np.sum(run_on_all_cores(library, program.program, starts).label != labels))
         results.accuracy[name] = Accuracy(count, None, None, wrong)
     results.flips = flips(program, sizes.flips)
     starts = start_points(sizes.stribeck_starts)
@@ -192,7 +192,6 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         program = Program(options.build / "bin" / "separatrix", Path(folder))
         results.version = program.version
-        reference = Reference(options.build / "lib" / "libseparatrix_reference.so", program.program)
         everybody = contestants(program, options.build, results.sizes)
         results.timings = {name: [] for name in everybody}
         names = list(everybody)
@@ -201,7 +200,7 @@ def main() -> None:
             # everybody follows everybody else in turn
             for name in names[number % len(names) :] + names[: number % len(names)]:
                 results.timings[name].append(everybody[name].round())
-        judge(everybody, reference, program, results)
+        judge(everybody, options.build / "lib" / "libseparatrix_reference.so", program, results)
     results.seconds = time.perf_counter() - began
     text = report.page(results, options.quick)
     options.output.write_text(text)

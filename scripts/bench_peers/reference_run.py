@@ -4,7 +4,10 @@
 
 import ctypes
 import json
+import multiprocessing
+import os
 import subprocess
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,7 @@ DOMAIN = 1e6
 EVENT_BUDGET = 1_000_000
 TIME_OVER = 2
 IMPACT_REGIMES = (2, 4, 5)
+SHARE = 200
 FAMILIES = ("body", "restoring", "friction", "contact", "drive")
 
 
@@ -79,3 +83,19 @@ class Reference:
         if failed or np.any(reason != TIME_OVER):
             raise RuntimeError("the reference did not run to the end of the duration")
         return Outcomes(x, v, impacts.astype(int), np.isin(regime, IMPACT_REGIMES))
+
+
+def run_share(share: tuple[Path, Path, np.ndarray]) -> Outcomes:
+    """Run some of the starts in a process of their own."""
+    library, program, starts = share
+    return Reference(library, program).run(starts)
+
+
+def run_on_all_cores(library: Path, program: Path, starts: np.ndarray) -> Outcomes:
+    """Run every start (x0, v0), on as many cores as this process may use."""
+    shares = [(library, program, starts[i : i + SHARE]) for i in range(0, len(starts), SHARE)]
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=spawn) as pool:
+        parts = list(pool.map(run_share, shares))
+    names = ("x", "v", "impacts", "label")
+    return Outcomes(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

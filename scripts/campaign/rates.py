@@ -41,3 +41,15 @@ class Rate:
 def rate(flags: list[bool]) -> Rate:
     """How many are true."""
     return Rate(sum(flags), len(flags))
+
+
+def difference(one: Rate, other: Rate) -> tuple[float, float]:
+    """R. G. Newcombe's 95 % interval of the difference of two rates (1998, method 10)."""
+    if not one.cases or not other.cases:
+        return -1.0, 1.0
+    middle = one.share - other.share
+    (low, high), (other_low, other_high) = one.interval, other.interval
+    return (
+        middle - math.hypot(one.share - low, other_high - other.share),
+        middle + math.hypot(high - one.share, other.share - other_low),
+    )

@@ -8,12 +8,13 @@ import statistics
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import effects
 import figure
 import records
 from bars import bars
 from markdown import table
 from rates import Rate, rate
-from scoring import PRECISE, SEPARABLE, STRONG, Score, score
+from scoring import HAVE_A_TERM, PRECISE, SEPARABLE, STRONG, Score, score
 
 TEMPLATE = Path(__file__).resolve().parent / "discovery.md.in"
 METHODS = ("STLSQ", "ensemble SINDy")
@@ -41,9 +42,10 @@ def scores_of(folders: object, numbers: Sequence[int]) -> tuple[list[Score], int
 
 
 def versions(folders: object, found: list[Score]) -> str:
-    """Commits whose workflow gave the verdicts."""
-    commits = [json.loads(folders.result(one.number).read_text())["commit"] for one in found]
-    return ", ".join(f"{name} ({commits.count(name)})" for name in dict.fromkeys(commits))
+    """Commits whose workflow gave the verdicts, and the libraries that it computed with."""
+    results = [json.loads(folders.result(one.number).read_text()) for one in found]
+    made_by = [f"{one['commit']} with library {one.get('library', 'unknown')}" for one in results]
+    return ", ".join(f"{name} ({made_by.count(name)})" for name in dict.fromkeys(made_by))
 
 
 def percent(share: float) -> str:
@@ -125,8 +127,8 @@ def precision(found: list[Score]) -> list[list[str]]:
 
 
 def baselines(found: list[Score]) -> list[list[str]]:
-    """Right names of all asked, single effects."""
-    strong = [one for one in found if one.kind == "single" and one.strong]
+    """Right names of all single effects that the baselines have a term for."""
+    strong = [one for one in found if one.comparable and one.strong]
     quiet = [one for one in strong if one.noise <= 0.01]
     none = [one for one in found if one.kind == "none"]
 
@@ -216,6 +218,7 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
             ["method", "right, d' >= 5", "right, noise <= 1 %", "alarm where nothing is hidden"],
             baselines(found),
         ),
+        "without_term": ", ".join(f"`{name}`" for name in effects.CATALOGUE if name not in HAVE_A_TERM),
         "undecided": table(["answer", "reason", "cases"], undecided(folders, found)),
         "failed": str(rate([one.answer == "failed" for one in found])),
     }

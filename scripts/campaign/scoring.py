@@ -7,12 +7,41 @@ from dataclasses import dataclass
 
 EQUIVALENT = frozenset({"offset_force", "asymmetric_friction", "sensor_bias", "sensor_gain"})
 """One motion while the body slides and scale, friction and barrier are free: only a set is right."""
+HAVE_A_TERM = EQUIVALENT | {
+    "viscous",
+    "coulomb",
+    "quadratic_drag",
+    "stribeck",
+    "position_dependent_friction",
+    "cubic_spring",
+    "drive_ripple",
+}
+"""Effects that the baselines can name: they have the force as a term, or a constant for the set."""
 STRONG = 5.0
 """d' from which on the bars count."""
 SEPARABLE = 3.0
 """d' that has to be left beside any one other effect for a name to be possible."""
 PRECISE = 10.0
 ANSWERS = ("named", "ambiguous", "none", "not-in-catalogue")
+
+
+SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
+PLANE, PHASE, IMPACT = "position and velocity", "drive phase", "time since the last impact"
+REGIONS = {
+    "viscous": {SPEED, PLANE},
+    "coulomb": {SPEED, REVERSAL, PLANE},
+    "quadratic_drag": {SPEED, PLANE},
+    "stribeck": {SPEED, REVERSAL, PLANE},
+    "static_excess": {REVERSAL},
+    "dahl": {REVERSAL, PLANE},
+    "position_dependent_friction": {PLANE},
+    "cubic_spring": {PLACE, PLANE},
+    "restitution_slope": {IMPACT},
+    "compliant_contact": {IMPACT},
+    "second_barrier": {PLACE, PLANE},
+    "drive_ripple": {PHASE},
+}
+"""Maps that an effect shows in; what acts in the whole motion or in the sensor has none."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +73,10 @@ class Score:
     covered: tuple[bool, ...]
     removed: float
     """Share of the held-out excess that the verdict removed; NaN without excess or name."""
+    decoy: bool
+    """A decoy could have been named."""
+    region: bool | None
+    """The clearest region is one where the effect acts; None without region or rule."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -55,13 +88,18 @@ class Score:
 
     @property
     def alarm(self) -> bool:
-        """Whether effects of the catalogue were reported, one or several."""
-        return self.answer in ("named", "ambiguous")
+        """Whether anything was said to be missing."""
+        return self.answer in ("named", "ambiguous", "not-in-catalogue")
 
     @property
     def strong(self) -> bool:
         """Whether the bars on names count for it."""
         return self.in_catalogue and self.d_prime >= STRONG
+
+    @property
+    def comparable(self) -> bool:
+        """Whether the baselines could have named it."""
+        return self.kind == "single" and self.truth in HAVE_A_TERM
 
     @property
     def separable(self) -> bool:
@@ -96,7 +134,9 @@ def score(truth: dict, result: dict) -> Score:
         "outside": answer == "not-in-catalogue",
     }.get(truth["kind"], one_answer and contains)
     in_catalogue = truth["kind"] in ("single", "pair")
-    part = truth["kind"] == "pair" and answer == "named" and next(iter(sets)) < names
+    # one name only is a name, also where the verdict doubts it
+    alone = len(sets) == 1
+    part = truth["kind"] == "pair" and alone and next(iter(sets)) < names
     errors, covered = precision(truth, verdict) if right and in_catalogue else ((), ())
     held_out = verdict.get("gap", {}).get("held_out")
     return Score(
@@ -116,10 +156,12 @@ def score(truth: dict, result: dict) -> Score:
         decided=one_answer,
         right=right,
         contains=contains,
-        wrong_name=one_answer and not right and not part,
+        wrong_name=(one_answer or alone) and not contains and not part,
         errors=errors,
         covered=covered,
         removed=removed(held_out) if one_answer else math.nan,
+        decoy=bool(verdict.get("decoys", {}).get("accepted")),
+        region=region(truth["names"], verdict.get("where", [])) if one_answer and right else None,
         seconds=result["seconds"],
         baselines=result.get("baselines", {}),
         baselines_right={
@@ -131,6 +173,14 @@ def score(truth: dict, result: dict) -> Score:
     )
 
 
+def region(names: list[str], where: list[dict]) -> bool | None:
+    """Whether the clearest flagged region lies in a map where one of the effects shows."""
+    if not where or not any(name in REGIONS for name in names):
+        return None
+    clearest = max(where, key=lambda one: abs(one["force"] / one["error"]))
+    return any(clearest["map"] in REGIONS.get(name, ()) for name in names)
+
+
 def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: bool, part: bool) -> str:
     """Column of the confusion matrix."""
     if answer == "failed":
@@ -139,7 +189,7 @@ def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: b
         return answer
     if contains:
         return "right name" if answer == "named" else "equivalent set" if one_answer else "set with the truth"
-    if answer == "ambiguous":
+    if len(sets) != 1:
         return "set without the truth"
     return "one of the pair" if part else "+".join(sorted(next(iter(sets))))
 
@@ -147,16 +197,17 @@ def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: b
 def precision(truth: dict, verdict: dict) -> tuple[tuple[float, ...], tuple[bool, ...]]:
     """Relative errors of the size of each effect, and whether its interval has the truth.
 
-    A parameter whose truth is 0, and one that the fit keeps, has no relative error.
+    A parameter whose truth is 0, and one that was not fitted, has no relative error. One that ended at its
+    bound has no interval, which cannot have the truth.
     """
     errors, covered = [], []
     for path, value in truth["parameters"].items():
         found = verdict.get("parameters", {}).get(path)
-        if found is None or value == 0 or not found.get("standard_error"):
+        if found is None or value == 0:
             continue
         errors.append(abs(found["value"] / value - 1))
-        low, high = found["interval_95"]
-        covered.append(low <= value <= high)
+        ends = found["interval_95"]
+        covered.append(ends is not None and ends[0] <= value <= ends[1])
     return tuple(errors), tuple(covered)
 
 

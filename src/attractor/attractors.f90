@@ -126,8 +126,8 @@ contains
     integer :: n, j, k
     n = attractor%coordinates
     if (n == 2) then
-      ! One body; every section of a map passes here.
-      d(:2) = [(point(1) - attractor%points(1, i))/attractor%scale(1), (point(2) - attractor%points(2, i))/attractor%scale(2)]
+      ! One body: the same operations as in lanes.
+      d(:2) = (point(:2) - attractor%points(:2, i))*(1/attractor%scale(:2))
       square = attractor%metric(1, i)*d(1)*d(1) + 2*attractor%metric(2, i)*d(2)*d(1) + attractor%metric(3, i)*d(2)*d(2)
       return
     end if

@@ -37,7 +37,7 @@ contains
     integer :: i, reason
     strobe = strobe_at(moving, point)
     if (present(wants_v_max)) tally%wants_v_max = wants_v_max
-    call reset_tally(tally, strobe%state)
+    call reset_tally(tally, strobe%state, allocated(moving%pair))
     reason = 0
     do i = 1, periods
       call advance_strobe_period(moving, strobe, tally, reason)

@@ -86,7 +86,7 @@ contains
     known = .false.
     ok = .true.
     regime = 0
-    call reset_tally(tally, strobe%state)
+    call reset_tally(tally, strobe%state, allocated(moving%pair))
     do i = 1, max(1, ceiling(patience/moving%machine%period))
       slips = tally%slips
       whole = .not. strobe%state%time > 0 .and. rest_lasts(moving)
@@ -113,7 +113,7 @@ contains
     type(motion_t) :: free
     integer :: i, p, reason, n, first
     later = strobe
-    call reset_tally(tally, later%state)
+    call reset_tally(tally, later%state, allocated(moving%pair))
     points(:, 0) = section_point(moving, later)
     do i = 1, 2*max_period
       call advance_strobe_period(moving, later, tally, reason)
@@ -177,7 +177,7 @@ contains
     integer :: i, k, reason
     later = strobe
     tally%wants_v_max = .true.
-    call reset_tally(tally, later%state)
+    call reset_tally(tally, later%state, allocated(moving%pair))
     found%coordinates = coordinates_of(moving)
     found%points(:, 1) = section_point(moving, later)
     found%points(:, 2) = found%points(:, 1)

@@ -14,7 +14,7 @@ module trajectory
   implicit none
   private
 
-  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, conclude
+  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, conclude
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -101,8 +101,8 @@ contains
     real(wp), intent(in) :: x, v, crank_angle
     type(course_t), intent(out) :: course
     course%strobe_t = start_strobe(moving, [x, v, crank_angle])
-    call reset_tally(course%tally, course%state)
-    if (.not. span%duration - span%window > 0) call open_window(course)
+    call reset_tally(course%tally, course%state, allocated(moving%pair))
+    if (.not. span%duration - span%window > 0) call open_window(moving, course)
     call set_stop(moving, span, course)
   end subroutine begin_course
 
@@ -130,16 +130,23 @@ contains
     call advance(moving, course%state, course%until, course%tally, course%reason, slip_speed=speed)
   end subroutine go_past_turn
 
-  !> Sections to come where nothing is due but the question whether the motion has been captured, and no answer stops it.
+  !> Sections to come where nothing is due but the question whether the motion has been captured.
   pure integer function sections_ahead(moving, span, course)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(course_t), intent(in) :: course
     sections_ahead = 0
-    if (span%stop_when_captured .or. course%phase == phase_extension .or. course%until < moving%machine%period) return
+    if (course%until < moving%machine%period .or. course%since > 0) return
     ! One is left out in case that rounding shifts the last.
     sections_ahead = max(0, int((end_of_phase(span, course%phase) - course%elapsed)/moving%machine%period) - 2)
   end function sections_ahead
+
+  !> Whether a course is over as soon as it is captured.
+  pure logical function ends_captured(span, course)
+    type(span_t), intent(in) :: span
+    type(course_t), intent(in) :: course
+    ends_captured = span%stop_when_captured .or. course%phase == phase_extension
+  end function ends_captured
 
   !> What is due at a stop, the state being there: has the motion been captured, is a phase over, where to stop next.
   !> `slipped` tells whether the body moved since the last stop.
@@ -157,14 +164,11 @@ contains
       if (course%until >= moving%machine%period) then
         course%elapsed = course%elapsed + (moving%machine%period - course%since)
         call note_section(moving, catalogue, slipped .or. course%since > 0, course, outcome)
-        course%since = 0
       else
         course%elapsed = phase_end
-        course%since = course%until
       end if
     end if
-    ended = course%reason /= 0 .or. (course%captured > 0 .and. (span%stop_when_captured .or. &
-                                                                course%phase == phase_extension))
+    ended = course%reason /= 0 .or. (course%captured > 0 .and. ends_captured(span, course))
     if (ended .or. course%elapsed >= phase_end) call end_phase(moving, span, size(catalogue) > 0, ended, course, outcome)
     if (course%phase /= phase_over) call set_stop(moving, span, course)
   end subroutine pass_stop
@@ -221,7 +225,7 @@ contains
     select case (course%phase)
     case (phase_transient)
       if (ended) call note_state(course, outcome)
-      if (.not. ended) call open_window(course)
+      if (.not. ended) call open_window(moving, course)
     case (phase_window)
       outcome%window = features_over(moving, course%tally, span%window/moving%machine%period)
       call note_state(course, outcome)
@@ -244,14 +248,15 @@ contains
   end subroutine note_state
 
   !> Starts the statistics window.
-  pure subroutine open_window(course)
+  pure subroutine open_window(moving, course)
+    type(motion_t), intent(in) :: moving
     type(course_t), intent(inout) :: course
     course%phase = phase_window
     course%impacts = course%impacts + course%tally%impacts
     course%last_impact_speed = latest_impact_speed(course)
     course%grazing_margin = min(course%grazing_margin, course%tally%grazing_margin)
     course%tally%wants_v_max = .true.
-    call reset_tally(course%tally, course%state)
+    call reset_tally(course%tally, course%state, allocated(moving%pair))
   end subroutine open_window
 
   pure real(wp) function latest_impact_speed(course) result(speed)

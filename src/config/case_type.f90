@@ -39,7 +39,7 @@ module case_type
     real(wp) :: tolerance = 1e-13_wp
     !> Most events of one trajectory.
     integer :: event_budget = 1000000
-    !> Most steps of its adaptive flights.
+    !> Most steps of its flights that take them.
     integer :: step_budget = 5000000
   end type integrator_t
 

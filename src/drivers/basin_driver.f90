@@ -9,8 +9,9 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_search, only: pack_catalogues, search_catalogues, unpack_catalogues
+  use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
+  use endings, only: report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
   use grid, only: grid_t, point_slice, slice_period, two_axes
@@ -25,7 +26,7 @@ module basin_driver
   use session, only: describe_file, identity_of, open_session, session_t
   use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
-  use status, only: last_reason, exit_done, reason_names, reason_settled
+  use status, only: last_reason, exit_done, reason_settled
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
@@ -60,6 +61,7 @@ module basin_driver
     procedure :: compute => compute_basin_points
     procedure :: note => note_basin_point
     procedure :: tell_apart => tell_apart_basin_points
+    procedure :: points_from => basin_points_from
   end type basin_work_t
 
 contains
@@ -80,6 +82,8 @@ contains
     call require_axes(session%the_case, error)
     call session%stop_if(error)
     call prepare_basin(session%the_case, work, tile)
+    call check_slices(work%grid, error)
+    call session%stop_if(error)
     if (command%validate) then
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
@@ -99,8 +103,6 @@ contains
       call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                              command%time_limit, work%catalogues, error)
     end if
-    call session%stop_if(error)
-    if (size(work%catalogues) > 0) call points_at_a_time(work%grid, work%span, work%block, error)
     call session%stop_if(error)
     call prepare_counts(work)
     if (command%dry_run) call report_plan(session, work, tile)
@@ -205,6 +207,15 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
   end subroutine compute_basin_points
+
+  subroutine basin_points_from(self, index, points, error)
+    class(basin_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    integer, intent(out) :: points
+    type(error_t), allocatable, intent(out) :: error
+    points = 1
+    if (size(self%catalogues) > 0) call points_at_a_time(self%grid, self%span, index, self%cache, points, error)
+  end subroutine basin_points_from
 
   !> Points of one cell are to have the same attractor, and to settle about equally fast.
   subroutine tell_apart_basin_points(self, index, values, marks, settling, error)
@@ -328,11 +339,7 @@ contains
         to_text(work%regimes(i))//' points)', '"regime": '//json_text(trim(regime_names(i)))//', "percent": '// &
         to_text(share)//', "points": '//to_text(work%regimes(i)))
     end do
-    do i = 0, last_reason
-      if (work%reasons(i) > 0) call session%journal%line('reason', '  ended as '//trim(reason_names(i))//': '// &
-        to_text(work%reasons(i))//' points', '"reason": '//json_text(trim(reason_names(i)))//', "points": '// &
-        to_text(work%reasons(i)))
-    end do
+    call report_reasons(session%journal, work%reasons)
   end subroutine report_shares
 
 end module basin_driver

@@ -13,6 +13,8 @@ module case_warnings
   use kinds, only: int64, wp
   use motion, only: motion_t
   use pair, only: impact_mass
+  use pair_damper, only: is_damper
+  use strobe, only: has_section
   use text, only: to_text
   implicit none
   private
@@ -22,7 +24,8 @@ module case_warnings
 contains
 
   !> One line in the journal for each. Looks at the case itself, not along its axes.
-  subroutine warn_about(the_case, journal)
+  subroutine warn_about(command, the_case, journal)
+    character(len=*), intent(in) :: command
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
     type(grid_t) :: grid
@@ -37,9 +40,14 @@ contains
           call journal%line('warning', 'warning: body.blow_time = '//to_text(machine%blow_time)//' s is after the end, run.'// &
             'duration = '//to_text(the_case%run%duration)//' s: no blow falls')
         end if
+        if ((command == 'basin' .or. command == 'sweep') .and. .not. has_section(moving)) then
+          call journal%line('warning', 'warning: no attractors are looked for: with '//trim(merge('drive.sample_time', &
+            'body.blow        ', machine%sample_time > 0))//' the state at crank angle 0 does not tell what follows. Points '// &
+            'get the regime at the end of their run')
+        end if
       end associate
     end if
-    if (moving%machine%contact%soft) call warn_about_steps(the_case, moving, journal)
+    if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
   !> Says if a body that leans on a soft barrier would use up the steps of a trajectory.
@@ -47,14 +55,19 @@ contains
     type(case_t), intent(in) :: the_case
     type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
-    real(wp) :: force, mass, lasts
+    real(wp) :: force, mass, rate, lasts
     mass = moving%machine%mass
     force = moving%machine%force_scale
     if (allocated(moving%pair)) then
       mass = impact_mass(moving%pair%machine)
       force = moving%pair%force_scale
     end if
-    lasts = the_case%integrator%step_budget/steps_per_second(moving%machine%contact, mass, force)
+    rate = steps_per_second(moving%machine%contact, mass, force)
+    if (allocated(moving%pair)) then
+      ! In closed form, one a radian of the fastest motion.
+      if (is_damper(moving%pair)) rate = max(sqrt(moving%machine%contact%stiffness/mass), moving%machine%contact%damping/mass)
+    end if
+    lasts = the_case%integrator%step_budget/rate
     if (lasts >= the_case%run%duration) return
     call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &
       to_text(the_case%integrator%step_budget)//' lasts a body that leans on it about '//to_text(lasts, 2)//' s of '// &

@@ -15,7 +15,7 @@ module catalogue_search
   use motion, only: motion_t
   use parallel, only: make_scheduler
   use scheduler, only: scheduler_options_t, scheduler_t
-  use status, only: exit_io, exit_resumable
+  use status, only: exit_bad_case, exit_io, exit_resumable
   use stop_check, only: check_stop
   use team, only: team_t
   use text, only: to_text
@@ -24,9 +24,28 @@ module catalogue_search
   implicit none
   private
 
-  public :: search_catalogues, pack_catalogues, unpack_catalogues
+  public :: check_slices, search_catalogues, pack_catalogues, unpack_catalogues
+
+  !> Most attractors of all slices together: their numbers are counted by default integers, as MPI does.
+  integer, parameter :: most_attractors = (huge(1) - modulo(huge(1), packed_size + 2))/(packed_size + 2)
 
 contains
+
+  !> Refuses a grid (code 65) whose slices, with one attractor each, would have more than fit.
+  pure subroutine check_slices(grid, error)
+    type(grid_t), intent(in) :: grid
+    type(error_t), allocatable, intent(out) :: error
+    if (any(grid%start_axis > 0)) call check_attractors(grid%slices, 'slices of starts', error)
+  end subroutine check_slices
+
+  pure subroutine check_attractors(number, things, error)
+    integer(int64), intent(in) :: number
+    character(len=*), intent(in) :: things
+    type(error_t), allocatable, intent(out) :: error
+    if (number > most_attractors) call fail(error, exit_bad_case, "key 'axis.count': found "//to_text(number)//' '//things// &
+      ' over the parameters of the machine, allowed at most '//to_text(most_attractors)//'; divide the map')
+  end subroutine check_attractors
+
 
   !> Catalogues of every slice, labelled along the slices; none if no start is an axis (then every point is its own
   !> slice). A second round offers each slice the attractors of its neighbours, so that none is missed
@@ -150,6 +169,15 @@ contains
     type(catalogue_t), intent(inout) :: catalogues(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: all_values(:)
+    integer(int64) :: found(1)
+    integer :: slice
+    found = 0
+    do slice = 1, size(catalogues)
+      if (searched(slice)) found = found + max(1, size(catalogues(slice)%attractors))
+    end do
+    call team%sum(found)
+    call check_attractors(found(1), 'attractors', error)
+    if (allocated(error)) return
     call team%allgather(pack_catalogues(catalogues, searched), all_values)
     call unpack_catalogues(all_values, catalogues, error)
   end subroutine exchange

@@ -13,7 +13,7 @@ module point_work
 
   type, abstract, public :: point_work_t
     integer :: variables = 0
-    !> Most points computed at a time: as many as a stop signal may wait for.
+    !> Points computed at a time: as many as a stop signal may wait for.
     integer :: block = 1
     !> Where not all points are computed: how they are chosen, and along which two axes.
     type(refine_t) :: refine
@@ -26,6 +26,7 @@ module point_work
     procedure(compute_points), deferred :: compute
     procedure(note_point), deferred :: note
     procedure :: tell_apart => by_all_values
+    procedure :: points_from => block_of_points
   end type point_work_t
 
   abstract interface
@@ -76,6 +77,17 @@ contains
     settling(:size(index, 2)) = 0
   end subroutine by_all_values
 
+  !> Points to compute at a time from that at `index` on.
+  subroutine block_of_points(self, index, points, error)
+    class(point_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    integer, intent(out) :: points
+    type(error_t), allocatable, intent(out) :: error
+    associate (unused => index)
+      points = self%block
+    end associate
+  end subroutine block_of_points
+
   !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch says stop.
   subroutine compute_list(work, index, values, whole, error, watch)
     class(point_work_t), intent(inout) :: work
@@ -85,10 +97,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
     logical :: stop_now
-    integer :: first, last
+    integer :: first, last, points
     whole = .true.
-    do first = 1, size(index, 2), work%block
-      last = min(first + work%block - 1, size(index, 2))
+    last = 0
+    do while (last < size(index, 2))
+      first = last + 1
+      call work%points_from(index(:, first), points, error)
+      if (allocated(error)) return
+      last = min(last + points, size(index, 2))
       call work%compute(index(:, first:last), values(first:last, :), error)
       if (allocated(error)) return
       work%computed = work%computed + last - first + 1

@@ -8,6 +8,7 @@ module points_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use endings, only: report_reasons
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
@@ -100,7 +101,6 @@ contains
     logical, intent(in) :: complete
     type(schema_t) :: extra
     type(error_t), allocatable :: error
-    integer :: i
     call session%team%sum(work%reasons)
     call finish_tiles(session, file, complete, extra)
     associate (csv => session%command%csv)
@@ -108,10 +108,7 @@ contains
       call session%stop_if(error)
       if (len(csv) > 0) call session%journal%line('written', 'wrote '//csv)
     end associate
-    do i = 0, last_reason
-      if (work%reasons(i) > 0) call session%journal%line('reason', '  ended as '//trim(reason_names(i))//': '// &
-        to_text(work%reasons(i))//' points')
-    end do
+    call report_reasons(session%journal, work%reasons)
     call session%end_with(exit_done)
   end subroutine end_points
 

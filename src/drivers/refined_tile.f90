@@ -7,6 +7,7 @@ module refined_tile
   use kinds, only: int64, wp
   use point_work, only: compute_list, point_work_t, watch_t
   use refinement, only: block_content, block_t, learn_points, next_points, open_block
+  use spread_order, only: spread_place
   use system, only: monotonic_seconds
   implicit none
   private
@@ -94,8 +95,8 @@ contains
     work%computed = 0
     points = 0
     do i = 1, pilot_blocks
+      place = spread_place(i, lengths) - 1
       do k = 1, size(lengths)
-        place(k) = int(modulo(0.5_wp + i*sqrt(real(4*k + 1, wp)), 1.0_wp)*lengths(k))
         if (any(work%refined_axes == k)) place(k) = place(k)/work%refine%block*work%refine%block
       end do
       call refine_block(work, lengths, place, block, whole, error)

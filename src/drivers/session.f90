@@ -105,7 +105,7 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
-    call warn_about(self%the_case, self%journal)
+    call warn_about(self%command%name, self%the_case, self%journal)
   end subroutine begin
 
   subroutine unlock(session)

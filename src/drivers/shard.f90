@@ -13,19 +13,24 @@ module shard
   implicit none
   private
 
-  public :: in_shard, shard_path, describe_shard, finish_search, finish_shard
+  public :: in_shard, share_of, shard_path, describe_shard, finish_search, finish_shard
 
   !> The catalogues of all slices as `pack_catalogues` makes them.
   character(len=*), parameter, public :: catalogue_dataset = '/shard/catalogue'
 
 contains
 
-  !> Whether share `number` of `shares` has the tile: every `shares`-th, so that each share has its part of the hard
-  !> regions. Without shares (0) all tiles are of this run.
+  !> The share that has a tile: of `shares` every one has each `shares`-th, so that it has its part of the hard regions.
+  pure integer function share_of(tile, shares)
+    integer, intent(in) :: tile, shares
+    share_of = 1 + modulo(tile - 1, shares)
+  end function share_of
+
+  !> Whether share `number` of `shares` has the tile. Without shares (0) all tiles are of this run.
   pure logical function in_shard(tile, number, shares)
     integer, intent(in) :: tile, number, shares
     in_shard = shares == 0
-    if (shares > 0) in_shard = modulo(tile - 1, shares) == number - 1
+    if (shares > 0) in_shard = share_of(tile, shares) == number
   end function in_shard
 
   !> The name from which that of a share's working file is made.

@@ -12,7 +12,7 @@ module share_files
   use point_work, only: point_work_t
   use resumption, only: builder_of, read_builder
   use session, only: session_t
-  use shard, only: catalogue_dataset, describe_shard, in_shard
+  use shard, only: catalogue_dataset, describe_shard, in_shard, share_of
   use status, only: exit_bad_case, exit_io, exit_no_input, exit_other_case, exit_resumable
   use text, only: to_text
   use tiled_run, only: index_in_block
@@ -88,7 +88,8 @@ contains
       call reader%number_attribute('/shard', 'number', values(1), error)
       if (.not. allocated(error)) call reader%number_attribute('/shard', 'shares', values(2), error)
     else
-      call fail(error, exit_bad_case, "'"//path//"' is no share of a map: basin --shard I/N writes them")
+      call fail(error, exit_bad_case, "'"//path// &
+                "' is no share of a map or of a list of starts: basin and points with --shard I/N write them")
     end if
     if (.not. allocated(error)) call reader%text_attribute('/', 'kind', kind, error)
     if (.not. allocated(error)) call reader%text_attribute('/provenance', 'version', made_by, error)
@@ -245,7 +246,7 @@ contains
     integer(int64) :: lower(size(file%tiling%lengths)), extent(size(file%tiling%lengths))
     integer :: tile, i, point
     do tile = 1, file%tile_count()
-      i = 1 + modulo(tile - 1, count)
+      i = share_of(tile, count)
       call parts(i)%read_tile(tile, values, error)
       if (.not. allocated(error)) call file%write_tile(tile, values, error)
       if (allocated(error)) return

@@ -25,6 +25,7 @@ module sweep_chain
   !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
   !> not a number there.
   integer, parameter :: hold_numbers = 10, hold_codes = 4
+  integer, parameter, public :: hold_reason = 2
   !> Most limits that are kept of one chain.
   integer, parameter :: most_limits = 64
 
@@ -124,8 +125,6 @@ contains
       call journal%progress(int(i, int64))
       call check_stop(journal, time_limit, 'running '//trim(path)//' up and down', error)
       if (allocated(error)) return
-      ! A hold that had to be given up leaves the body where the last good one ended.
-      if (held%reason == 0) state = held%state
     end do
     packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(found, wp), &
               reshape(limits(:, :found), [4*found])]

@@ -13,6 +13,7 @@ module sweep_driver
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
   use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
+  use endings, only: report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_map_variables, add_reason, add_regime, axis_dimension
   use grid, only: grid_t
@@ -23,8 +24,8 @@ module sweep_driver
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int64, type_string
   use pair, only: is_pair
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_done
-  use sweep_chain, only: chains_t, limit_t, run_chains
+  use status, only: exit_done, last_reason, reason_names, reason_settled, reason_time_over
+  use sweep_chain, only: chains_t, hold_reason, limit_t, run_chains
   use text, only: replace_all, to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
@@ -43,9 +44,12 @@ module sweep_driver
     type(slice_cache_t) :: cache
     !> Per value: points with impacts and points without.
     integer(int64), allocatable :: impacting(:), free(:)
+    !> Points per reason.
+    integer(int64) :: reasons(0:last_reason) = 0
   contains
     procedure :: compute => compute_branch_points
     procedure :: note => note_branch_point
+    procedure :: points_from => branch_points_from
   end type branch_work_t
 
 contains
@@ -90,7 +94,8 @@ contains
                       trim(sweep%swept%name), sweep%swept%values, [sweep%directions /= 'down', &
                       sweep%directions /= 'up'], sweep%samples, sweep%limit_tolerance, chains, error)
       call session%stop_if(error)
-      call report_limits(session, chains%limits)
+      call report_given_up(session, chains)
+      call report_limits(session, chains)
       call describe_file(session, 'sweep', schema)
       call describe_chains(session, chains, schema)
     end associate
@@ -145,8 +150,6 @@ contains
     call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                            session%command%time_limit, work%catalogues, error)
     call session%stop_if(error)
-    call points_at_a_time(work%grid, work%span, work%block, error)
-    call session%stop_if(error)
     starts = product(work%grid%shape(2:3))
     associate (axes => work%grid%axes)
       x0 = [(axes(2)%values(1 + (i - 1)/work%grid%shape(3)), i=1, starts)]
@@ -162,8 +165,10 @@ contains
     call run_tiles(session, file, work, complete)
     call session%team%sum(work%impacting)
     call session%team%sum(work%free)
+    call session%team%sum(work%reasons)
     call finish_tiles(session, file, complete, extra)
     call report_multiple(session, work)
+    call report_reasons(session%journal, work%reasons)
   end subroutine run_branches
 
   subroutine compute_branch_points(self, index, values, error)
@@ -178,15 +183,29 @@ contains
     call basin_points(self%grid, self%span, self%max_period, self%catalogues, place, self%cache, values, error)
   end subroutine compute_branch_points
 
+  subroutine branch_points_from(self, index, points, error)
+    class(branch_work_t), intent(inout) :: self
+    integer, intent(in) :: index(:)
+    integer, intent(out) :: points
+    type(error_t), allocatable, intent(out) :: error
+    points = 1
+    ! The slice depends on the first axis only.
+    if (size(self%catalogues) > 0) call points_at_a_time(self%grid, self%span, [index(1), 1, 1], self%cache, points, error)
+  end subroutine branch_points_from
+
   subroutine note_branch_point(self, index, values)
     class(branch_work_t), intent(inout) :: self
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    if (values(6) > 0) then
-      self%impacting(index(1)) = self%impacting(index(1)) + 1
-    else
-      self%free(index(1)) = self%free(index(1)) + 1
-    end if
+    associate (reason => nint(values(3)), place => index(1))
+      self%reasons(reason) = self%reasons(reason) + 1
+      if (reason /= reason_settled .and. reason /= reason_time_over) return
+      if (values(6) > 0) then
+        self%impacting(place) = self%impacting(place) + 1
+      else
+        self%free(place) = self%free(place) + 1
+      end if
+    end associate
   end subroutine note_branch_point
 
   !> Run up and run down as variables, and the limits as a table.
@@ -290,21 +309,50 @@ contains
     name = name//'_'//trim(merge('up  ', 'down', limit%up))
   end function limit_name
 
-  subroutine report_limits(session, limits)
+  !> Where holds had to be given up, and why: ranges of the parameter.
+  subroutine report_given_up(session, chains)
     type(session_t), intent(inout) :: session
-    type(limit_t), intent(in) :: limits(:)
+    type(chains_t), intent(in) :: chains
+    integer :: direction, i, first, reason
+    associate (reasons => nint(chains%holds(hold_reason, :, :)), values => session%the_case%sweep%swept%values)
+      do direction = 1, 2
+        first = 1
+        do i = 1, size(values)
+          reason = reasons(i, direction)
+          if (i < size(values)) then
+            if (reasons(i + 1, direction) == reason) cycle
+          end if
+          if (chains%ran(direction) .and. reason /= reason_time_over) then
+            call session%journal%line('given_up', '  run '//trim(merge('up  ', 'down', direction == 1))//': given up from '// &
+              to_text(values(first), 6)//' to '//to_text(values(i), 6)//' as '//trim(reason_names(reason)), &
+              '"reason": "'//trim(reason_names(reason))//'", "from": '//to_text(values(first))//', "to": '//to_text(values(i)))
+          end if
+          first = i + 1
+        end do
+      end do
+    end associate
+  end subroutine report_given_up
+
+  subroutine report_limits(session, chains)
+    type(session_t), intent(inout) :: session
+    type(chains_t), intent(in) :: chains
     character(len=:), allocatable :: name
     integer :: i
-    do i = 1, size(limits)
-      name = limit_name(session, limits(i))
-      associate (bracket => limits(i)%bracket)
-        call session%journal%line('limit', '  run '//trim(merge('up  ', 'down', limits(i)%up))//': '// &
-          replace_all(name(:index(name, '_', back=.true.) - 1), '_', ' ')//' between '//to_text(bracket(1), 6)//' and '// &
-          to_text(bracket(2), 6), '"name": "'//name//'", "lower": '//to_text(bracket(1))//', "upper": '//to_text(bracket(2)))
-      end associate
-    end do
-    if (size(limits) > 0) return
-    if (is_pair(session%the_case%laws)) then
+    associate (limits => chains%limits)
+      do i = 1, size(limits)
+        name = limit_name(session, limits(i))
+        associate (bracket => limits(i)%bracket)
+          call session%journal%line('limit', '  run '//trim(merge('up  ', 'down', limits(i)%up))//': '// &
+            replace_all(name(:index(name, '_', back=.true.) - 1), '_', ' ')//' between '//to_text(bracket(1), 6)//' and '// &
+            to_text(bracket(2), 6), '"name": "'//name//'", "lower": '//to_text(bracket(1))//', "upper": '//to_text(bracket(2)))
+        end associate
+      end do
+    end associate
+    if (size(chains%limits) > 0) return
+    if (any(count(nint(chains%holds(hold_reason, :, :)) == reason_time_over, dim=1) < size(chains%holds, 2) .and. &
+            chains%ran)) then
+      call session%journal%line('limit', '  no limit seen between the values that were not given up')
+    else if (is_pair(session%the_case%laws)) then
       call session%journal%line('limit', '  one regime throughout')
     else
       call session%journal%line('limit', '  impacts neither start nor stop')

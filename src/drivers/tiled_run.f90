@@ -19,6 +19,7 @@ module tiled_run
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use shard, only: in_shard
+  use spread_order, only: spread_place
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -246,12 +247,10 @@ contains
     real(wp), intent(out) :: seconds
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: values(pilot_points, work%variables), start
-    integer :: index(size(lengths), pilot_points), i, k
+    integer :: index(size(lengths), pilot_points), i
     logical :: whole
     do i = 1, pilot_points
-      do k = 1, size(lengths)
-        index(k, i) = 1 + int(modulo(0.5_wp + i*sqrt(real(4*k + 1, wp)), 1.0_wp)*lengths(k))
-      end do
+      index(:, i) = spread_place(i, lengths)
     end do
     start = monotonic_seconds()
     call compute_list(work, index, values, whole, error)

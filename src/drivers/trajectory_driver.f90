@@ -61,6 +61,7 @@ contains
     call slice_motion(grid, 0_int64, moving, error)
     if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
     if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
+    if (.not. allocated(error) .and. len(command%record) > 0) call check_record(session%the_case, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path)
     if (command%validate .or. command%dry_run) then
@@ -91,7 +92,8 @@ contains
     end if
     call session%stop_if(error)
     call check_written(session, path)
-    call report(session, moving, outcome, log, path)
+    call report(session, moving, outcome, log)
+    call report_files(session, command, path)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
 
@@ -105,6 +107,16 @@ contains
               to_text(the_case%trajectory%samples_per_period)//' over '//to_text(periods, 6)//' drive periods, allowed '// &
               'at most '//to_text(nint(most_samples))//' samples in all')
   end subroutine check_samples
+
+  !> Code 65 if the samples of a record are more than fit into memory.
+  subroutine check_record(the_case, error)
+    type(case_t), intent(in) :: the_case
+    type(error_t), allocatable, intent(out) :: error
+    if (the_case%run%duration*the_case%record%rate < most_samples) return
+    call fail(error, exit_bad_case, "key 'record.rate': found "//to_text(the_case%record%rate)//' Hz, allowed at most '// &
+              to_text(most_samples/the_case%run%duration, 6)//' Hz over '//to_text(the_case%run%duration, 6)//' s ('// &
+              to_text(nint(most_samples))//' samples in all)')
+  end subroutine check_record
 
   !> Attributes: the drive, the barriers, and the steady values over the window.
   subroutine describe_motion(moving, span, outcome, log, schema)
@@ -273,17 +285,25 @@ contains
     call table%close(error)
   end subroutine write_events
 
-  subroutine report(session, moving, outcome, log, path)
+  !> A line for each file that was written.
+  subroutine report_files(session, command, path)
+    type(session_t), intent(inout) :: session
+    type(command_t), intent(in) :: command
+    character(len=*), intent(in) :: path
+    call session%journal%line('written', 'wrote '//path)
+    if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
+    if (len(command%record) > 0) call session%journal%line('written', 'wrote '//command%record)
+  end subroutine report_files
+
+  subroutine report(session, moving, outcome, log)
     type(session_t), intent(inout) :: session
     type(motion_t), intent(in) :: moving
     type(outcome_t), intent(in) :: outcome
     type(log_t), intent(in) :: log
-    character(len=*), intent(in) :: path
     associate (f => outcome%window, journal => session%journal)
       if (outcome%reason /= reason_time_over) then
         call journal%line('end', 'given up before the end: '//explained(outcome%reason)//'; '//to_text(log%events)// &
           ' events recorded until then')
-        call journal%line('written', 'wrote '//path)
         return
       end if
       call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
@@ -294,7 +314,6 @@ contains
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
       call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, drive period '// &
         to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
-      call journal%line('written', 'wrote '//path)
     end associate
   end subroutine report
 

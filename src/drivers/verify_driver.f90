@@ -44,6 +44,8 @@ module verify_driver
     integer :: points = 0, differing = 0, flips = 0, impact_count_differs = 0
     !> Of a refined map: points that were inferred, and those of them that were inferred wrongly.
     integer :: inferred = 0, inferred_differing = 0
+    !> Every point was run again.
+    logical :: whole = .false.
     real(wp) :: x_deviation = 0, v_deviation = 0
     character(len=:), allocatable :: first_difference
   end type audit_t
@@ -106,10 +108,11 @@ contains
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
-    real(wp) :: values(1, basin_variables), random_numbers(6)
+    real(wp) :: values(1, basin_variables)
     integer, allocatable :: index(:)
     integer(int64), allocatable :: lengths(:), place(:)
-    integer :: i, k
+    integer(int64) :: points
+    integer :: i
     grid = grid_of(the_case, axes)
     call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
                            error)
@@ -117,12 +120,12 @@ contains
     if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
     allocate (index(size(axes)), place(size(lengths)))
-    call journal%begin('points run again', int(sample, int64), 0_int64)
-    do i = 1, sample
-      call uniform(int(seed, int64), int(i, int64), random_numbers)
-      do k = 1, size(axes)
-        index(k) = 1 + int(random_numbers(k)*grid%shape(k))
-      end do
+    points = product(int(grid%shape(:size(axes)), int64))
+    audit%whole = points <= sample
+    points = min(points, int(sample, int64))
+    call journal%begin('points run again', points, 0_int64)
+    do i = 1, int(points)
+      index = sampled(grid%shape(:size(axes)), audit%whole, seed, i)
       if (size(lengths) == size(axes)) then
         place = index - 1
       else
@@ -139,6 +142,25 @@ contains
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
+
+  !> Indices of point `i` of the sample: each point once where the sample is the `whole`, else a random one.
+  pure function sampled(shape, whole, seed, i) result(index)
+    integer, intent(in) :: shape(:), seed, i
+    logical, intent(in) :: whole
+    integer :: index(size(shape))
+    real(wp) :: random_numbers(size(shape))
+    integer :: k, left
+    if (.not. whole) then
+      call uniform(int(seed, int64), int(i, int64), random_numbers)
+      index = 1 + int(random_numbers*shape)
+      return
+    end if
+    left = i - 1
+    do k = 1, size(shape)
+      index(k) = 1 + modulo(left, shape(k))
+      left = left/shape(k)
+    end do
+  end function sampled
 
   !> A map has the lengths of the axes of its case; the starts of a sweep are one dimension of the file.
   subroutine check_lengths(path, lengths, shape, error)
@@ -259,15 +281,16 @@ contains
     type(catalogue_t) :: none
     type(outcome_t) :: outcomes(1)
     real(wp), allocatable :: table(:, :)
-    real(wp) :: random_numbers(1), results(6, 1), start(3, 1)
+    real(wp) :: results(6, 1), start(3, 1)
     character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
-    integer :: i, point
+    integer :: i, place(1), point
     call reader%read_columns('/'//names, table, error)
     if (allocated(error)) return
     allocate (none%attractors(0))
+    audit%whole = size(table, 1) <= sample
     do i = 1, min(sample, size(table, 1))
-      call uniform(int(seed, int64), int(i, int64), random_numbers)
-      point = 1 + int(random_numbers(1)*size(table, 1))
+      place = sampled([size(table, 1)], audit%whole, seed, i)
+      point = place(1)
       if (.not. all(abs(table(point, :3)) <= huge(1.0_wp))) then
         call fail(error, exit_io, "'"//reader%path//"', point "//to_text(point - 1)//': the start is not finite')
         return
@@ -304,6 +327,9 @@ contains
     integer, intent(in) :: datasets
     integer(int64), intent(in) :: points
     type(audit_t), intent(in) :: audit
+    character(len=:), allocatable :: all_of
+    all_of = ''
+    if (audit%whole) all_of = 'all '
     if (command%json) then
       write (output_unit, '(a)') '{"path": '//json_text(command%path)//', "kind": '//json_text(kind)// &
         ', "datasets": '//to_text(datasets)//', "points": '//to_text(points)//', "rerun": '//to_text(audit%points)// &
@@ -323,11 +349,12 @@ contains
       ' differ; so, with 95 % confidence, at most '// &
       to_text(100*share_upper_limit(audit%inferred_differing, audit%inferred, 0.95_wp), 3)//' % of the inferred ones are wrong'
     write (output_unit, '(a)') &
-      '  '//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file'// &
+      '  '//all_of//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file'// &
       trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
-      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s', &
+      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s'
+    if (.not. audit%whole) write (output_unit, '(a)') &
       '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &
       ' % of the labels would change'
   end subroutine report

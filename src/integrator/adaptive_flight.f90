@@ -23,7 +23,7 @@ module adaptive_flight
 
   public :: fly_adaptive
 
-  integer, parameter :: most_polish = 6
+  integer, parameter :: most_polish = 6, most_equations = 2
   !> Positions and speeds beyond this stand for none.
   real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
 
@@ -75,8 +75,7 @@ contains
       end if
       call try_step(machine, slip, options%tolerance, state%time, y, h, slopes, next, error)
       if (.not. error <= 1) then
-        h = h*max(0.2_wp, 0.9_wp/eighth_root(error))
-        if (error /= error) h = h*0.2_wp
+        h = next_length_after(h, error)
         cycle
       end if
       call extend(machine, slip, state%time, y, next, h, slopes, path)
@@ -86,7 +85,7 @@ contains
         state%time = merge(until, state%time + h, last)
         y = next
         slopes(:, 1) = slopes(:, 13)
-        h = h*min(5.0_wp, 0.9_wp/eighth_root(max(error, 1e-10_wp)))
+        h = next_length_after(h, error)
         outcome = flight_time_over
         ! An unstable spring drives a body to infinity within a finite time.
         if (abs(y(1)) > options%domain) exit
@@ -135,26 +134,15 @@ contains
     if (machine%extra) slope(2) = slope(2) + extra_force(machine, slip%memory, time, y(1), y(2), stretch)/machine%mass
   end function slope
 
-  !> Starting step: Hairer, Norsett, Wanner, II.4.
   pure real(wp) function first_step(machine, slip, tolerance, time, y, f) result(h)
     type(oscillator_t), intent(in) :: machine
     type(slip_t), intent(in) :: slip
     real(wp), intent(in) :: tolerance, time, y(2), f(2)
-    real(wp) :: weight(2), d0, d1, d2
+    real(wp) :: weight(2)
     weight = tolerance*(abs(y) + slip%scale)
-    d0 = norm2(y/weight)
-    d1 = norm2(f/weight)
-    h = 1e-3_wp*machine%period
-    if (d0 > 0 .and. d1 > 0) h = min(h, 0.01_wp*d0/d1)
-    d2 = norm2((slope(machine, slip, time + h, y + h*f) - f)/weight)/h
-    h = min(100*h, eighth_root(0.01_wp/max(d1, d2, tiny(d1))))
+    h = trial_length(y, f, weight, machine%period)
+    h = first_length(f, slope(machine, slip, time + h, y + h*f), weight, h)
   end function first_step
-
-  !> By square roots, which every processor rounds alike; powers depend on the mathematical library.
-  pure elemental real(wp) function eighth_root(x)
-    real(wp), intent(in) :: x
-    eighth_root = sqrt(sqrt(sqrt(x)))
-  end function eighth_root
 
   !> One step of order 8 and its error relative to the tolerance; slope 13 is that at the end.
   pure subroutine try_step(machine, slip, tolerance, time, y, h, slopes, next, error)
@@ -163,35 +151,14 @@ contains
     real(wp), intent(in) :: tolerance, time, y(2), h
     real(wp), intent(inout) :: slopes(2, 16)
     real(wp), intent(out) :: next(2), error
-    real(wp) :: weight(2), e5(2), e3(2), size_5, size_3
     integer :: i
     do i = 2, 12
-      slopes(:, i) = slope(machine, slip, time + node(i)*h, y + h*combine(slopes, i))
+      slopes(:, i) = slope(machine, slip, time + node(i)*h, y + h*combine(2, slopes, i))
     end do
-    next = y + h*combine(slopes, 13)
+    next = y + h*combine(2, slopes, 13)
     slopes(:, 13) = slope(machine, slip, time + h, next)
-    weight = tolerance*(max(abs(y), abs(next)) + slip%scale)
-    e5 = matmul(slopes(:, 1:12), error_5)/weight
-    e3 = (combine(slopes, 13) - error_3(1)*slopes(:, 1) - error_3(2)*slopes(:, 9) &
-          - error_3(3)*slopes(:, 12))/weight
-    size_5 = sum(e5**2)
-    size_3 = sum(e3**2)
-    error = 0
-    if (size_5 > 0) error = abs(h)*size_5/sqrt(2*(size_5 + 0.01_wp*size_3))
+    error = error_of(2, slopes, h, tolerance*(max(abs(y), abs(next)) + slip%scale))
   end subroutine try_step
-
-  !> Weighted sum of the slopes before stage `i`.
-  pure function combine(slopes, i) result(total)
-    real(wp), intent(in) :: slopes(2, 16)
-    integer, intent(in) :: i
-    real(wp) :: total(2)
-    integer :: k, offset
-    offset = ((i - 1)*(i - 2))/2
-    total = 0
-    do k = 1, i - 1
-      total = total + stage(offset + k)*slopes(:, k)
-    end do
-  end function combine
 
   !> Continuous extension of a step as polynomials in the fraction of the step.
   pure subroutine extend(machine, slip, time, y, next, h, slopes, path)
@@ -199,29 +166,12 @@ contains
     type(slip_t), intent(in) :: slip
     real(wp), intent(in) :: time, y(2), next(2), h
     real(wp), intent(inout) :: slopes(2, 16)
-    real(wp), intent(out) :: path(0:degree, 2)
-    real(wp) :: nested(2, 7), p(0:degree)
-    integer :: i, k
+    real(wp), intent(inout) :: path(0:degree, 2)
+    integer :: i
     do i = 14, 16
-      slopes(:, i) = slope(machine, slip, time + node(i)*h, y + h*combine(slopes, i))
+      slopes(:, i) = slope(machine, slip, time + node(i)*h, y + h*combine(2, slopes, i))
     end do
-    nested(:, 1) = next - y
-    nested(:, 2) = h*slopes(:, 1) - nested(:, 1)
-    nested(:, 3) = 2*nested(:, 1) - h*(slopes(:, 13) + slopes(:, 1))
-    nested(:, 4:7) = h*matmul(slopes, extension)
-    do k = 1, 2
-      p = 0
-      do i = 7, 1, -1
-        p(0) = p(0) + nested(k, i)
-        if (modulo(i, 2) == 1) then
-          p = [0.0_wp, p(:degree - 1)]
-        else
-          p = p - [0.0_wp, p(:degree - 1)]
-        end if
-      end do
-      path(:, k) = p
-      path(0, k) = path(0, k) + y(k)
-    end do
+    call extend_path(2, slopes, h, y, next, path)
   end subroutine extend
 
   !> First event within a step; `flight_failed` stands for none.
@@ -339,5 +289,7 @@ contains
                         (until - from)*h*gauss_weight(k), book)
     end do
   end subroutine book_piece
+
+  include 'dormand_prince_step.inc'
 
 end module adaptive_flight

@@ -83,7 +83,7 @@ contains
     type(march_t), intent(out) :: march
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: tolerance, scale(:), longest, time, y(:)
-    real(wp) :: weight(size(y)), f(size(y)), d0, d1, d2, h
+    real(wp) :: weight(size(y)), f(size(y)), h
     march%n = size(y)
     march%time = time
     march%y(:march%n) = y
@@ -91,14 +91,9 @@ contains
     march%scale(:march%n) = scale
     f = system%slope(time, y)
     march%slopes(:march%n, 1) = f
-    ! Starting step: Hairer, Norsett, Wanner, II.4.
     weight = tolerance*(abs(y) + scale)
-    d0 = norm2(y/weight)
-    d1 = norm2(f/weight)
-    h = 1e-3_wp*longest
-    if (d0 > 0 .and. d1 > 0) h = min(h, 0.01_wp*d0/d1)
-    d2 = norm2((system%slope(time + h, y + h*f) - f)/weight)/h
-    march%next_length = min(100*h, (0.01_wp/max(d1, d2, tiny(d1)))**0.125_wp)
+    h = trial_length(y, f, weight, longest)
+    march%next_length = first_length(f, system%slope(time + h, y + h*f), weight, h)
   end subroutine begin_march
 
   !> One step, to `time_end` [s] at most. `fallen` is the guard that fell first, and the state then is that at its fall;
@@ -129,8 +124,7 @@ contains
       end if
       call try_step(march, system, h, next, error)
       if (error <= 1) exit
-      march%next_length = h*max(0.2_wp, 0.9_wp/sqrt(sqrt(sqrt(error))))
-      if (error /= error) march%next_length = 0.2_wp*h
+      march%next_length = next_length_after(h, error)
     end do
     call extend(march, system, h, next)
     march%length = h
@@ -138,7 +132,7 @@ contains
     if (fallen == march_goes_on) then
       march%time = merge(time_end, march%from + h, last)
       march%slopes(:, 1) = march%slopes(:, 13)
-      march%next_length = h*min(5.0_wp, 0.9_wp/sqrt(sqrt(sqrt(max(error, 1e-10_wp)))))
+      march%next_length = next_length_after(h, error)
     else
       call land(march, system, guards(fallen), next)
       march%time = min(march%from + march%fraction*h, time_end)
@@ -154,67 +148,29 @@ contains
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: h
     real(wp), intent(out) :: next(march%n), error
-    real(wp) :: weight(march%n), e5(march%n), e3(march%n), size_5, size_3
     integer :: i, n
     n = march%n
-    associate (y => march%y(:n), slopes => march%slopes(:n, :))
+    associate (y => march%y(:n))
       do i = 2, 12
-        march%slopes(:n, i) = system%slope(march%time + node(i)*h, y + h*combine(march, i))
+        march%slopes(:n, i) = system%slope(march%time + node(i)*h, y + h*combine(n, march%slopes, i))
       end do
-      next = y + h*combine(march, 13)
+      next = y + h*combine(n, march%slopes, 13)
       march%slopes(:n, 13) = system%slope(march%time + h, next)
-      weight = march%tolerance*(max(abs(y), abs(next)) + march%scale(:n))
-      e5 = matmul(slopes(:, 1:12), error_5)/weight
-      e3 = (combine(march, 13) - error_3(1)*slopes(:, 1) - error_3(2)*slopes(:, 9) - error_3(3)*slopes(:, 12))/weight
+      error = error_of(n, march%slopes, h, march%tolerance*(max(abs(y), abs(next)) + march%scale(:n)))
     end associate
-    size_5 = sum(e5**2)
-    size_3 = sum(e3**2)
-    error = 0
-    if (size_5 > 0) error = abs(h)*size_5/sqrt(n*(size_5 + 0.01_wp*size_3))
-    if (size_5 /= size_5) error = size_5
   end subroutine try_step
-
-  !> Weighted sum of the slopes before stage `i`.
-  pure function combine(march, i) result(total)
-    type(march_t), intent(in) :: march
-    integer, intent(in) :: i
-    real(wp) :: total(march%n)
-    integer :: k, offset
-    offset = ((i - 1)*(i - 2))/2
-    total = 0
-    do k = 1, i - 1
-      total = total + stage(offset + k)*march%slopes(:march%n, k)
-    end do
-  end function combine
 
   !> Continuous extension of a step.
   pure subroutine extend(march, system, h, next)
     type(march_t), intent(inout) :: march
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: h, next(march%n)
-    real(wp) :: nested(march%n, 7), p(0:degree)
-    integer :: i, k, n
+    integer :: i, n
     n = march%n
     do i = 14, 16
-      march%slopes(:n, i) = system%slope(march%time + node(i)*h, march%y(:n) + h*combine(march, i))
+      march%slopes(:n, i) = system%slope(march%time + node(i)*h, march%y(:n) + h*combine(n, march%slopes, i))
     end do
-    nested(:, 1) = next - march%y(:n)
-    nested(:, 2) = h*march%slopes(:n, 1) - nested(:, 1)
-    nested(:, 3) = 2*nested(:, 1) - h*(march%slopes(:n, 13) + march%slopes(:n, 1))
-    nested(:, 4:7) = h*matmul(march%slopes(:n, :), extension)
-    do k = 1, n
-      p = 0
-      do i = 7, 1, -1
-        p(0) = p(0) + nested(k, i)
-        if (modulo(i, 2) == 1) then
-          p = eoshift(p, -1)
-        else
-          p = p - eoshift(p, -1)
-        end if
-      end do
-      p(0) = p(0) + march%y(k)
-      march%path(:, k) = p
-    end do
+    call extend_path(n, march%slopes, h, march%y(:n), next, march%path)
   end subroutine extend
 
   !> The first guard that falls within the step; of several at one instant the first in the list.
@@ -295,5 +251,7 @@ contains
       march%fraction = march%fraction + correction
     end do
   end subroutine land
+
+  include 'dormand_prince_step.inc'
 
 end module guarded_march

@@ -136,7 +136,7 @@ contains
     real(wp), intent(inout) :: elapsed, y
     logical, intent(out) :: ok
     real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half, change, last_change
-    integer :: round, i
+    integer :: round
     half = 0.5_wp*(transit%ends(k, which) - transit%ends(k - 1, which))
     time = elapsed
     place = y
@@ -154,17 +154,11 @@ contains
         ! From the outer end: what is left of the whole integral.
         time = elapsed + dot_product(transit%weight, inverse)
         place = y + dot_product(transit%weight, run)
-        do i = 1, points
-          time = time - transit%integral(:, i)*inverse(i)
-          place = place - transit%integral(:, i)*run(i)
-        end do
+        call add_integrals(transit, -inverse, -run, time, place)
       else
         time = elapsed
         place = y
-        do i = 1, points
-          time = time + transit%integral(:, i)*inverse(i)
-          place = place + transit%integral(:, i)*run(i)
-        end do
+        call add_integrals(transit, inverse, run, time, place)
       end if
       last_change = change
       change = maxval(abs(time - before))
@@ -177,6 +171,28 @@ contains
       end if
     end do
   end subroutine cross_piece
+
+  !> Adds the integrals from -1 to each point of what has the values `inverse` and `run` at the points. A few at a time, whose
+  !> sums stay in registers.
+  pure subroutine add_integrals(transit, inverse, run, time, place)
+    type(transit_t), intent(in) :: transit
+    real(wp), intent(in) :: inverse(points), run(points)
+    real(wp), intent(inout) :: time(points), place(points)
+    integer, parameter :: few = 8
+    real(wp) :: t(few), p(few)
+    integer :: first, i
+    do first = 1, points, few
+      t = time(first:first + few - 1)
+      p = place(first:first + few - 1)
+      !GCC$ novector
+      do i = 1, points
+        t = t + transit%integral(first:first + few - 1, i)*inverse(i)
+        p = p + transit%integral(first:first + few - 1, i)*run(i)
+      end do
+      time(first:first + few - 1) = t
+      place(first:first + few - 1) = p
+    end do
+  end subroutine add_integrals
 
   !> Taylor coefficients of the forcing about `time`.
   pure subroutine expand_forcing(flow, time, taylor)

@@ -6,7 +6,7 @@
 module motion
   use adaptive_flight, only: fly_adaptive
   use constants, only: two_pi
-  use contact_flight, only: contact_side, fly_contact
+  use contact_flight, only: contact_side
   use contact_law, only: velocity_after_impact
   use effect_law, only: dahl_level
   use energy, only: book_exact, book_rest, record_with_book
@@ -24,6 +24,7 @@ module motion
     word_stick, word_upper
   use oscillator, only: oscillator_t
   use pair_modes, only: pair_motion_t
+  use pressed_flight, only: fly_pressed_body, prepare_pressed, pressed_flow_t
   use rest, only: chatter_time, hold, mode_from_rest
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
     reason_step_budget, reason_step_failed
@@ -45,6 +46,7 @@ module motion
     type(oscillator_t) :: machine
     type(options_t) :: options
     type(flow_t) :: flow
+    type(pressed_flow_t) :: pressed
     !> Passage through the Stribeck layer, where it can be made in one stroke.
     type(transit_t) :: transit
     !> Slips outside the Stribeck layer are flown on the closed form.
@@ -69,10 +71,12 @@ contains
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive
     if (moving%exact) call prepare_transit(machine, moving%flow, layer_exit*moving%layer, moving%transit)
-    if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0)) then
+    if (options%flight /= flight_adaptive) call prepare_pressed(machine, moving%pressed)
+    if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0 .and. &
+                                                    (moving%pressed%available .or. .not. machine%contact%soft))) then
       call fail(error, exit_bad_case, 'integrator.flight = "exact": this machine has modes without a '// &
-                'closed form (Stribeck layer, nonlinear or missing spring, effect, damping ratio above 0.9); '// &
-                'use "auto"')
+                'closed form (Stribeck layer, nonlinear or missing spring, effect, damping ratio above 0.9, soft barrier '// &
+                'other than kelvin_voigt that pulls); use "auto"')
     end if
   end subroutine prepare_motion
 
@@ -221,8 +225,8 @@ contains
     integer :: outcome, direction
     before = state%time
     direction = merge(1, -1, state%mode == mode_slip_plus)
-    call fly_contact(moving%machine, moving%options, contact_side(moving%machine%contact, state%x, direction), state, &
-                     time_end, tally, outcome, log)
+    call fly_pressed_body(moving%pressed, moving%machine, moving%options, &
+                          contact_side(moving%machine%contact, state%x, direction), state, time_end, tally, outcome, log)
     if (state%time > before) tally%slips = tally%slips + 1
     call note_position(tally, state)
     select case (outcome)

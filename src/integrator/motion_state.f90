@@ -8,8 +8,8 @@ module motion_state
   implicit none
   private
 
-  public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, note_position, append_word, open_log, &
-    record_event, record_sample, put_sample_book
+  public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
+    append_word, open_log, record_event, record_sample, put_sample_book
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -150,10 +150,20 @@ contains
     closing_error = book%at_start + book%work - book%friction - book%damping - book%contact - book%at_end
   end function closing_error
 
-  !> Starts counting anew from a state; keeps what was asked for.
-  pure subroutine reset_tally(tally, state)
+  !> Whether a mode is a stick phase. Two bodies stick where the one does not slide over the other: not where the driven one
+  !> rests on its stop while the driving one slides on.
+  pure elemental logical function sticks_in(mode, two_bodies)
+    integer, intent(in) :: mode
+    logical, intent(in) :: two_bodies
+    sticks_in = mode == mode_stick .or. mode == mode_held .or. &
+      ((mode == mode_upper_barrier .or. mode == mode_lower_barrier) .and. .not. two_bodies)
+  end function sticks_in
+
+  !> Starts counting anew from a state, of a body or the driven one of two; keeps what was asked for.
+  pure subroutine reset_tally(tally, state, two_bodies)
     type(tally_t), intent(inout) :: tally
     type(state_t), intent(in) :: state
+    logical, intent(in) :: two_bodies
     logical :: wants_v_max
     integer(int64) :: events, steps
     wants_v_max = tally%wants_v_max
@@ -165,10 +175,7 @@ contains
     tally%steps = steps
     call note_position(tally, state)
     tally%v_max = state%v
-    select case (state%mode)
-    case (mode_stick, mode_upper_barrier, mode_lower_barrier)
-      tally%sticks = 1
-    end select
+    if (sticks_in(state%mode, two_bodies)) tally%sticks = 1
   end subroutine reset_tally
 
   !> Extremes of the position are taken at the ends of flights: between them x is monotone.

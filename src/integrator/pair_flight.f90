@@ -15,7 +15,7 @@ module pair_flight
   implicit none
   private
 
-  public :: fly_pair, body_state, driver_of, energy_of
+  public :: fly_pair, body_state, driver_of, energy_of, note_extremes
 
   !> Guards.
   integer, parameter, public :: guard_none = 0, guard_upper = 1, guard_lower = 2, guard_slip = 3, guard_plus = 4, &
@@ -80,7 +80,7 @@ contains
           fallen = i
         end if
       end do
-      call look_along(moving, state, stretch, first, tally, log)
+      call look_along(moving, state, stretch, first, begins, tally, log)
       state%y = state_at(stretch, first)
       if (fallen == guard_none .and. stretch%length >= time_end - state%time) then
         state%time = time_end
@@ -92,6 +92,9 @@ contains
     end do
     call refresh(moving, state)
     call note_position(tally, body_state(state))
+    if (moving%machine%carried .and. fallen == guard_slip) then
+      call note_miss(moving, -sense_of(state%mode), state%y(at_x2) - state%y(at_x1), tally)
+    end if
   end subroutine fly_pair
 
   !> What ends the mode of a state.
@@ -166,18 +169,19 @@ contains
     watch%allowance = tie_allowance*moving%force_scale
   end subroutine watch_interface
 
-  !> Extremes, samples and energy of a stretch up to a fraction of it.
-  pure subroutine look_along(moving, state, stretch, last, tally, log)
+  !> Extremes, samples and energy of a stretch up to a fraction of it; the flight `begins` with it or not.
+  pure subroutine look_along(moving, state, stretch, last, begins, tally, log)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(in) :: state
     type(stretch_t), intent(in) :: stretch
     real(wp), intent(in) :: last
+    logical, intent(in) :: begins
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     type(pair_state_t) :: sample
     type(book_t) :: book
     real(wp) :: t
-    call note_extremes(stretch, last, tally)
+    call note_extremes(moving, merge(state%touch, 0, begins), stretch, last, tally)
     if (.not. present(log)) return
     book = log%book
     call book_stretch(moving, state, stretch, last, log%book)
@@ -207,19 +211,25 @@ contains
     call record_sample(log, body_state(sample), driver_of(sample), now)
   end subroutine record_at
 
-  !> Turning points and largest velocity of m2.
-  pure subroutine note_extremes(stretch, last, tally)
+  !> Turning points and largest velocity of m2, which begins on the stop `touch` where that is not 0.
+  pure subroutine note_extremes(moving, touch, stretch, last, tally)
+    type(pair_motion_t), intent(in) :: moving
+    integer, intent(in) :: touch
     type(stretch_t), intent(in) :: stretch
     real(wp), intent(in) :: last
     type(tally_t), intent(inout) :: tally
     real(wp) :: v(0:order), a(0:order), x, t
-    integer :: k
+    integer :: k, direction
     v = stretch%path(:, at_v2)
-    t = first_zero(sign(1.0_wp, v(0))*v)
-    if (t <= last) then
+    k = findloc(abs(v) > 0, .true., dim=1) - 1
+    direction = 0
+    if (k >= 0) direction = nint(sign(1.0_wp, v(k)))
+    t = first_zero(direction*v)
+    if (t <= last .and. direction /= 0) then
       call series_value(stretch%path(:, at_x2), t, x)
       tally%x_max = max(tally%x_max, x)
       tally%x_min = min(tally%x_min, x)
+      if (.not. moving%machine%carried .and. direction /= touch) call note_miss(moving, direction, x, tally)
     end if
     if (.not. tally%wants_v_max) return
     a(order) = 0
@@ -230,6 +240,17 @@ contains
     call series_value(v, last, x)
     tally%v_max = max(tally%v_max, x)
   end subroutine note_extremes
+
+  !> m2 has turned at `place` [m], as the stops count it, on its way in `direction`.
+  pure subroutine note_miss(moving, direction, place, tally)
+    type(pair_motion_t), intent(in) :: moving
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: place
+    type(tally_t), intent(inout) :: tally
+    real(wp) :: stop_ahead
+    stop_ahead = merge(moving%machine%upper, moving%machine%lower, direction > 0)
+    tally%grazing_margin = min(tally%grazing_margin, direction*(stop_ahead - place))
+  end subroutine note_miss
 
   !> Where the energy of a stretch went.
   pure subroutine book_stretch(moving, state, stretch, last, book)

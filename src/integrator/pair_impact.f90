@@ -171,7 +171,6 @@ contains
     if (fallen /= guard_none) return
     state = resting
     tally%chatters = tally%chatters + 1
-    tally%sticks = tally%sticks + 1
     call append_word(tally, merge(word_chatter_upper, word_chatter_lower, side > 0))
     if (.not. present(log)) return
     log%book%contact = log%book%contact + 0.5_wp*impact_mass(moving%machine)*speed**2

@@ -14,7 +14,7 @@ module pair_modes
   implicit none
   private
 
-  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now, speed_size, stands
+  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now, speed_size, stands, with_clocks
 
   !> Unknowns: both bodies, cosine and sine of the drive, one, integral of the control error, velocity of the drive
   !> times time, control held between samples.

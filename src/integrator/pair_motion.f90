@@ -5,12 +5,13 @@
 !> of a controller, until a time.
 module pair_motion
   use constants, only: two_pi
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use motion_state, only: append_word, event_barrier_release, event_blow, event_release, event_stick, &
     event_separation, event_turning_point, log_t, mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
-    mode_upper_barrier, record_event, tally_t, word_period, word_stick
+    mode_upper_barrier, record_event, sticks_in, tally_t, word_period, word_stick
   use pair, only: driven_by_controller, driven_by_motion
   use pair_contact, only: fly_pressed, mode_pressed, touch_stop
+  use pair_damper, only: fly_damped, is_damper
   use pair_flight, only: body_state, driver_of, fly_pair, guard_failed, guard_leave, guard_lower, guard_minus, guard_plus, &
     guard_press, guard_separate, guard_slip, guard_upper
   use pair_impact, only: collide_pair, rest_on_stop
@@ -106,6 +107,10 @@ contains
       if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (any(state%y /= state%y)) reason = reason_not_finite
       if (.not. abs(state%y(at_x2)) <= moving%options%domain) reason = reason_left_domain
+      ! A motion that is given may well run away.
+      if (moving%machine%drive /= driven_by_motion) then
+        if (.not. abs(state%y(at_x1)) <= moving%options%domain) reason = reason_left_domain
+      end if
       stalls = merge(0, stalls + 1, state%time > before)
     end do
   end subroutine advance_pair
@@ -139,6 +144,7 @@ contains
     type(log_t), intent(inout), optional :: log
     real(wp) :: stop_time, blow, sample, before
     integer :: fallen, mode
+    integer(int64) :: chatters
     logical :: slips, held, presses
     call take_sample(moving, state, sample)
     blow = huge(blow)
@@ -151,10 +157,13 @@ contains
     held = stalled .and. abs(state%y(at_v1) - state%y(at_v2)) <= moving%negligible_speed
     if (held) call hold_for_an_instant(moving, state, stop_time)
     before = state%time
+    chatters = tally%chatters
     mode = state%mode
-    slips = mode /= mode_stick .and. mode /= mode_held
+    slips = .not. sticks_in(mode, .true.)
     presses = state%pressed /= 0
-    if (presses) then
+    if (presses .and. is_damper(moving)) then
+      call fly_damped(moving, state, stop_time, held, fallen, tally, log)
+    else if (presses) then
       call fly_pressed(moving, state, stop_time, held, fallen, tally, log)
     else
       call fly_pair(moving, state, stop_time, held, fallen, tally, log)
@@ -176,7 +185,7 @@ contains
     case (guard_failed)
       reason = reason_step_failed
     case (guard_slip)
-      call come_together(moving, state, tally, log)
+      call come_together(moving, state, log)
     case (guard_plus, guard_minus)
       state%mode = mode_of_slip(merge(1, -1, fallen == guard_plus))
       if (present(log)) call record_event(log, event_release, body_state(state), state%y(at_v2), driver_of(state))
@@ -187,6 +196,10 @@ contains
       call mode_together(moving, state)
       if (present(log)) call record_event(log, event_barrier_release, body_state(state), state%y(at_v2), driver_of(state))
     end select
+    if (slips .and. sticks_in(state%mode, .true.)) then
+      tally%sticks = tally%sticks + 1
+      if (tally%chatters == chatters) call append_word(tally, word_stick)
+    end if
   end subroutine move_once
 
   !> A tie of forces to the last bit: the bodies move together, or m2 stays on its stop, for an instant.
@@ -205,10 +218,9 @@ contains
   end subroutine hold_for_an_instant
 
   !> The relative velocity is zero: the forces choose the next mode.
-  pure subroutine come_together(moving, state, tally, log)
+  pure subroutine come_together(moving, state, log)
     type(pair_motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
-    type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     integer :: kind
     if (state%mode == mode_slip_plus .or. state%mode == mode_slip_minus) then
@@ -220,13 +232,7 @@ contains
       if (moving%machine%drive /= driven_by_motion) state%y(at_v1) = 0
       call mode_together(moving, state)
     end if
-    if (state%mode == mode_stick .or. state%mode == mode_held) then
-      if (kind == event_turning_point .or. state%mode == mode_held) then
-        kind = event_stick
-        tally%sticks = tally%sticks + 1
-        call append_word(tally, word_stick)
-      end if
-    end if
+    if (sticks_in(state%mode, .true.) .and. (kind == event_turning_point .or. state%mode == mode_held)) kind = event_stick
     if (present(log)) call record_event(log, kind, body_state(state), state%y(at_v2), driver_of(state))
   end subroutine come_together
 

@@ -224,17 +224,29 @@ contains
     class(map_file_t), intent(inout) :: self
     class(team_t), intent(in) :: team
     type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: later
     integer :: i
     if (allocated(self%datasets)) then
       do i = 1, size(self%datasets)
-        if (.not. allocated(error)) call h5_close_dataset(self%datasets(i), error)
+        call h5_close_dataset(self%datasets(i), later)
+        call keep_first(later, error)
       end do
     end if
-    if (.not. allocated(error)) call h5_close_dataset(self%states, error)
-    if (.not. allocated(error)) call h5_close_dataset(self%checksums, error)
-    if (.not. allocated(error)) call h5_close(self%part, error)
+    call h5_close_dataset(self%states, later)
+    call keep_first(later, error)
+    call h5_close_dataset(self%checksums, later)
+    call keep_first(later, error)
+    ! Collective: after an error, too, or the other ranks wait for ever.
+    call h5_close(self%part, later)
+    call keep_first(later, error)
     call team%agree(error)
   end subroutine close_part
+
+  !> Keeps the first of several errors.
+  subroutine keep_first(later, error)
+    type(error_t), allocatable, intent(inout) :: later, error
+    if (.not. allocated(error) .and. allocated(later)) call move_alloc(later, error)
+  end subroutine keep_first
 
   !> The number of tiles.
   pure integer function tile_count(self)

@@ -13,6 +13,7 @@
 #define SEPARATRIX_LANE_KERNEL_HPP
 
 #include "lane_layer.hpp"
+#include "lane_stops.hpp"
 
 namespace {
 
@@ -54,25 +55,25 @@ inline mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, vec
 // A body set off: the free part of its motion. One within a Stribeck layer is left to the scalar code.
 template <bool damping, bool layer> inline void begin_flight(const lane_machine &m, lane_group &g) {
   if (layer)
-    g.status = (g.status == lane_fresh) & (g.direction * g.v < m.layer.edge) ? all(lane_left) : g.status;
+    put(g.status, (g.status == lane_fresh) & (g.direction * g.v < m.layer.edge), lane_left);
   mask fresh = g.status == lane_fresh;
   if (!any(fresh))
     return;
-  g.start = fresh ? g.time : g.start;
-  g.z_re = fresh ? vec{} : g.z_re;
-  g.z_im = fresh ? vec{} : g.z_im;
+  put(g.start, fresh, g.time);
+  put(g.z_re, fresh, 0);
+  put(g.z_im, fresh, 0);
   kinematics k = evaluate<damping>(m, g, g.time - g.start);
   vec y = g.x - k.x, v = g.v - k.v;
   vec a = -m.natural * m.natural * y - 2 * m.decay * v;
-  g.z_re = fresh ? v + m.decay * y : g.z_re;
-  g.z_im = fresh ? m.damped * y : g.z_im;
-  g.start_v = fresh ? g.v : g.start_v;
-  g.start_a = fresh ? k.a + a : g.start_a;
-  g.start_j = fresh ? k.j - m.natural * m.natural * v - 2 * m.decay * a : g.start_j;
-  g.found = fresh ? vec{} : g.found;
+  put(g.z_re, fresh, v + m.decay * y);
+  put(g.z_im, fresh, m.damped * y);
+  put(g.start_v, fresh, g.v);
+  put(g.start_a, fresh, k.a + a);
+  put(g.start_j, fresh, k.j - m.natural * m.natural * v - 2 * m.decay * a);
+  put(g.found, fresh, 0);
   if (layer)
-    g.skip = fresh ? vec{} : g.skip;
-  g.status = fresh ? all(lane_flying) : g.status;
+    put(g.skip, fresh, 0);
+  put(g.status, fresh, lane_flying);
 }
 
 // Keeps the event that is `step` after the evaluated point, where `accept`.
@@ -81,34 +82,35 @@ inline void keep_event(const lane_machine &m, const kinematics &k, mask accept, 
                        lane_group &g) {
   vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, re = k.re, im = k.im;
   turn_on<damping, 3>(m, step, re, im);
-  g.found = accept ? all(1) : g.found;
-  g.span = accept ? span : g.span;
-  g.hits = accept ? (hit ? all(1) : vec{}) : g.hits;
-  g.end_x = accept ? k.x + step * (k.v + half * (k.a + third * (k.j + fourth * k.s))) : g.end_x;
-  g.end_v = accept ? k.v + step * (k.a + half * (k.j + third * k.s)) : g.end_v;
-  g.end_a = accept ? k.a + step * (k.j + half * k.s) : g.end_a;
-  g.end_j = accept ? k.j + step * k.s : g.end_j;
+  put(g.found, accept, 1);
+  put(g.span, accept, span);
+  put(g.hits, accept, pick(hit, 1, 0));
+  put(g.end_x, accept, k.x + step * (k.v + half * (k.a + third * (k.j + fourth * k.s))));
+  put(g.end_v, accept, k.v + step * (k.a + half * (k.j + third * k.s)));
+  put(g.end_a, accept, k.a + step * (k.j + half * k.s));
+  put(g.end_j, accept, k.j + step * k.s);
   if (layer)
-    g.end_s = accept ? k.s : g.end_s;
-  g.end_re = accept ? re : g.end_re;
-  g.end_im = accept ? im : g.end_im;
+    put(g.end_s, accept, k.s);
+  put(g.end_re, accept, re);
+  put(g.end_im, accept, im);
 }
 
 // Finds the ends of the flights of `seek`: a turning point, or the barrier if that lies before it. Returns
 // the lanes whose search failed.
 template <bool damping, bool layer>
 inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
-  vec s = upward ? g.up_span : g.down_span, low = layer ? g.skip : vec{}, high = all(1e300);
-  mask hit = (upward ? g.up_hits : g.down_hits) > 0.5;
+  vec s = pick(upward, g.up_span, g.down_span), low = layer ? g.skip : vec{}, high = 1e300;
+  mask hit = pick(upward, g.up_hits, g.down_hits) > 0.5;
   for (int round = 0; round < most_rounds; round++) {
     kinematics k = evaluate<damping>(m, g, s);
     vec w = g.direction * k.v, rate = g.direction * k.a, curl = g.direction * k.j, snap = g.direction * k.s;
     vec gap = g.direction * (barrier - k.x);
     // Past the turning point, short of the barrier: the body turns first.
     hit = hit & ((w > 0.0) | (gap <= 0.0));
-    vec f = hit ? gap : w, f1 = hit ? -w : rate, f2 = hit ? -rate : curl, f3 = hit ? -curl : snap;
-    low = f > 0.0 ? s : low;
-    high = f > 0.0 ? high : s;
+    vec f = pick(hit, gap, w), f1 = pick(hit, -w, rate), f2 = pick(hit, -rate, curl),
+        f3 = pick(hit, -curl, snap);
+    put(low, f > 0.0, s);
+    high = pick(f > 0.0, high, s);
     // Householder's step of fourth order.
     vec step = -f * (f1 * f1 - 0.5 * f * f2) / (f1 * (f1 * f1 - f * f2) + (1.0 / 6) * f * f * f3);
     vec next = s + step;
@@ -126,11 +128,11 @@ inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barri
         break;
     }
     // A turning point beyond the barrier: the impact is before it.
-    low = beyond ? (layer ? g.skip : vec{}) : low;
-    high = beyond ? next : high;
+    put(low, beyond, layer ? g.skip : vec{});
+    put(high, beyond, next);
     hit = hit | beyond;
-    vec onward = high < 1e299 ? 0.5 * (low + high) : s + m.stride;
-    s = beyond ? 0.5 * next : (guided ? next : onward);
+    vec onward = pick(high < 1e299, 0.5 * (low + high), s + m.stride);
+    s = pick(beyond, 0.5 * next, pick(guided, next, onward));
   }
   return seek;
 }
@@ -153,7 +155,7 @@ inline mask prove_pieces(const lane_machine &m, int pieces, vec bound, const lan
   if (layer)
     return proven & (h > 0.0) &
            positive_between(h, w, rate, curl, d * g.reach_v - level, d * g.reach_a, d * g.reach_j, bound);
-  vec end_w = g.hits > 0.5 ? d * g.end_v : vec{};
+  vec end_w = pick(g.hits > 0.5, d * g.end_v, 0);
   return proven & positive_between(h, w, rate, curl, end_w, d * g.end_a, d * g.end_j, bound);
 }
 
@@ -174,93 +176,58 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   mask hit = g.hits > 0.5;
   vec w = g.direction * g.end_v, gap = g.direction * (barrier - g.end_x);
   vec push = -g.direction * g.end_a - m.kinetic;
-  mask plain = (hit ? m.restitution * w > m.slow : push > m.break_away) & (magnitude(g.end_x) < m.domain);
+  mask plain = pick(hit, m.restitution * w > m.slow, push > m.break_away) & (magnitude(g.end_x) < m.domain);
   turning turn;
   bool turns = layer && any(due & ~hit);
   if (turns) {
     turn = turn_in_layer(m, due & ~hit, g);
-    plain = hit ? plain : turn.sound;
-    gap = hit ? gap : g.direction * (barrier - turn.x);
+    plain = pick(hit, plain, turn.sound & (magnitude(turn.x) < m.domain));
+    gap = pick(hit, gap, g.direction * (barrier - turn.x));
   }
   mask rare = due & ~plain;
   due = due & plain;
-  vec v = hit ? -m.restitution * g.end_v : vec{};
-  vec v_jump = hit ? v - g.end_v : vec{};
+  vec v = pick(hit, -m.restitution * g.end_v, 0);
+  vec v_jump = pick(hit, v - g.end_v, 0);
   vec y_jump = (-2 * m.offset) * g.direction, a_jump = (2 * m.kinetic) * g.direction;
   if (damping)
     a_jump -= 2 * m.decay * v_jump;
   vec j_jump = -m.natural * m.natural * v_jump - 2 * m.decay * a_jump;
   mask up = due & upward, down = due & ~upward, struck = due & hit;
-  g.up_span = up ? g.span : g.up_span;
-  g.up_hits = up ? g.hits : g.up_hits;
-  g.down_span = down ? g.span : g.down_span;
-  g.down_hits = down ? g.hits : g.down_hits;
-  g.flights = due ? g.flights + 1.0 : g.flights;
-  g.impacts = struck ? g.impacts + 1.0 : g.impacts;
-  g.speed_sum = struck ? g.speed_sum + w : g.speed_sum;
-  g.last_speed = struck ? w : g.last_speed;
-  g.margin = (due & ~hit & (gap < g.margin)) ? gap : g.margin;
+  put(g.up_span, up, g.span);
+  put(g.up_hits, up, g.hits);
+  put(g.down_span, down, g.span);
+  put(g.down_hits, down, g.hits);
+  // The event loop flies to the edge of the layer, in and out.
+  put(g.flights, due, g.flights + (turns ? pick(hit, 1, 3) : vec(1)));
+  put(g.impacts, struck, g.impacts + 1.0);
+  put(g.speed_sum, struck, g.speed_sum + w);
+  put(g.last_speed, struck, w);
+  put(g.margin, due & ~hit & (gap < g.margin), gap);
   if (turns)
-    g.end_x = hit ? g.end_x : turn.x;
-  g.start = due ? g.start + (turns ? (hit ? g.span : g.span - turn.early) : g.span) : g.start;
-  g.time = due ? g.start : g.time;
-  g.x = due ? (hit ? barrier : g.end_x) : g.x;
-  g.v = due ? v : g.v;
-  g.start_v = due ? v : g.start_v;
-  g.start_a = due ? g.end_a + a_jump : g.start_a;
-  g.start_j = due ? g.end_j + j_jump : g.start_j;
-  g.z_re = due ? g.end_re + v_jump + m.decay * y_jump : g.z_re;
-  g.z_im = due ? g.end_im + m.damped * y_jump : g.z_im;
+    g.end_x = pick(hit, g.end_x, turn.x);
+  put(g.start, due, g.start + (turns ? pick(hit, g.span, g.span - turn.early) : g.span));
+  put(g.time, due, g.start);
+  put(g.x, due, pick(hit, barrier, g.end_x));
+  put(g.v, due, v);
+  put(g.start_v, due, v);
+  put(g.start_a, due, g.end_a + a_jump);
+  put(g.start_j, due, g.end_j + j_jump);
+  put(g.z_re, due, g.end_re + v_jump + m.decay * y_jump);
+  put(g.z_im, due, g.end_im + m.damped * y_jump);
   if (layer)
-    g.skip = due ? vec{} : g.skip;
+    put(g.skip, due, 0);
   if (turns) {
     mask turned = due & ~hit;
-    g.skip = turned ? turn.skip : g.skip;
-    g.start_v = turned ? turn.v : g.start_v;
-    g.start_a = turned ? turn.a : g.start_a;
-    g.start_j = turned ? turn.j : g.start_j;
-    g.z_re = turned ? turn.re : g.z_re;
-    g.z_im = turned ? turn.im : g.z_im;
+    put(g.skip, turned, turn.skip);
+    put(g.start_v, turned, turn.v);
+    put(g.start_a, turned, turn.a);
+    put(g.start_j, turned, turn.j);
+    put(g.z_re, turned, turn.re);
+    put(g.z_im, turned, turn.im);
   }
-  g.direction = due ? -g.direction : g.direction;
-  g.found = due ? vec{} : g.found;
+  put(g.direction, due, -g.direction);
+  put(g.found, due, 0);
   return rare;
-}
-
-// The state of the lanes that have come to where they stop. The end of the period starts the clock anew.
-template <bool damping> inline void take_stops(const lane_machine &m, mask sent, lane_group &g) {
-  mask stopped = sent & (g.status == lane_stopped);
-  if (!any(stopped))
-    return;
-  kinematics k = evaluate<damping>(m, g, g.until - g.start);
-  mask section = stopped & (g.until >= m.period);
-  g.x = stopped ? k.x : g.x;
-  g.v = stopped ? k.v : g.v;
-  g.time = stopped ? (section ? vec{} : g.until) : g.time;
-  g.start = section ? g.start - m.period : g.start;
-}
-
-// Lanes with a layer that come to a stop. Those that need not stop at this section: their motion is noted,
-// and the clock starts anew. Those within the layer at that time are `left` to the scalar code.
-inline void pass_sections(const lane_machine &m, int first, mask stops, lane_group &g, lane_batch &batch) {
-  mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
-  mask passing = stops & ~within & (g.sections > 0.5);
-  g.status = stops & ~passing ? (within ? all(lane_left) : all(lane_stopped)) : g.status;
-  if (!any(passing))
-    return;
-  kinematics k = evaluate<false>(m, g, g.until - g.start);
-  for (int i = 0; i < width; i++) {
-    if (passing[i]) {
-      batch.section_x[(int)g.passed[i]][first + i] = k.x[i];
-      batch.section_v[(int)g.passed[i]][first + i] = k.v[i];
-    }
-  }
-  g.passed = passing ? g.passed + 1.0 : g.passed;
-  g.sections = passing ? g.sections - 1.0 : g.sections;
-  g.x = passing ? k.x : g.x;
-  g.v = passing ? k.v : g.v;
-  g.time = passing ? vec{} : g.time;
-  g.start = passing ? g.start - m.period : g.start;
 }
 
 // Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that
@@ -270,9 +237,9 @@ inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrie
   mask left = {};
   for (int attempt = 0; attempt < (layer ? 2 : 1) && any(seek); attempt++) {
     if (attempt > 0) {
-      g.found = seek ? vec{} : g.found;
-      g.up_span = seek ? 0.5 * g.up_span : g.up_span;
-      g.down_span = seek ? 0.5 * g.down_span : g.down_span;
+      put(g.found, seek, 0);
+      put(g.up_span, seek, 0.5 * g.up_span);
+      put(g.down_span, seek, 0.5 * g.down_span);
     }
     left = find_events<damping, layer>(m, seek, upward, barrier, g);
     mask found = seek & ~left;
@@ -284,31 +251,34 @@ inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrie
   return left;
 }
 
-// Flies the lanes of one vector until each has stopped or is left to the scalar code.
+// Flies the lanes of one vector until one has stopped or is left to the scalar code. They pass the sections
+// together, so that those set off together, whose first flights take longer to find, stay together.
 template <bool damping> void fly(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
   load<false>(batch, first, g);
   begin_flight<damping, false>(m, g);
   mask flying = g.status == lane_flying, sent = flying;
-  while (any(flying)) {
-    mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
-    vec barrier = upward ? all(m.upper) : all(m.lower);
-    if (any(seek))
-      left = look_ahead<damping, false>(m, seek, upward, barrier, g);
-    mask stops = flying & ~left & (g.start + g.span >= g.until);
-    g.status = stops ? all(lane_stopped) : g.status;
-    flying = flying & ~left & ~stops;
-    if (any(flying))
-      left = left | take_events<damping, false>(m, flying, upward, barrier, g);
-    g.status = left ? all(lane_left) : g.status;
-    flying = flying & ~left;
+  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+    flying = sent;
+    while (any(flying)) {
+      mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
+      vec barrier = pick(upward, m.upper, m.lower);
+      if (any(seek))
+        left = look_ahead<damping, false>(m, seek, upward, barrier, g);
+      left = left | (flying & (g.flights >= g.budget));
+      flying = flying & ~left & (g.start + g.span < g.until);
+      if (any(flying))
+        left = left | take_events<damping, false>(m, flying, upward, barrier, g);
+      put(g.status, left, lane_left);
+      flying = flying & ~left;
+    }
+    take_stops<damping>(m, g.status == lane_flying, batch, g);
   }
-  take_stops<damping>(m, sent, g);
   store<false>(g, first, batch);
 }
 
-// The same with a Stribeck layer, until one lane has stopped or is left. Turnings are dear here: a lane that
-// has come to one waits until all have. Before that the impacts are taken, and then the sections passed.
+// The same with a Stribeck layer. Turnings are dear here, so no lane waits for another at a section, but one
+// that has come to a turning waits until all have. Before that the impacts are taken, and then the stops.
 void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   lane_group g;
   load<true>(batch, first, g);
@@ -317,23 +287,23 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   mask flying = g.status == lane_flying;
   while (any(flying) && !any(sent & ~flying)) {
     mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
-    vec barrier = upward ? all(m.upper) : all(m.lower);
+    vec barrier = pick(upward, m.upper, m.lower);
     if (any(seek))
       left = look_ahead<false, true>(m, seek, upward, barrier, g);
-    g.status = left ? all(lane_left) : g.status;
-    flying = g.status == lane_flying;
+    left = left | (flying & (g.flights >= g.budget));
+    flying = flying & ~left;
     mask stops = flying & (g.start + g.span >= g.until), due = flying & ~stops & (g.hits > 0.5);
-    if (!any(due) && any(stops))
-      pass_sections(m, first, stops, g, batch);
-    else if (!any(due))
+    if (!any(due) && any(stops)) {
+      mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
+      left = left | within;
+      take_stops<false>(m, stops & ~within, batch, g);
+    } else if (!any(due))
       due = flying;
-    if (any(due)) {
-      left = take_events<false, true>(m, due, upward, barrier, g);
-      g.status = left ? all(lane_left) : g.status;
-    }
+    if (any(due))
+      left = left | take_events<false, true>(m, due, upward, barrier, g);
+    put(g.status, left, lane_left);
     flying = g.status == lane_flying;
   }
-  take_stops<false>(m, sent, g);
   store<true>(g, first, batch);
 }
 
@@ -341,7 +311,7 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
 
 #define SEPARATRIX_LANE_KERNEL(name)                                                                         \
   extern "C" void name(const lane_machine *m, lane_batch *batch) {                                           \
-    for (int first = 0; first < lanes; first += width)                                                       \
+    for (int first = 0; first < lanes; first += vec_size)                                                    \
       if (m->layer.excess > 0)                                                                               \
         fly_through_layers(*m, first, *batch);                                                               \
       else if (m->decay > 0)                                                                                 \

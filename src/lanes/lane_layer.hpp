@@ -84,16 +84,16 @@ template <bool outward> inline vec improve(const lane_machine &m, const course &
       moment[k] += table[i][k] * late;
     }
   }
-  n.total = seek ? total : n.total;
+  put(n.total, seek, total);
   const double stiffness = m.natural * m.natural;
   for (int i = 0; i < layer_nodes; i++) {
     vec speed = l.speed[i] + lost[i], t = time_at(c, speed);
     vec now = acceleration_at(c, speed) + stiffness * (lost[i] * t - moment[i]);
     vec x = (now - n.before[i]) * n.inverse[i];
-    change = magnitude(x) > change ? magnitude(x) : change;
-    n.inverse[i] = seek ? n.inverse[i] * (1.0 - x * (1.0 - x)) : n.inverse[i];
-    n.before[i] = seek ? now : n.before[i];
-    n.time[i] = seek ? t : n.time[i];
+    put(change, magnitude(x) > change, magnitude(x));
+    put(n.inverse[i], seek, n.inverse[i] * (1.0 - x * (1.0 - x)));
+    put(n.before[i], seek, now);
+    put(n.time[i], seek, t);
   }
   return change;
 }
@@ -110,7 +110,7 @@ template <bool outward> passage pass_layer(const lane_machine &m, const course &
     vec guess = share * (outward ? first[i] + share * second[i] : first[i] - share * second[i]);
     vec speed = l.speed[i] + guess;
     n.before[i] = acceleration_at(c, speed);
-    lowest = n.before[i] < lowest ? n.before[i] : lowest;
+    put(lowest, n.before[i] < lowest, n.before[i]);
     n.inverse[i] = 1.0 / (outward ? n.before[i] - l.force[i] : n.before[i] + l.force[i]);
     n.time[i] = time_at(c, speed);
   }
@@ -145,14 +145,14 @@ template <bool outward> passage pass_layer(const lane_machine &m, const course &
 inline mask find_edge(const lane_machine &m, mask found, lane_group &g) {
   vec d = g.direction, speed, rate, curl;
   course c = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, vec{}, vec{});
-  vec t = time_at(c, all(m.layer.edge));
+  vec t = time_at(c, m.layer.edge);
   follow(c, t, speed, rate, curl);
   mask hit = g.hits > 0.5;
   mask sound = hit | ((t > 0.0) & (magnitude(speed - m.layer.edge) < m.layer.edge - m.layer.level));
-  g.reach = found ? (hit ? g.span : g.span - t) : g.reach;
-  g.reach_v = found ? (hit ? g.end_v : d * speed) : g.reach_v;
-  g.reach_a = found ? (hit ? g.end_a : -d * rate) : g.reach_a;
-  g.reach_j = found ? (hit ? g.end_j : d * curl) : g.reach_j;
+  put(g.reach, found, pick(hit, g.span, g.span - t));
+  put(g.reach_v, found, pick(hit, g.end_v, d * speed));
+  put(g.reach_a, found, pick(hit, g.end_a, -d * rate));
+  put(g.reach_j, found, pick(hit, g.end_j, d * curl));
   return found & ~sound;
 }
 

@@ -17,7 +17,7 @@ typedef lane_fields<vec> lane_group;
 
 enum {
   members = sizeof(lane_batch::fields) / sizeof(double[lanes]),
-  plain_members = offsetof(lane_fields<double[lanes]>, sections) / sizeof(double[lanes])
+  plain_members = offsetof(lane_fields<double[lanes]>, skip) / sizeof(double[lanes])
 };
 
 template <bool layer> inline void load(const lane_batch &batch, int first, lane_group &g) {
@@ -87,7 +87,7 @@ template <bool damping, int terms> inline void turn_on(const lane_machine &m, ve
 inline vec derivative_bound(const lane_machine &m, const lane_group &g) {
   vec re = magnitude(g.z_re), im = magnitude(g.z_im);
   // At least |Z|, at most 8 % more.
-  vec size = re + im - 0.5857864376269049 * (re < im ? re : im);
+  vec size = re + im - 0.5857864376269049 * pick(re < im, re, im);
   return m.bound_periodic + m.bound_free * size;
 }
 

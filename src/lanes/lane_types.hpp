@@ -5,7 +5,7 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_sections = 32 };
+enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64 };
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
 struct lane_layer {
@@ -66,21 +66,30 @@ template <class T> struct lane_fields {
   // The event found at the end of the flight: 1 = found, when, whether at a barrier, the motion just before
   // it.
   T found, span, hits, end_x, end_v, end_a, end_j, end_re, end_im;
-  // Counts and extremes since the caller last took them away.
+  // Counts and extremes since the caller last took them away. A section ends a flight, too.
   T flights, impacts, speed_sum, last_speed, margin;
-  // From here on with a Stribeck layer only. Sections that the lane passes over before it stops at one, and
-  // that it has passed.
-  T sections, passed;
-  // The time since the start of the flight at which the body leaves the layer (`start_v`, ... are those
-  // then), and at which it enters it again or hits, with its motion. Fourth derivative at the end of the
-  // flight.
+  // Sections that the lane passes before it stops at one; the flights after which it is left to the scalar
+  // code; whether it stops where it is captured. Time since the start of the trajectory, the attractor that
+  // has captured it (0 = none), and since when (-1 = not).
+  T sections, budget, leaves, elapsed, captor, settled;
+  // From here on with a Stribeck layer only. The time since the start of the flight at which the body leaves
+  // the layer (`start_v`, ... are those then), and at which it enters it again or hits, with its motion.
+  // Fourth derivative at the end of the flight.
   T skip, reach, reach_v, reach_a, reach_j, end_s;
+};
+
+// The neighbourhood of a point of an attractor on the section: its points, relative to that one and times
+// `stretch`, have a square below `reach` in the metric.
+struct lane_region {
+  double attractor, x, v, stretch_x, stretch_v, metric_xx, metric_xv, metric_vv, reach;
 };
 
 struct lane_batch {
   lane_fields<double[lanes]> fields;
-  // The motion on the sections passed.
-  double section_x[most_sections][lanes], section_v[most_sections][lanes];
+  // What the lanes can be captured by; a point in several belongs to the first. Unless these are all, every
+  // lane stops at every section.
+  int regions, complete;
+  lane_region region[most_regions];
 };
 
 #endif

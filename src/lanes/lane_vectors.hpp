@@ -19,62 +19,120 @@ enum { width = 4 };
 enum { width = 2 };
 #endif
 
-typedef double vec __attribute__((vector_size(8 * width)));
-typedef int64_t mask __attribute__((vector_size(8 * width)));
+enum { vec_size = 2 * width };
 
-inline vec all(double x) { return x - vec{}; }
+typedef double reg __attribute__((vector_size(8 * width)));
+typedef int64_t reg_mask __attribute__((vector_size(8 * width)));
 
+inline reg all(double x) { return x - reg{}; }
+
+// Two registers: while the operations of one wait for each other, those of the other go on.
+struct mask {
+  reg_mask low, high;
+};
+
+struct vec {
+  reg low, high;
+  vec() = default;
+  vec(double x) : low(all(x)), high(all(x)) {}
+  vec(reg low, reg high) : low(low), high(high) {}
+};
+
+#define LANE_OPERATOR(result, type, op)                                                                      \
+  inline result operator op(type a, type b) { return {a.low op b.low, a.high op b.high}; }
+
+LANE_OPERATOR(vec, vec, +)
+LANE_OPERATOR(vec, vec, -)
+LANE_OPERATOR(vec, vec, *)
+LANE_OPERATOR(vec, vec, /)
+LANE_OPERATOR(mask, vec, <)
+LANE_OPERATOR(mask, vec, <=)
+LANE_OPERATOR(mask, vec, >)
+LANE_OPERATOR(mask, vec, >=)
+LANE_OPERATOR(mask, vec, ==)
+LANE_OPERATOR(mask, vec, !=)
+LANE_OPERATOR(mask, mask, &)
+LANE_OPERATOR(mask, mask, |)
+
+#undef LANE_OPERATOR
+
+inline vec operator-(vec a) { return {-a.low, -a.high}; }
+inline mask operator~(mask m) { return {~m.low, ~m.high}; }
+inline void operator+=(vec &a, vec b) { a = a + b; }
+inline void operator-=(vec &a, vec b) { a = a - b; }
+inline void operator*=(vec &a, vec b) { a = a * b; }
+
+// a where m holds, elsewhere b.
+inline vec pick(mask m, vec a, vec b) { return {m.low ? a.low : b.low, m.high ? a.high : b.high}; }
+inline mask pick(mask m, mask a, mask b) { return (m & a) | (~m & b); }
+
+// Replaces a by b where m holds.
+inline void put(vec &a, mask m, vec b) { a = pick(m, b, a); }
+
+// Down to two integers by vectors, so that few have to be taken out one by one.
 inline bool any(mask m) {
-  int64_t bits = 0;
-  for (int i = 0; i < width; i++)
-    bits |= m[i];
-  return bits != 0;
+  typedef int64_t two __attribute__((vector_size(16)));
+  reg_mask both = m.low | m.high;
+  two parts[width / 2], bits = {};
+  memcpy(parts, &both, sizeof both);
+  for (const two &part : parts)
+    bits |= part;
+  return (bits[0] | bits[1]) != 0;
 }
 
-inline vec magnitude(vec a) { return (vec)((mask)a & INT64_MAX); }
+inline vec magnitude(vec a) {
+  return {(reg)((reg_mask)a.low & INT64_MAX), (reg)((reg_mask)a.high & INT64_MAX)};
+}
 
 // Adding it rounds to the nearest integer, which then stands in the last bits.
 const double to_integer = 6755399441055744.0;
 
-inline void sine_cosine(vec angle, vec &sine, vec &cosine) {
-  vec shifted = angle * 6.36619772367581382433e-01 + to_integer;
-  vec quarters = shifted - to_integer;
-  mask quadrant = (mask)shifted;
-  vec high = angle - quarters * 1.57079632673412561417e+00;
-  vec low = quarters * 6.07710050650619224932e-11;
-  vec r = high - low, tail = (high - r) - low, z = r * r;
-  vec odd_part = -1.66666666666666324348e-01 +
+inline void sine_cosine(reg angle, reg &sine, reg &cosine) {
+  reg shifted = angle * 6.36619772367581382433e-01 + to_integer;
+  reg quarters = shifted - to_integer;
+  reg_mask quadrant = (reg_mask)shifted;
+  reg high = angle - quarters * 1.57079632673412561417e+00;
+  reg low = quarters * 6.07710050650619224932e-11;
+  reg r = high - low, tail = (high - r) - low, z = r * r;
+  reg odd_part = -1.66666666666666324348e-01 +
                  z * (8.33333333332248946124e-03 +
                       z * (-1.98412698298579493134e-04 +
                            z * (2.75573137070700676789e-06 +
                                 z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))));
-  vec sin_r = r + (r * z * odd_part + tail * (1.0 - 0.5 * z));
-  vec even_part = 4.16666666666666019037e-02 +
+  reg sin_r = r + (r * z * odd_part + tail * (1.0 - 0.5 * z));
+  reg even_part = 4.16666666666666019037e-02 +
                   z * (-1.38888888888741095749e-03 +
                        z * (2.48015872894767294178e-05 +
                             z * (-2.75573143513906633035e-07 +
                                  z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))));
-  vec half = 0.5 * z, w = 1.0 - half;
-  vec cos_r = w + (((1.0 - w) - half) + (z * z * even_part - r * tail));
-  mask odd = (quadrant & 1) != 0;
-  vec s = odd ? cos_r : sin_r, c = odd ? sin_r : cos_r;
-  sine = (vec)((mask)s ^ ((quadrant & 2) << 62));
-  cosine = (vec)((mask)c ^ (((quadrant + 1) & 2) << 62));
+  reg half = 0.5 * z, w = 1.0 - half;
+  reg cos_r = w + (((1.0 - w) - half) + (z * z * even_part - r * tail));
+  reg_mask odd = (quadrant & 1) != 0;
+  reg s = odd ? cos_r : sin_r, c = odd ? sin_r : cos_r;
+  sine = (reg)((reg_mask)s ^ ((quadrant & 2) << 62));
+  cosine = (reg)((reg_mask)c ^ (((quadrant + 1) & 2) << 62));
+}
+
+inline void sine_cosine(vec angle, vec &sine, vec &cosine) {
+  sine_cosine(angle.low, sine.low, cosine.low);
+  sine_cosine(angle.high, sine.high, cosine.high);
 }
 
 // e**x for -700 <= x <= 700; below that e**-700.
-inline vec exponential(vec x) {
+inline reg exponential(reg x) {
   x = x < -700.0 ? all(-700.0) : x;
-  vec shifted = x * 1.44269504088896338700e+00 + to_integer, twos = shifted - to_integer;
-  vec r = (x - twos * 6.93147180369123816490e-01) - twos * 1.90821492927058770002e-10;
-  vec z = r * r;
-  vec c = r - z * (1.66666666666666019037e-01 +
+  reg shifted = x * 1.44269504088896338700e+00 + to_integer, twos = shifted - to_integer;
+  reg r = (x - twos * 6.93147180369123816490e-01) - twos * 1.90821492927058770002e-10;
+  reg z = r * r;
+  reg c = r - z * (1.66666666666666019037e-01 +
                    z * (-2.77777777770155933842e-03 +
                         z * (6.61375632143793436117e-05 +
                              z * (-1.65339022054652515390e-06 + z * 4.13813679705723846039e-08))));
-  vec y = 1.0 + (r - (r * c) / (c - 2.0));
-  return y * (vec)(((mask)shifted - (mask)all(to_integer) + 1023) << 52);
+  reg y = 1.0 + (r - (r * c) / (c - 2.0));
+  return y * (reg)(((reg_mask)shifted - (reg_mask)all(to_integer) + 1023) << 52);
 }
+
+inline vec exponential(vec x) { return {exponential(x.low), exponential(x.high)}; }
 
 } // namespace
 

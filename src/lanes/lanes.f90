@@ -17,12 +17,10 @@ module lanes
   implicit none
   private
 
-  public :: widest_lanes, prepare_lanes, occupy_lane, lane_state, section_state, take_counts, fly_lanes
+  public :: widest_lanes, prepare_lanes, add_region, occupy_lane, lane_state, take_counts, fly_lanes
 
   integer, parameter, public :: lane_count = 16
-  !> Sections that a lane can pass over in one go.
-  integer, parameter, public :: most_sections = 32
-  integer, parameter :: most_harmonics = 64, points = 10
+  integer, parameter :: most_harmonics = 64, points = 10, most_regions = 64
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
@@ -55,14 +53,22 @@ module lanes
     type(layer_t) :: layer
   end type machine_t
 
+  !> Mirrors `lane_region` of lane_types.hpp.
+  type, bind(c) :: region_t
+    real(c_double) :: attractor = 0, x = 0, v = 0, stretch_x = 1, stretch_v = 1, metric_xx = 0, metric_xv = 0, metric_vv = 0, &
+      reach = 0
+  end type region_t
+
   !> Mirrors `lane_batch` of lane_types.hpp.
   type, bind(c), public :: lane_batch_t
     real(c_double), dimension(lane_count) :: status = lane_idle, until = 0, time = 0, x = 0, v = 0, start = 0, &
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
-      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, passed = 0, &
-      skip = 0, reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
-    real(c_double), dimension(lane_count, most_sections) :: section_x = 0, section_v = 0
+      flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
+      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, skip = 0, reach = 0, reach_v = 0, &
+      reach_a = 0, reach_j = 0, end_s = 0
+    integer(c_int) :: regions = 0, complete = 1
+    type(region_t) :: region(most_regions)
   end type lane_batch_t
 
   !> A machine ready to fly in lanes.
@@ -74,9 +80,8 @@ module lanes
     type(machine_t) :: machine
     !> A body must be so fast [m/s] to be put into a lane: out of its Stribeck layer.
     real(wp) :: slowest = 0
-    !> All lanes stop at every section, so that those set off together, whose first flights take longer to find, stay
-    !> together. With a Stribeck layer, whose passages are dear, none waits for another.
-    logical :: in_step = .true.
+    !> With a Stribeck layer.
+    logical :: layered = .false.
   end type lane_flow_t
 
   interface
@@ -175,7 +180,7 @@ contains
       layer%second_from_edge = 0.5_wp*matmul(layer%from_edge, share**2)
       ! A body that leaves a barrier within the layer is left to the event loop.
       flow%slowest = layer%edge
-      flow%in_step = .false.
+      flow%layered = .true.
       flow%machine%slow = max(flow%machine%slow, layer%edge)
     end associate
   end subroutine set_layer
@@ -204,6 +209,21 @@ contains
       end associate
     end do
   end subroutine set_response
+
+  !> The lanes can be captured by attractor number `attractor` near its point [x, v]: where the square of the distance from
+  !> that, in scaled coordinates and a metric (xx, xv, vv), is at most `reach`. The first of several takes precedence.
+  pure subroutine add_region(batch, attractor, point, scale, metric, reach)
+    type(lane_batch_t), intent(inout) :: batch
+    integer, intent(in) :: attractor
+    real(wp), intent(in) :: point(2), scale(2), metric(3), reach
+    if (batch%regions == most_regions) then
+      batch%complete = 0
+      return
+    end if
+    batch%regions = batch%regions + 1
+    batch%region(batch%regions) = region_t(real(attractor, wp), point(1), point(2), 1/scale(1), 1/scale(2), metric(1), &
+                                           metric(2), metric(3), reach)
+  end subroutine add_region
 
   !> Puts a slipping body into a lane, which will fly it to the section. `new`: without memory of flights before.
   pure subroutine occupy_lane(flow, lane, state, new, batch)
@@ -236,16 +256,6 @@ contains
     state%time = batch%time(lane)
     state%mode = merge(mode_slip_minus, mode_slip_plus, batch%direction(lane) < 0)
   end subroutine lane_state
-
-  !> The body in a lane on the section number `section` that the lane passed over.
-  pure subroutine section_state(batch, lane, section, state)
-    type(lane_batch_t), intent(in) :: batch
-    integer, intent(in) :: lane, section
-    type(state_t), intent(out) :: state
-    state%x = batch%section_x(lane, section)
-    state%v = batch%section_v(lane, section)
-    state%mode = merge(mode_slip_minus, mode_slip_plus, state%v < 0)
-  end subroutine section_state
 
   !> Moves what a lane has counted to a tally.
   pure subroutine take_counts(batch, lane, tally)

@@ -71,17 +71,31 @@ contains
     call prepare_lanes(journey%moving, journey%flow)
   end subroutine open_journey
 
-  !> Points worth asking `basin_points` for at a time; the machine of the first slice speaks for all.
-  subroutine points_at_a_time(grid, span, points, error)
+  !> Points worth asking `basin_points` for at a time, from that at `index` on: its slice speaks for those that follow.
+  subroutine points_at_a_time(grid, span, index, cache, points, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
+    integer, intent(in) :: index(:)
+    type(slice_cache_t), intent(inout) :: cache
     integer, intent(out) :: points
     type(error_t), allocatable, intent(out) :: error
-    type(journey_t) :: journey
     points = 1
-    call open_journey(grid, span, 0_int64, describe_all, journey, error)
-    if (.not. allocated(error)) points = block_size(journey)
+    call turn_to(grid, span, point_slice(grid, index), cache, error)
+    if (.not. allocated(error)) points = block_size(cache%journey)
   end subroutine points_at_a_time
+
+  !> Makes the cache hold the machine of a slice.
+  subroutine turn_to(grid, span, slice, cache, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    integer(int64), intent(in) :: slice
+    type(slice_cache_t), intent(inout) :: cache
+    type(error_t), allocatable, intent(out) :: error
+    if (slice == cache%slice) return
+    cache%slice = -1
+    call open_journey(grid, span, slice, describe_all, cache%journey, error)
+    if (.not. allocated(error)) cache%slice = slice
+  end subroutine turn_to
 
   !> Starts from which the attractors of a slice are searched: its own sample, or, where `neighbours` (attractors of other
   !> slices) are given, their section points.
@@ -151,12 +165,8 @@ contains
     left = .true.
     do first = 1, size(slices)
       if (.not. left(first)) cycle
-      if (slices(first) /= cache%slice) then
-        cache%slice = -1
-        call open_journey(grid, span, slices(first), describe_all, cache%journey, error)
-        if (allocated(error)) return
-        cache%slice = slices(first)
-      end if
+      call turn_to(grid, span, slices(first), cache, error)
+      if (allocated(error)) return
       associate (members => pack([(i, i=1, size(slices))], left .and. slices == slices(first)))
         left(members) = .false.
         if (size(catalogues) > 0) then

@@ -60,11 +60,11 @@ contains
     periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)
     allocate (held%samples(2, samples), source=ieee_value(1.0_wp, ieee_quiet_nan))
     held%state = resume_strobe(moving, state, crank_angle)
-    call reset_tally(tally, held%state%state)
+    call reset_tally(tally, held%state%state, allocated(moving%pair))
     do i = 1, periods
       if (i == periods - in_window + 1) then
         tally%wants_v_max = .true.
-        call reset_tally(tally, held%state%state)
+        call reset_tally(tally, held%state%state, allocated(moving%pair))
       end if
       call advance_strobe_period(moving, held%state, tally, held%reason)
       if (held%reason /= 0) then
@@ -109,7 +109,7 @@ contains
     type(tally_t) :: tally
     integer :: i, reason
     probe = state
-    call reset_tally(tally, probe%state)
+    call reset_tally(tally, probe%state, allocated(moving%pair))
     do i = 1, period
       call advance_strobe_period(moving, probe, tally, reason)
       if (reason /= 0) exit

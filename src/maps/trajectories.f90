@@ -6,13 +6,13 @@
 module trajectories
   use attractors, only: attractor_t
   use kinds, only: wp
-  use lanes, only: fly_lanes, lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_state, lane_stopped, &
-    most_sections, occupy_lane, section_state, take_counts
+  use lanes, only: add_region, fly_lanes, lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_state, &
+    lane_stopped, occupy_lane, take_counts
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus
-  use status, only: reason_event_budget
-  use trajectory, only: begin_course, conclude, course_t, go_past_turn, go_to_stop, outcome_t, pass_stop, phase_over, &
-    phase_window, run_trajectory, sections_ahead, span_t
+  use status, only: reason_left_domain
+  use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_turn, go_to_stop, outcome_t, pass_stop, &
+    phase_over, phase_window, run_trajectory, sections_ahead, span_t
   implicit none
   private
 
@@ -54,6 +54,7 @@ contains
       end do
       return
     end if
+    call set_regions(catalogue, batch)
     next = 1
     do lane = 1, lane_count
       call board(journey, catalogue, starts, lane, next, passengers(lane), batch, outcomes)
@@ -96,7 +97,7 @@ contains
       end associate
       if (passenger%course%phase /= phase_over) then
         call occupy_lane(journey%flow, lane, passenger%course%state, .true., batch)
-        call send_on(journey, passenger%course, lane, batch)
+        call send_on(journey, passenger%course, outcomes(passenger%start), lane, batch)
         return
       end if
     end do
@@ -104,16 +105,35 @@ contains
     batch%status(lane) = lane_idle
   end subroutine board
 
+  !> Tells the lanes what they can be captured by: a slipping body, by a cycle.
+  pure subroutine set_regions(catalogue, batch)
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(lane_batch_t), intent(inout) :: batch
+    integer :: k, i
+    do k = 1, size(catalogue)
+      associate (a => catalogue(k))
+        if (a%rests .or. a%any_place) cycle
+        do i = 1, a%period
+          call add_region(batch, k, a%points(:2, i), a%scale(:2), a%metric(:3, i), a%capture_radius**2)
+        end do
+      end associate
+    end do
+  end subroutine set_regions
+
   !> Tells a lane where to stop.
-  pure subroutine send_on(journey, course, lane, batch)
+  pure subroutine send_on(journey, course, outcome, lane, batch)
     type(journey_t), intent(in) :: journey
     type(course_t), intent(in) :: course
+    type(outcome_t), intent(in) :: outcome
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
     batch%until(lane) = course%until
-    if (journey%flow%in_step) return
-    batch%sections(lane) = min(most_sections, sections_ahead(journey%moving, journey%span, course))
-    batch%passed(lane) = 0
+    batch%sections(lane) = sections_ahead(journey%moving, journey%span, course)
+    batch%budget(lane) = real(journey%moving%options%event_budget - course%tally%events, wp)
+    batch%leaves(lane) = merge(1, 0, ends_captured(journey%span, course))
+    batch%elapsed(lane) = course%elapsed
+    batch%captor(lane) = course%captured
+    batch%settled(lane) = outcome%settle_time
   end subroutine send_on
 
   !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
@@ -126,19 +146,17 @@ contains
     type(lane_batch_t), intent(inout) :: batch
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped, left, taken
-    integer :: section
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
     associate (course => passenger%course)
-      do section = 1, int(batch%passed(lane))
-        call section_state(batch, lane, section, course%state)
-        call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
-      end do
+      course%elapsed = batch%elapsed(lane)
+      course%captured = nint(batch%captor(lane))
+      outcome%settle_time = batch%settled(lane)
       call lane_state(batch, lane, course%state)
       call take_counts(batch, lane, course%tally)
-      if (course%tally%events > journey%moving%options%event_budget) course%reason = reason_event_budget
+      if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
-        if (.not. journey%flow%in_step) then
+        if (journey%flow%layered) then
           call go_past_turn(journey%moving, journey%flow%slowest, course)
           taken = course%reason == 0 .and. course%state%time < course%until .and. flies(journey, course)
         end if
@@ -153,7 +171,7 @@ contains
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
       batch%status(lane) = lane_flying
       if (taken) call occupy_lane(journey%flow, lane, course%state, .false., batch)
-      call send_on(journey, course, lane, batch)
+      call send_on(journey, course, outcome, lane, batch)
     end associate
   end subroutine attend
 

@@ -15,7 +15,6 @@ from simulator import X
 TRAINING = ("first.csv", "second.csv")
 HELD_OUT = "held_out.csv"
 BASE = "base.toml"
-SEALS = "seals.txt"
 QUANTUM = math.sqrt(6)
 """Resolution over the standard deviation of the noise, half of whose power it has."""
 FRICTION = {

@@ -7,10 +7,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest"
-REASONS = "not_run settled time_over left_domain not_finite event_budget"
-EVENTS = "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release"
-MODES = "slip_plus slip_minus stick upper_barrier lower_barrier"
+REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
+REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget"
+EVENTS = (
+    "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release"
+    " touch_upper touch_lower separation blow"
+)
+MODES = "slip_plus slip_minus stick upper_barrier lower_barrier held"
 AXES = {
     "x0": ("m", "initial position"),
     "v0": ("m/s", "initial velocity"),

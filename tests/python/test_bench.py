@@ -46,10 +46,12 @@ def test_the_driver_of_a_peer_agrees_with_ours(
 
 def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separatrix, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    import reference_run
     from published_case import CASE
-    from reference_run import Reference
 
-    found = Reference(build_dir / "lib" / "libseparatrix_reference.so", separatrix).run(np.array(STARTS))
+    monkeypatch.setattr(reference_run, "SHARE", 2)
+    library = build_dir / "lib" / "libseparatrix_reference.so"
+    found = reference_run.run_on_all_cores(library, separatrix, np.array(STARTS))
     (tmp_path / "list.csv").write_text("x0,v0\n" + "".join(f"{x},{v}\n" for x, v in STARTS))
     succeed(separatrix, "points", CASE, "--list", "list.csv", "-o", "ours.h5", "--quiet", folder=tmp_path)
     with h5py.File(tmp_path / "ours.h5") as file:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The discovery campaign: statistics, how verdicts are judged, command line, and that it can be killed."""
 
+import hashlib
 import json
 import math
 import os
@@ -9,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
 import pytest
 
@@ -53,11 +55,36 @@ def test_wilson_intervals_as_published(campaign, hits, cases, low, high):
     assert found == pytest.approx((low, high), abs=5e-5)
 
 
-def test_a_rate_without_cases_reaches_no_bar(campaign):
-    rates, _, bars, _ = campaign
-    assert rates.Rate(0, 0).interval == (0.0, 1.0)
-    assert not bars.reached(rates.Rate(0, 0), 0.0, high=True)
-    assert not bars.reached(rates.Rate(0, 0), 1.0, high=False)
+# R. G. Newcombe, Statistics in Medicine 17 (1998) 873, table II, method 10
+@pytest.mark.parametrize(
+    ("one", "other", "low", "high"),
+    [
+        ((56, 70), (48, 80), 0.0524, 0.3339),
+        ((9, 10), (3, 10), 0.1705, 0.8090),
+        ((10, 10), (0, 20), 0.6791, 1),
+    ],
+)
+def test_intervals_of_differences_as_published(campaign, one, other, low, high):
+    rates = campaign[0]
+    assert rates.difference(rates.Rate(*one), rates.Rate(*other)) == pytest.approx((low, high), abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("hits", "cases", "lowest", "highest", "said"),
+    [
+        (0, 0, 0.9, 1, "undecided"),
+        (96, 100, 0.95, 1, "undecided"),
+        (990, 1000, 0.95, 1, "yes"),
+        (80, 100, 0.95, 1, "**no**"),
+        (0, 10, 0, 0.03, "undecided"),
+        (0, 500, 0, 0.03, "yes"),
+        (20, 100, 0, 0.03, "**no**"),
+        (950, 1000, 0.9, 0.98, "yes"),
+        (999, 1000, 0.9, 0.98, "**no**"),
+    ],
+)
+def test_a_bar_is_met_where_the_whole_interval_is(campaign, hits, cases, lowest, highest, said):
+    assert campaign[2].met(campaign[0].Rate(hits, cases), lowest, highest) == said
 
 
 def truth(names: list[str], kind: str = "single", number: int = 0, **more) -> dict:
@@ -142,6 +169,21 @@ JUDGED = [
         (True, False, False, False),
         "one of the pair",
     ),
+    (truth([], "none"), verdict("ambiguous", ["dahl"]), (False, False, False, True), "dahl"),
+    (truth([], "none"), verdict("not-in-catalogue"), (False, False, False, False), "not-in-catalogue"),
+    (truth(["viscous"]), verdict("ambiguous", ["dahl"]), (False, False, False, True), "dahl"),
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["viscous"]),
+        (False, False, True, False),
+        "set with the truth",
+    ),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("ambiguous", ["viscous"]),
+        (False, False, False, False),
+        "one of the pair",
+    ),
     (
         truth(["viscous"]),
         verdict("named", ["viscous", "dahl"]),
@@ -168,6 +210,35 @@ def test_parameters_are_judged_by_their_intervals(campaign):
         assert one.covered == (inside,)
 
 
+def test_a_parameter_at_its_bound_is_not_covered(campaign):
+    hidden = truth(["stribeck"], parameters={"effect.stribeck.excess": 2.0, "effect.stribeck.velocity": 0.1})
+    found = {
+        "effect.stribeck.excess": {"value": 2.0, "standard_error": 0.1, "interval_95": [1.8, 2.2]},
+        "effect.stribeck.velocity": {"value": 0.2, "standard_error": None, "interval_95": None},
+    }
+    one = campaign[1].score(hidden, verdict("named", ["stribeck"], parameters=found))
+    assert one.covered == (True, False)
+    assert one.errors == pytest.approx((0, 1))
+
+
+def test_the_clearest_region_is_judged(campaign):
+    where = [
+        {"map": "drive phase", "force": 0.5, "error": 0.2},
+        {"map": "time since the last impact", "force": -3.0, "error": 0.1},
+    ]
+    region = campaign[1].region
+    assert region(["restitution_slope"], where) is True
+    assert region(["drive_ripple"], where) is False
+    assert region(["sensor_bias"], where) is None
+    assert region(["restitution_slope"], []) is None
+
+
+def test_a_decoy_that_could_be_named_counts(campaign):
+    said = verdict("none", decoys={"tested": 9, "accepted": True})
+    assert campaign[1].score(truth([], "none"), said).decoy
+    assert not campaign[1].score(truth([], "none"), verdict("none")).decoy
+
+
 def test_removed_excess(campaign):
     assert campaign[1].removed({"before": 3.0, "after": 1.5}) == pytest.approx(0.75)
     assert campaign[1].removed({"before": 3.0, "after": 0.9}) == 1
@@ -181,7 +252,7 @@ def test_the_confusion_matrix_has_every_case_once(campaign):
     counts, columns = figure.confusion_counts(found, rows)
     assert counts.sum() == len(JUDGED)
     assert counts[:, columns.index("right")].sum() == sum(flags[1] for _, _, flags, _ in JUDGED)
-    assert sum(one.alarm for one in found if one.kind == "none") == 1
+    assert sum(one.alarm for one in found if one.kind == "none") == 3
     wrong = {row[0]: row[2] for row in bars.bars(found)}["wrong name, all cases"]
     assert f"({sum(flags[3] for _, _, flags, _ in JUDGED)} of {len(JUDGED)};" in wrong
 
@@ -194,9 +265,11 @@ def test_the_baselines_name_what_is_large(campaign, tmp_path, name, size):
     import effects
     import records
 
-    number = next(n for n in range(200) if design.plan(SEED, n)[0] == "none")
-    case = design.draw(SEED, number)
-    case.level, case.colour, case.velocity, case.crank_angle = 1e-4, "white", True, True
+    # the filter rounds the jump of dry friction and raises a false alarm, not in a viscous machine
+    regime = "damped" if size > 0 else "viscous"
+    drawn = (design.draw(SEED, n) for n in range(400) if design.plan(SEED, n)[0] == "none")
+    case = next(one for one in drawn if one.regime == regime)
+    case.level, case.colour, case.velocity, case.crank_angle = 1e-4 if size > 0 else 1e-2, "white", True, True
     for experiment in (*case.training, case.held_out):
         experiment.samples_per_period = 400
     if size > 0:
@@ -204,11 +277,13 @@ def test_the_baselines_name_what_is_large(campaign, tmp_path, name, size):
         case.machine = case.hidden[0].on(case.base)
     records.write_case(tmp_path, tmp_path / "truth.json", case)
     training = [tmp_path / name for name in records.TRAINING]
+    known = set(baselines.terms(tomllib.loads((tmp_path / records.BASE).read_text()), training).names)
+    # a constant stands for the sensor; the friction that the base machine has is none of the terms
+    others = {"sensor_bias", "sensor_gain", "viscous", "coulomb"}
+    assert known - others == campaign[1].HAVE_A_TERM - others
     found = baselines.verdicts(tmp_path / records.BASE, training, 1)
-    if size > 0:
-        assert set(found.values()) == {name}
-    else:
-        assert set(found) == {"STLSQ", "ensemble SINDy"}
+    assert set(found) == {"STLSQ", "ensemble SINDy"}
+    assert set(found.values()) == {name}
 
 
 @pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--many", 64), ("--cases", 64)])
@@ -217,6 +292,34 @@ def test_the_command_line(source_dir, option, code):
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == code
     assert (option in result.stderr) == (code != 0)
+
+
+def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_path, monkeypatch):
+    import campaign as program
+    import report
+
+    library = tmp_path / "libseparatrix.so"
+    library.write_bytes(b"a library")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    for command in ("init -q", "add .", "-c user.name=a -c user.email=b commit -q -m one"):
+        (tmp_path / "source").mkdir(exist_ok=True)
+        (tmp_path / "source" / "file").write_text("as committed")
+        subprocess.run(["git", "-C", tmp_path / "source", *command.split()], check=True)
+    monkeypatch.setattr(program, "SOURCE", tmp_path / "source")
+    program.commit.cache_clear()
+    program.library.cache_clear()
+    clean = program.commit()
+    (tmp_path / "source" / "file").write_text("changed")
+    program.commit.cache_clear()
+    assert program.commit() == f"{clean}-dirty"
+    folders = program.Folders(tmp_path)
+    folders.make()
+    folders.result(3).write_text(json.dumps({"commit": program.commit(), "library": program.library()}))
+    said = report.versions(folders, [campaign[1].score(truth(["viscous"], number=3), verdict("none"))])
+    digest = hashlib.sha256(b"a library").hexdigest()
+    assert said == f"{clean}-dirty with library {digest[:12]} (1)"
+    program.commit.cache_clear()
+    program.library.cache_clear()
 
 
 def start(source_dir, folder, pause: float) -> subprocess.Popen:

@@ -15,7 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import KINDS, STARTS, Outcome, differences, listing, succeed, write_case
+from program import KINDS, STARTS, Outcome, differences, listing, run, succeed, write_case
 
 COMMANDS = ["basin", "sweep", "trajectory", "points", "laws", "info", "verify"]
 OPTIONS = [
@@ -237,6 +237,16 @@ def test_verify(separatrix, results, kind):
         assert facts["x_deviation"] < 1e-6
 
 
+def test_verify_runs_each_point_of_a_small_map_once(separatrix, tmp_path):
+    write_case(tmp_path)
+    small = [word for place in (1, 2) for word in ("--set", f"axis[{place}].count=3")]
+    succeed(separatrix, "basin", "case.toml", "-o", "map.h5", *small, folder=tmp_path)
+    for sample, said in ((200, "  all 9 points"), (9, "  all 9 points"), (8, "  8 points")):
+        text = succeed(separatrix, "verify", "map.h5", "--sample", sample, folder=tmp_path).out
+        assert f"{said} run again: 0 differ" in text
+        assert ("95 % confidence" in text) == (sample == 8)
+
+
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_points_to_a_table_and_back(mpi_separatrix, tmp_path, ranks):
     write_case(tmp_path)
@@ -363,3 +373,32 @@ def test_progress_on_a_terminal_rewrites_its_line(separatrix, tmp_path):
     # The search of the attractors has a line of its own where it takes long.
     assert text.count("\n") == sum(f" {things}, " in text for things in ("slices", "points"))
     assert "ETA" in text
+
+
+def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
+    """A trajectory that ran out of events is neither a motion with impacts nor one without."""
+    write_case(tmp_path)
+    more = ["--set", "integrator.event_budget=3", "--set", "attractors.sample=1", "-o", "out.h5"]
+    said = succeed(separatrix, *KINDS["sweep"], *more, folder=tmp_path).out
+    assert "run up: given up from 0.800000 to 1.40000 as event_budget" in said
+    assert "run down: given up from 0.800000 to 1.40000 as event_budget" in said
+    assert "ended as event_budget: 42 points" in said
+    assert "many starts" not in said
+    assert "neither start nor stop" not in said
+    plain = succeed(separatrix, *KINDS["sweep"], "-o", "plain.h5", folder=tmp_path).out
+    assert "given up" not in plain
+    assert "many starts" in plain
+    assert sum(map(int, re.findall(r"ended as \w+: (\d+) points", plain))) == 42
+
+
+def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
+    """The numbers of all attractors are exchanged in one piece, which counts to 2**31 - 1."""
+    write_case(tmp_path)
+    axes = (
+        "axis=[{name='x0', from=0, to=1, count=2}, {name='drive.ratio', from=0.8, to=1.4, count=1300},"
+        " {name='friction.kinetic_coefficient', from=0.1, to=0.3, count=1300}]"
+    )
+    ended = run(separatrix, "basin", "case.toml", "--validate", "--set", axes, folder=tmp_path)
+    assert ended.code == 65
+    assert "'axis.count': found 1690000" in ended.err
+    assert "allowed at most 1643" in ended.err

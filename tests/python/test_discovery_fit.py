@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Laws of the numerics of the discovery workflow that need no simulator."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
+from separatrix.discovery import rounds
 from separatrix.discovery.fit import blocks_of, eliminate, gauss_newton_step
+from separatrix.discovery.options import Options
 from separatrix.discovery.preflight import white_noise
 from separatrix.discovery.screen import project
 from separatrix.discovery.smoother import impact_table, smooth
@@ -118,3 +122,22 @@ def test_false_flags_are_rare():
     random = np.random.default_rng(8)
     assert sum(benjamini_hochberg(random.random(60), 0.01).any() for _ in range(1000)) < 25
     assert benjamini_hochberg(np.array([1e-9, 0.5, 0.7]), 0.01).tolist() == [True, False, False]
+
+
+def test_what_was_not_tested_is_that_of_the_first_round_in_the_order_of_the_catalogue(monkeypatch):
+    names = ["viscous", "dahl", "cubic_spring", "offset_force", "sensor_delay"]
+    fits = SimpleNamespace(values=[], reduced_chi2=1.0)
+    monkeypatch.setattr(
+        rounds, "candidate", lambda *words: "the machine has no friction" if words[3] == "dahl" else object()
+    )
+    monkeypatch.setattr(rounds, "signature", lambda *_: None)
+    monkeypatch.setattr(rounds, "screen", lambda *_: None)
+    monkeypatch.setattr(rounds, "choose", lambda *_: [])
+    bench = rounds.Bench(None, None, None, Options(candidates=tuple(reversed(names))))
+    for added in ((), ("viscous",)):
+        base = SimpleNamespace(
+            names=added, model=SimpleNamespace(parameters={}), problem=SimpleNamespace(free=[]), fit=fits
+        )
+        rounds.run_round(bench, base, None, 0, 1)
+        assert list(bench.absent) == names
+        assert bench.absent["dahl"] == "the machine has no friction"

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured records: the pendulum whose published model is viscous lacks dry friction and drag."""
+"""Measured records: a positioning system with asymmetric friction, and a pendulum that is not viscous."""
 
+import json
 import os
 import runpy
 from pathlib import Path
 
 import pytest
-from separatrix.discovery import discover
-from separatrix.discovery.options import Options
+from separatrix.discovery.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = os.environ.get("SEPARATRIX_MEASURED")
@@ -17,30 +17,63 @@ pytestmark = pytest.mark.skipif(
     not FOLDER, reason="asked for by SEPARATRIX_MEASURED=FOLDER with emps/ and single_pendulum/"
 )
 
+OPTIONS = {
+    "emps": ["--segment-seconds", "0.5", "--effects", "asymmetric_friction"],
+    "pendulum_large": [],
+    "pendulum_small": ["--segment-seconds", "0.4"],
+}
+
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
     """The records that scripts/measured_records makes."""
     out = tmp_path_factory.mktemp("records")
-    main = runpy.run_path(str(ROOT / "scripts" / "measured_records"))["main"]
-    assert main([FOLDER, "--out", str(out)]) == 0
+    make = runpy.run_path(str(ROOT / "scripts" / "measured_records"))["main"]
+    assert make([FOLDER, "--out", str(out)]) == 0
     return out
 
 
-def verdict(records: Path, name: str, **choices) -> dict:
-    """The verdict on one pendulum record, its small swings held out."""
-    options = Options(partial=True, quick=True, **choices)
-    paths = [records / f"{name}.csv"], [records / f"{name}_low.csv"]
-    return discover(ROOT / "examples" / "measured_pendulum.toml", *paths, options)
+def found(records: Path, name: str) -> dict:
+    """The verdict in part on one record, the other of its machine held out, and the figures of the field."""
+    machine, held_out = ("positioning", "emps_pulses") if name == "emps" else ("pendulum", f"{name}_low")
+    folder = records / name
+    if not folder.is_dir():
+        arguments = [str(ROOT / "examples" / f"measured_{machine}.toml"), str(records / f"{name}.csv")]
+        arguments += ["--hold-out", str(records / f"{held_out}.csv"), "--out", str(folder)]
+        assert main([*arguments, "--partial", "--quick", "--quiet", *OPTIONS[name]]) == 0
+    verdict = json.loads((folder / "verdict.json").read_text())
+    figures = runpy.run_path(str(ROOT / "scripts" / "measured_figures"))
+    options = figures["parsed"]([FOLDER, "--records", str(records)])
+    measured = figures["force_errors" if name == "emps" else "loss_errors"](options, folder, verdict)
+    return verdict | {"errors": measured}
 
 
-def test_large_swings_lack_dry_friction_and_drag_and_small_ones_have_the_same_dry_friction(records):
-    large = verdict(records, "pendulum_large")
-    assert (large["outcome"], large["complete"]) == ("named", False)
-    assert set(large["effects"]) == {"coulomb", "quadratic_drag"}
-    held_out = large["gap"]["held_out"]
-    assert held_out["after"] < 0.5 * held_out["before"]
-    small = verdict(records, "pendulum_small", segment_seconds=0.4)
-    assert "coulomb" in small["effects"]
-    path = "effect.coulomb.force"
-    assert small["parameters"][path]["value"] == pytest.approx(large["parameters"][path]["value"], rel=0.15)
+def test_the_positioning_system_lacks_asymmetric_friction_and_remains_flexible(records):
+    verdict = found(records, "emps")
+    assert (verdict["outcome"], verdict["complete"]) == ("named", False)
+    assert verdict["effects"] == ["asymmetric_friction"]
+    # the authors: 166.7 and 240.4 N s/m
+    viscous = verdict["parameters"]["effect.asymmetric_friction.viscous"]["value"]
+    assert viscous == pytest.approx((166.7 - 240.4) / 2, rel=0.05)
+    assert verdict["errors"]["emps"][1] <= 3.1 < 4.0 < verdict["errors"]["emps"][0]
+    assert verdict["errors"]["emps_pulses"][1] < 5.4 < verdict["errors"]["emps_pulses"][0]
+    assert any("emps_pulses" in reason and "flexible" in reason for reason in verdict["reasons"])
+
+
+def test_large_swings_of_the_pendulum_lack_dry_friction_and_drag(records):
+    verdict = found(records, "pendulum_large")
+    assert (verdict["outcome"], verdict["complete"]) == ("named", False)
+    assert verdict["effects"] == ["coulomb", "quadratic_drag"]
+    before, after = verdict["errors"]["pendulum_large_low"]
+    assert after < 17 < 25 < before
+
+
+def test_small_swings_of_the_pendulum_have_the_same_dry_friction(records):
+    small, large = found(records, "pendulum_small"), found(records, "pendulum_large")
+    assert small["outcome"] == "named"
+    assert small["effects"][0] == "coulomb"
+    assert "cubic_spring" not in small["effects"]
+    forces = [one["parameters"]["effect.coulomb.force"]["value"] for one in (small, large)]
+    assert forces[0] == pytest.approx(forces[1], rel=0.15)
+    before, after = small["errors"]["pendulum_small_low"]
+    assert after < 0.3 * before

@@ -8,8 +8,10 @@ import h5py
 import numpy as np
 import pytest
 from program import CASE, listing
+from separatrix.discovery import cli
 from separatrix.discovery.cli import main
-from separatrix.discovery.records import read_record
+from separatrix.discovery.records import make_record, read_record, unique_names
+from separatrix.discovery.results import FILES
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -50,6 +52,10 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         head[0] = "# units: s, furlong"
     elif kind == "clipped":
         x = np.minimum(x, 0.9)
+    elif kind == "still drive":
+        head.append("# drive_frequency_rad_s: 0")
+    elif kind == "negative noise":
+        head.append("# sensor_noise_sigma_m_s: -1")
     elif kind == "short":
         t, x = t[:40], x[:40]
     return t, x, head
@@ -65,6 +71,8 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         ("unit", ["furlong", "expected"]),
         ("clipped", ["clipped"]),
         ("short", ["40 samples"]),
+        ("still drive", ["'drive_frequency_rad_s' is 0"]),
+        ("negative noise", ["'sensor_noise_sigma_m_s' is -1"]),
     ],
 )
 def test_faults_are_refused_with_their_place(tmp_path, kind, words):
@@ -108,6 +116,25 @@ def test_units_and_hdf5(tmp_path):
     assert stored.header["drive_ratio"] == 1.2
 
 
+def test_a_body_at_rest_may_show_one_value(tmp_path):
+    """A coarse sensor shows one value, or two of its steps."""
+    t, x = rows()
+    x[:] = 0.5
+    for count in (0, 200):
+        x[:count] = 0.51
+        path = write(tmp_path / "rest.csv", t, x)
+        assert np.array_equal(read_record(path, at_rest=True).x, x)
+    with pytest.raises(SeparatrixError, match="constant"):
+        read_record(write(tmp_path / "rest.csv", t, 0 * x))
+
+
+def test_records_get_names_of_their_own(tmp_path):
+    names = ["a", "a", "a_2", "b", "a"]
+    records = [make_record(name, dict(zip("tx", rows(), strict=True))) for name in names]
+    unique_names(records)
+    assert [one.name for one in records] == ["a", "a_3", "a_2", "b", "a_4"]
+
+
 @pytest.mark.parametrize("fault", ["nan", "other machine", "coarse", "no such file"])
 def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault):
     library = build_dir / "lib" / "libseparatrix.so"
@@ -133,6 +160,38 @@ def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault)
     assert listing(tmp_path) == before
 
 
+@pytest.mark.parametrize("earlier", [True, False])
+def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys, earlier):
+    """Neither half of a new result nor a mixture with an old one."""
+    out = tmp_path / "folder" / "out"
+    if earlier:
+        out.mkdir(parents=True)
+        for name in (*FILES, "notes.txt"):
+            (out / name).write_text("of an earlier run")
+    before = listing(tmp_path)
+
+    def write(folder: Path, *_: object) -> None:
+        (folder / "verdict.json").write_text("new")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
+    verdict |= {"reasons": [], "separating_experiment": "", "warnings": []}
+    monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
+    monkeypatch.setattr(cli, "write_results", write)
+    monkeypatch.setattr(cli, "write_report", fail)
+    arguments = ["base.toml", "record.csv", "--out", str(out), "-q"]
+    assert main(arguments) == 73
+    assert f"{out}: No space left" in capsys.readouterr().err
+    assert listing(tmp_path) == before
+    assert out.parent.exists() == earlier
+    monkeypatch.setattr(cli, "write_report", lambda *_: None)
+    assert main(arguments) == 0
+    left = {path.name: path.read_text() for path in out.iterdir()}
+    assert left == {"verdict.json": "new"} | ({"notes.txt": "of an earlier run"} if earlier else {})
+
+
 def test_usage(capsys):
     for arguments in (
         ["base.toml"],
@@ -141,3 +200,90 @@ def test_usage(capsys):
     ):
         assert main(arguments) == 64
         assert "separatrix-discover: " in capsys.readouterr().err
+
+
+def test_a_byte_order_mark_is_no_text(tmp_path):
+    path = write(tmp_path / "record.csv", *rows())
+    wanted = read_record(path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert np.array_equal(read_record(path).x, wanted.x)
+    assert read_record(path).header == wanted.header
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("# drive_ration: 1.2", "'drive_ration' is not used: 'drive_ratio'?"),
+        ("# phase: 180", "phase is 180 rad, more than a turn: degrees?"),
+        ("# operator: none", ""),
+    ],
+)
+def test_header_lines_that_look_wrong_are_told(tmp_path, line, words):
+    warnings = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD, line])).warnings
+    assert [words in text for text in warnings] == ([True] if words else [])
+
+
+@pytest.mark.parametrize("size", [0.4, -50.0])
+def test_a_sample_where_no_motion_leads_is_left_out_and_told(tmp_path, size):
+    t, x = rows()
+    x[150] += size
+    record = read_record(write(tmp_path / "record.csv", t, x))
+    assert np.array_equal(record.t, np.delete(t, 150))
+    assert record.pieces == [(0, 150), (150, 399)]
+    assert any(
+        text.startswith(f"{tmp_path}/record.csv:157: ") and "left out" in text for text in record.warnings
+    )
+    x[10:200:19] += size
+    with pytest.raises(SeparatrixError, match=r"record.csv:17: .* 11 such samples"):
+        read_record(write(tmp_path / "record.csv", t, x))
+
+
+def test_impacts_and_steps_of_the_sensor_are_no_stray_samples():
+    t = np.arange(2000) / 100
+    bouncing = np.abs(np.sin(3 * t))
+    for x in (bouncing, np.round(bouncing / 0.2) * 0.2, np.where(t < 19, 0.5, bouncing)):
+        assert make_record("record", {"t": t, "x": x}).t.size == t.size
+
+
+def test_the_same_record_is_not_taken_twice(tmp_path, build_dir, monkeypatch, capsys):
+    library = build_dir / "lib" / "libseparatrix.so"
+    if not library.is_file():
+        pytest.skip(f"{library} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    (tmp_path / "base.toml").write_text(CASE)
+    (tmp_path / "copies").mkdir()
+    first = write(tmp_path / "first.csv", *rows())
+    copy = write(tmp_path / "copies" / "first.csv", *rows())
+    for words in ([first, "--hold-out", first], [first, "--hold-out", copy], [first, copy]):
+        arguments = [tmp_path / "base.toml", *words, "--out", tmp_path / "out", "-q"]
+        assert main([str(word) for word in arguments]) == 64
+        assert f"{words[-1]}: the same record as {first}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    before = listing(tmp_path)
+    for out in ("file", "file/sub"):
+        # were it looked for, the case would be missing: 66
+        assert main(["no.toml", "no.csv", "--out", str(tmp_path / out)]) == 73
+        assert str(tmp_path / "file") in capsys.readouterr().err
+    assert main(["no.toml", "no.csv", "--out", str(tmp_path / "new" / "sub")]) == 66
+    assert listing(tmp_path) == before
+
+
+def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "investigate", interrupt)
+    assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 130
+    assert capsys.readouterr().err.splitlines() == ["separatrix-discover: interrupted, nothing was written"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_report_has_its_share_of_the_time(capsys):
+    progress = cli.Progress()
+    progress.began -= 67.0
+    progress("writing the report", 0.9)
+    assert "about 33 s left" in capsys.readouterr().err

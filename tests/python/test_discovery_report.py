@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from program import CASE
+from separatrix.discovery import comparison
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.discovery.story import sections
+from separatrix.library import Model
 
 SECTIONS = [
     "verdict", "compared", "gap", "where", "missing", "confusable", "residuals", "impacts", "held-out",
@@ -87,12 +90,16 @@ def verdict(outcome: str) -> dict:
             "value": 88.8833, "standard_error": 0.0804, "interval_95": [88.7257, 89.0409], "unit": "N/m",
         }
     }  # fmt: skip
+    parameters["contact.stiffness"] = {
+        "value": 1.0, "standard_error": None, "interval_95": None, "note": "at its bound", "unit": "N",
+    }  # fmt: skip
     if found:
         parameters["effect.cubic_spring.stiffness"] = {
             "value": 9.83014, "standard_error": 0.8334, "interval_95": [8.19671, 11.4636], "unit": "N/m^3",
         }  # fmt: skip
     return {
         "outcome": outcome,
+        "complete": True,
         "effects": effects,
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
         "equivalent": False,
@@ -107,8 +114,12 @@ def verdict(outcome: str) -> dict:
         "p_value": 5.8e-74 if found else None,
         "reasons": [] if outcome in ("named", "none") else ["gate 'separate' was not passed"],
         "detectable": {
-            "cubic_spring": {"size": 4.2252, "path": "effect.cubic_spring.stiffness", "unit": "N/m^3"},
-            "offset_force": {"size": None, "path": "effect.offset_force.force", "unit": "N"},
+            "cubic_spring": {
+                "size": 4.2252, "path": "effect.cubic_spring.stiffness", "unit": "N/m^3", "reason": "",
+            },
+            "offset_force": {
+                "size": None, "path": "effect.offset_force.force", "unit": "N", "reason": "imitated",
+            },
         },
         "confusability": {"names": NAMES, "matrix": [[1.0, 0.31, 0.2], [0.31, 1.0, 0.98], [0.2, 0.98, 1.0]]},
         "separating_experiment": "measure the barrier" if outcome == "ambiguous" else "",
@@ -127,7 +138,7 @@ def verdict(outcome: str) -> dict:
         "records": [
             {
                 "name": name, "use": use, "samples": 600, "sigma": 1e-3, "memory": 0.0, "resolution": 0.0,
-                "drive_frequency": RATE, "phase_known": True,
+                "drive_frequency": RATE, "drive_scale": 0.5, "phase_known": True,
             }
             for name, use in (("f0", "training"), ("f1", "held out"))
         ],
@@ -215,6 +226,10 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
     for row, (path, one) in zip(page.tables["parameter"], told["parameters"].items(), strict=True):
         assert row[0] == path
         assert row[4] == one["unit"]
+        if one["interval_95"] is None:
+            assert same(row[1], one["value"])
+            assert row[2:4] == ["-", "at its bound"]
+            continue
         numbers = [*row[1:3], *row[3].split(" to ")]
         wanted = [one["value"], one["standard_error"], *one["interval_95"]]
         assert all(same(cell, value) for cell, value in zip(numbers, wanted, strict=True))
@@ -224,6 +239,7 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
     for row, one in zip(page.tables["effect"], told["detectable"].values(), strict=True):
         assert row[1] == one["path"]
         assert same(row[2].split(" ")[0], one["size"])
+        assert row[3] == one["reason"]
 
 
 def test_the_excess_that_was_removed(report: tuple) -> None:
@@ -236,6 +252,13 @@ def test_the_excess_that_was_removed(report: tuple) -> None:
         if removed == 0
         else float(cell.removesuffix(" %")) == pytest.approx(100 * removed, abs=0.06)
     )
+
+
+def test_a_verdict_in_part_says_that_a_gap_remains() -> None:
+    for complete in (True, False):
+        summary = sections(verdict("named") | {"complete": complete})[0].body[0]
+        assert ("a gap remains" in summary) != complete
+        assert ("All gates are passed" in summary) == complete
 
 
 def test_the_words_fit_the_outcome(report: tuple) -> None:
@@ -296,7 +319,16 @@ def test_maps_before_and_after(
     make(tmp_path, "named")
     (tmp_path / "base.toml").write_text(CASE)
     (tmp_path / "extended.toml").write_text(CASE + "[effect.restitution_slope]\nslope = 0.06\n")
+    flown, fly = [], comparison.impact_speeds
+
+    def kept(program: Path, case: Path, *more: object) -> np.ndarray:
+        flown.append(Model.read(case).parameters["drive.cosine[1]"].value)
+        return fly(program, case, *more)
+
+    monkeypatch.setattr(comparison, "impact_speeds", kept)
     html, _ = write_report(tmp_path, tmp_path / "base.toml")
+    # half of the drive, as the record says
+    assert flown == pytest.approx(2 * [0.5 * Model.from_text(CASE).parameters["drive.cosine[1]"].value])
     page = Page(html.read_text())
     assert {"bifurcation", "impact-speeds"} <= {name for name, _ in page.pictures}
 

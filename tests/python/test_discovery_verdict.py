@@ -4,12 +4,16 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 from program import CASE, succeed
 from separatrix.discovery.cli import main
+from separatrix.discovery.machine import Free
+from separatrix.discovery.verdict import _parameters
+from separatrix.discovery.wording import with_error
 
 RATIOS = {"first": 0.8, "second": 1.25, "held_out": 0.95}
 
@@ -88,7 +92,10 @@ def test_nothing_is_found_where_nothing_is_and_twice_the_same(separatrix, tmp_pa
     assert (verdict["outcome"], verdict["effects"]) == ("none", [])
     assert not (tmp_path / "out" / "extended.toml").exists()
     assert 0 < verdict["detectable"]["offset_force"]["size"] < 0.5
+    (tmp_path / "again").mkdir()
+    (tmp_path / "again" / "extended.toml").write_text("of an earlier run")
     again = asked(tmp_path, made, "again", *few)
+    assert not (tmp_path / "again" / "extended.toml").exists()
     for one in (verdict, again):
         del one["runtime_s"]
     assert again == verdict
@@ -102,3 +109,32 @@ def test_effects_that_are_one_motion_are_reported_together(separatrix, tmp_path)
     assert {"offset_force", "sensor_bias"} <= {*verdict["effects"], *verdict["alternatives"]}
     assert verdict["equivalent"]
     assert verdict["separating_experiment"]
+
+
+def test_a_part_is_named_where_more_is_missing(separatrix, tmp_path):
+    """Drag is among the effects that are asked for, the ripple of the drive is not."""
+    hidden = "[effect.viscous]\ndamping = 0.4\n[effect.drive_ripple]\nsine = 0.03\n"
+    made = records(separatrix, tmp_path, hidden)
+    few = ("--effects", "viscous,restitution_slope,offset_force")
+    found = asked(tmp_path, made, "out", *few, "--quick", "--partial")
+    assert (found["outcome"], found["complete"]) == ("named", False)
+    assert found["effects"][0] == "viscous"
+    assert found["parameters"]["effect.viscous.damping"]["value"] == pytest.approx(0.4, rel=0.2)
+    held_out = found["gap"]["held_out"]
+    assert 1.05 < held_out["after"] < held_out["before"]
+    assert (tmp_path / "out" / "extended.toml").exists()
+
+
+def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so():
+    free = [Free("contact.restitution", 1.0, 0.0, 1.0), Free("restoring.stiffness", 89.0)]
+    fitted = SimpleNamespace(
+        problem=SimpleNamespace(free=free),
+        fit=SimpleNamespace(values=np.array([1.0, 89.0]), at_bound=np.array([True, False])),
+        covariance=np.diag([0.0, 0.25]),
+        model=SimpleNamespace(parameters={}),
+    )
+    held, known = _parameters(fitted).values()
+    assert (held["standard_error"], held["interval_95"], held["note"]) == (None, None, "at its bound")
+    assert known["interval_95"] == pytest.approx([89 - 0.98, 89 + 0.98])
+    assert with_error(held, 4) == "1, at its bound"
+    assert with_error(known, 4) == "89 +- 0.5"

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from program import KINDS, run, succeed, write_case
+from sample_files import EVENTS, MODES, REASONS, REGIMES
 
 COORDINATES = {
     "map": {"x0": (19, "m"), "v0": (31, "m/s")},
@@ -196,6 +197,14 @@ def test_the_catalogue_explains_the_labels(results, kind):
         assert (regimes[where][here] == catalogue["regime"][i]).all()
         np.testing.assert_array_equal(amplitudes[where][here], np.float32(catalogue["amplitude"][i]))
     assert catalogue["count"].sum() == (labels > 0).sum()
+
+
+def test_made_up_files_have_the_codes_of_real_ones(results):
+    with h5py.File(results["map"]) as basin, h5py.File(results["trajectory"]) as trajectory:
+        assert basin["regime"].attrs["flag_meanings"] == REGIMES
+        assert basin["reason"].attrs["flag_meanings"] == REASONS
+        assert trajectory["event_kind"].attrs["flag_meanings"] == EVENTS
+        assert trajectory["mode"].attrs["flag_meanings"] == MODES
 
 
 def test_the_sweep_has_the_limits_it_prints(separatrix, tmp_path, results):

@@ -93,6 +93,27 @@ def test_a_blow_after_the_end_is_told(separatrix, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("setting", "key"),
+    [
+        ("body.blow=0.1", "body.blow"),
+        (
+            'drive={law="pid_velocity",velocity=0.2,proportional=50,sample_time=0.05}',
+            "drive.sample_time",
+        ),
+    ],
+)
+def test_a_motion_without_section_is_told(separatrix, tmp_path, setting, key):
+    (tmp_path / "case.toml").write_text(PAIR)
+    axes = 'axis=[{name="x0",from=0,to=1,count=2},{name="v0",from=0,to=1,count=2}]'
+    told = succeed(
+        separatrix, "basin", "case.toml", "--set", axes, "--set", setting, "-o", "b.h5", folder=tmp_path
+    ).out
+    assert f"no attractors are looked for: with {key} the state" in told
+    with h5py.File(tmp_path / "b.h5") as file:
+        assert set(file["attractor"][()].ravel().tolist()) <= {-1, 0}
+
+
+@pytest.mark.parametrize(
     ("option", "message"),
     [
         ("trajectory.samples_per_period=2000000000", "allowed at most 20000000 samples in all"),

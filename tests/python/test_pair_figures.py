@@ -68,6 +68,51 @@ def test_linear_damping_jumps_and_pulls(separatrix, source_dir, tmp_path):
     assert force[-1] < -0.02 * force.max()
 
 
+def test_backlash_is_shown_relative_to_its_stops(separatrix, source_dir, tmp_path):
+    """Between the stops in the phase portrait; impacts turn the relative velocity by the restitution."""
+    path = file_of(separatrix, source_dir, tmp_path, "pair_backlash")
+    with open_result(path) as result, style.context():
+        seen = pair.relative_to_stop(result)
+        assert np.abs(seen["x"]).max() <= 0.1 + 1e-12
+        hits = np.abs(seen["event_x"].values) > 0.1 - 1e-9
+        turned = seen["event_v_after"].values[hits] / seen["event_v_before"].values[hits]
+        assert turned == pytest.approx(-0.85, abs=1e-12)
+        ax = trajectory.figures(result, "backlash")["phase"].axes[0]
+        assert ax.get_xlabel() == "relative position $x_2 - x_1$ (m)"
+        assert np.nanmax(np.abs(ax.lines[0].get_xdata())) <= 0.1 + 1e-12
+
+
+def test_soft_backlash_has_loops(separatrix, source_dir, tmp_path):
+    law = 'contact={law="hunt_crossley_exact", stiffness=1e5, restitution=0.85, upper=0.1, lower=-0.1}'
+    path = file_of(separatrix, source_dir, tmp_path, "pair_backlash", law)
+    with open_result(path) as result, style.context():
+        found = contact.contacts(pair.relative_to_stop(result))
+        assert len(found) > 5
+        for _, speed, _, depth, force in found:
+            assert speed > 0
+            assert min(depth.min(), force.min()) > 0
+        assert len(trajectory.figures(result, "b")["contact"].axes[0].lines) > 5
+
+
+def test_contacts_beside_one_another(separatrix, source_dir, tmp_path):
+    files = [
+        file_of(separatrix, source_dir, tmp_path, f"contact_{law}")
+        for law in ("hunt_crossley", "kelvin_voigt")
+    ]
+    words = [*map(str, files), "--beside", "-o", str(tmp_path / "out"), "--formats", "png", "--dpi", "50"]
+    assert cli.main(words) == 0
+    assert (tmp_path / "out" / "contact_hunt_crossley_beside.png").is_file()
+    other = file_of(separatrix, source_dir, tmp_path, "pair_free")
+    assert cli.main([str(other), "--beside", "-o", str(tmp_path / "out")]) == 64
+
+
+def test_a_motion_at_rest_is_shown_from_its_start(separatrix, source_dir, tmp_path):
+    path = file_of(separatrix, source_dir, tmp_path, "hammer")
+    with open_result(path) as result, style.context():
+        ax = trajectory.figures(result, "hammer")["phase"].axes[0]
+        assert np.nanmax(ax.lines[0].get_ydata()) == pytest.approx(2, abs=1e-3)
+
+
 def test_books_of_one_body_close_at_every_sample(separatrix, source_dir, tmp_path):
     examples = ("contact_hunt_crossley", "trajectory_coulomb_1.05", "trajectory_stribeck_1.2_impact")
     for example in examples:

@@ -153,3 +153,21 @@ def test_book_of_energy(separatrix, case):
         abs=1e-12,
     )
     assert np.all(np.diff(losses["friction_loss"]) >= 0)
+
+
+@pytest.mark.parametrize("rate", [1e9, 3e8, 3e6])
+def test_a_record_that_does_not_fit_is_refused_before_the_run(separatrix, case, rate):
+    words = ("trajectory", "case.toml", "--record", "record.csv", "--set", f"record.rate={rate}")
+    refused = run(separatrix, *words, folder=case)
+    assert refused.code == 65
+    assert "'record.rate'" in refused.err
+    assert "at most 2500000.0 Hz over 8" in refused.err
+    assert [path.name for path in case.iterdir()] == ["case.toml"]
+
+
+def test_every_file_is_named_when_it_is_written(separatrix, case):
+    said = succeed(
+        separatrix, "trajectory", "case.toml", "--record", "record.csv", "--csv", "events.csv", folder=case
+    ).out
+    written = [line.split("wrote ")[1] for line in said.splitlines() if "wrote " in line]
+    assert sorted(path.split("/")[-1] for path in written) == ["case.h5", "events.csv", "record.csv"]

@@ -74,3 +74,13 @@ def test_build_info_is_valid_fortran_and_names_the_commit(source_dir, tmp_path):
     assert f"commit = '{head.stdout[:12]}'" in text
     assert max(map(len, text.splitlines())) <= 132
     assert "'It''s a compiler'" in text
+
+
+@pytest.mark.parametrize(("option", "code"), [("--help", 0), ("-h", 0), ("--fast", 64)])
+def test_quickstart_does_nothing_on_an_option(source_dir, option, code):
+    """Only an exit before the first step leaves out its line."""
+    script = source_dir / "scripts" / "quickstart.sh"
+    done = subprocess.run([script, option], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == code
+    assert "1/5" not in done.stdout
+    assert "quickstart" in done.stdout + done.stderr

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The base machine fitted honestly: noise measured, phases found, several starts."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
@@ -14,7 +12,6 @@ from separatrix.discovery.problem import Problem
 from separatrix.discovery.refit import Fitted
 
 _PHASES = 12
-_DISAGREEMENT = 1.3
 _RENEWED = 0.03
 _RENEWED_MEMORY = 0.06
 # reduced chi^2 above which correlated residuals say more about the model than about the noise
@@ -46,7 +43,7 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
 
 
 def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
-    """Set what the records do not state, and doubt what they state if the samples scatter more.
+    """Set what the records do not state.
 
     The fit must have been made without memory.
     """
@@ -56,10 +53,6 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
-        elif measured > _DISAGREEMENT * prepared.sigma:
-            prepared.note(
-                f"noise is stated as {prepared.sigma:.3g} m, the samples scatter by {measured:.3g} m"
-            )
     if any(one.record.v is not None for one in data.prepared):
         factors, _ = noise_of(problem, fit, 1, mass)
         for number, prepared in enumerate(data.prepared):
@@ -72,17 +65,22 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
 
 
 def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
-    """Measure the noise anew by a better fit; whether it changed enough to matter."""
+    """Measure the noise anew by a better fit; whether it changed enough to matter (else it stays)."""
     before = [(one.sigma, one.velocity_sigma, one.memory) for one in data.prepared]
     for one in data.prepared:
         one.memory = 0.0
     measure_noise(data, problem, again(problem, fit), mass)
-    return any(
+    changed = any(
         abs(np.log(one.sigma / sigma)) > _RENEWED
         or (one.record.v is not None and abs(np.log(one.velocity_sigma / speed)) > _RENEWED)
         or abs(one.memory - memory) > _RENEWED_MEMORY
         for one, (sigma, speed, memory) in zip(data.prepared, before, strict=True)
     )
+    if not changed:
+        # what is compared must be scored with one noise
+        for one, noise in zip(data.prepared, before, strict=True):
+            one.sigma, one.velocity_sigma, one.memory = noise
+    return changed
 
 
 def find_phases(data: Data, model, free: list[Free]) -> None:
@@ -98,7 +96,9 @@ def find_phases(data: Data, model, free: list[Free]) -> None:
             data.prepared[i].phase = float(turn)
         problem, fit = fit_stages(data, model, free, values, stages=[0], most=4)
         record = problem.segments.record
-        trials.append([float(np.sum(np.minimum(fit.chi2, 1e12)[record == i])) for i in missing])
+        # a start that cannot be flown is no fit
+        lost = np.where(fit.evaluation.failed, 1e12, np.minimum(fit.chi2, 1e12))
+        trials.append([float(np.sum(lost[record == i])) for i in missing])
     best = np.argmin(np.array(trials), axis=0)
     for one, phase in zip(data.prepared, original, strict=True):
         one.phase = phase
@@ -111,11 +111,3 @@ def copy_noise(source: Data, target: Data) -> None:
     memory = float(np.mean([one.memory for one in source.prepared]))
     for one in target.prepared:
         one.memory = memory
-
-
-def with_fitted_values(base: Fitted) -> list[Free]:
-    """What is free in the base, with the fitted values."""
-    return [
-        replace(one, value=float(value))
-        for one, value in zip(base.problem.free, base.fit.values, strict=True)
-    ]

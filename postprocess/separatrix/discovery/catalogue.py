@@ -47,13 +47,8 @@ class Effect:
     linear: tuple[str, ...] = ()
     positive: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    sensor: bool = False
     # effects that are the same motion, and when
     equivalent: dict[str, str] = field(default_factory=dict)
-
-    def paths(self, scales: Scales) -> list[str]:
-        """Paths of its parameters."""
-        return [f"effect.{self.name}.{key}" for key in self.starts(scales)]
 
 
 _FAR = 20.0
@@ -62,6 +57,13 @@ _GAIN = (
     "where friction, barrier and the scale of the drive are fitted, a gain of the sensor is a constant force"
 )
 _SHIFT = "where the position of the barrier is fitted, a shifted sensor is a constant force"
+
+
+def _asymmetry(scales: Scales) -> dict[str, list[float]]:
+    """Both parts of friction that differs with the direction; the dry part within the machine's friction."""
+    dry = {"coulomb": [min(0.02 * scales.force, 0.5 * scales.friction)]} if scales.friction > 0 else {}
+    return dry | {"viscous": [0.02 * scales.force / scales.speed]}
+
 
 CATALOGUE: tuple[Effect, ...] = (
     Effect("viscous", lambda s: {"damping": [0.02 * s.force / s.speed]}, ("damping",)),
@@ -82,7 +84,7 @@ CATALOGUE: tuple[Effect, ...] = (
     ),
     Effect(
         "asymmetric_friction",
-        lambda s: {"coulomb": [0.02 * s.force], "viscous": [0.02 * s.force / s.speed]},
+        _asymmetry,
         ("coulomb", "viscous"),
         equivalent={"offset_force": _SLIDING, "sensor_bias": _SHIFT, "sensor_gain": _GAIN},
     ),
@@ -127,17 +129,15 @@ CATALOGUE: tuple[Effect, ...] = (
         "sensor_bias",
         lambda s: {"bias": [0.01 * s.length]},
         ("bias",),
-        sensor=True,
         equivalent={"offset_force": _SHIFT, "asymmetric_friction": _SHIFT, "sensor_gain": _GAIN},
     ),
     Effect(
         "sensor_gain",
         lambda s: {"gain": [0.01]},
         ("gain",),
-        sensor=True,
         equivalent={"offset_force": _GAIN, "asymmetric_friction": _GAIN, "sensor_bias": _GAIN},
     ),
-    Effect("sensor_delay", lambda s: {"delay": [0.2 * s.interval]}, ("delay",), sensor=True),
+    Effect("sensor_delay", lambda s: {"delay": [0.2 * s.interval]}, ("delay",)),
 )
 
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
@@ -236,7 +236,7 @@ def _starts(effect: Effect, sizes: dict[str, list[float]], added: list[Free]) ->
         fitted = np.log(values) if key in effect.positive else np.array(values)
         choices.append([float(sign * value) for value in fitted for sign in signs])
     found = [np.array(values, float) for values in product(*choices)]
-    # two linear parameters: one sign of each and the opposite is enough
+    # two linear parameters: one sign of the first, both of the second
     return found[:2] if len(effect.linear) == 2 else found
 
 

@@ -55,14 +55,14 @@ class Ceiling:
         return min(self.families, key=lambda one: one.p)
 
 
-def ceiling(problem: Problem, fit: Fit, mass: float, inflation: float = 1.0) -> Ceiling:
+def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
     """Try every family on the residuals of a fit."""
     families = []
     for name, columns in _families(problem, fit, mass).items():
         gain, rank = _gain(fit, columns)
-        families.append(Family(name, gain, rank, float(chi2.sf(gain / inflation, rank)) if rank else 1.0))
+        families.append(Family(name, gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     gain, rank = _piecewise_gain(problem, fit, mass)
-    families.append(Family("pieces", gain, rank, float(chi2.sf(gain / inflation, rank)) if rank else 1.0))
+    families.append(Family("pieces", gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     return Ceiling(families)
 
 
@@ -102,14 +102,15 @@ def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int
 
 
 def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
-    state = motion(problem, fit)
+    state = scaled_motion(problem, fit)
+    good = problem.segments.inside & fit.good[:, None]
     x, v, phase, time = state["x"], state["v"], state["phase"], state["time"]
     sign = np.sign(v)
     one = np.ones_like(x)
     forces = {
-        "speed": _splines(v, 7),
-        "place": _splines(x, 7),
-        "speed and place": _products(_splines(v, 4), _splines(x, 4)),
+        "speed": _splines(v, good, 7),
+        "place": _splines(x, good, 7),
+        "speed and place": _products(_splines(v, good, 4), _splines(x, good, 4)),
         "time": np.stack(
             [time * f for f in (one, x, v, sign)] + [time**2 * f for f in (one, x, sign)], axis=2
         ),
@@ -121,8 +122,9 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
         )
         forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
     since = after_impacts(problem, fit)
-    if np.isfinite(since).sum() > 100:
-        forces["time since impact"] = _splines(since, 12)
+    known = good & np.isfinite(since)
+    if known.sum() > 100:
+        forces["time since impact"] = _splines(since, known, 12)
     made = {name: force_columns(problem, fit, values, mass) for name, values in forces.items()}
     kicks = impact_kicks(problem, fit, state)
     if kicks is not None:
@@ -130,7 +132,7 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     return made
 
 
-def motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
+def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
     """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
     inside = problem.segments.inside
     x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
@@ -145,14 +147,14 @@ def motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
         time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
         if prepared.frequency is not None:
             phase = np.zeros(inside.shape) if phase is None else phase
-            phase[rows] = prepared.phase + prepared.frequency * (stamps - prepared.origin)
+            phase[rows] = problem.crank_angle(number, fit.values, stamps)
     return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
 
 
 def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
-    """Changes of the speed after an impact: constant, with the speed before, its square, and with time."""
+    """Changes of the speed after an impact: a cubic of the speed before, and with time and its square."""
     before, at = _impacts(problem, fit)
-    if at.sum() < 4:
+    if np.count_nonzero(at) < 4:
         return None
     speed = before / state["speed"]
     scale = 0.1 * state["speed"]
@@ -162,10 +164,9 @@ def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
 
 
 def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Signed speed before the impact, and its direction after it, at the first sample after each impact."""
+    """Speed before the impact, and its direction after it, at the first sample after each impact."""
     inside = problem.segments.inside
     before, at = np.zeros(inside.shape), np.zeros(inside.shape)
-    times = None
     for number, impacts in enumerate(fit.evaluation.impacts):
         rows = np.flatnonzero(problem.segments.record == number)
         if impacts is None or not rows.size:
@@ -181,11 +182,9 @@ def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return before, at
 
 
-def _splines(values: np.ndarray, count: int) -> np.ndarray:
-    """Cubic B-splines over the middle 98 % of the values, knots at their quantiles."""
-    known = np.isfinite(values)
-    flat = values[known & (values != 0)]
-    inner = np.quantile(flat, np.linspace(0.01, 0.99, count - 2))
+def _splines(values: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
+    """Cubic B-splines over the middle 98 % of the `known` values, knots at their quantiles; 0 elsewhere."""
+    inner = np.quantile(values[known], np.linspace(0.01, 0.99, count - 2))
     inner += np.arange(inner.size) * 1e-9
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
     clipped = np.clip(np.where(known, values, knots[0]), knots[0], knots[-1])

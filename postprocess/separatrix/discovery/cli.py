@@ -8,13 +8,16 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.catalogue import BY_NAME
-from separatrix.discovery.extend import write_all
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import write_report
+from separatrix.discovery.results import FILES, replacing, require_writable, write_results
+from separatrix.discovery.wording import with_error
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import SeparatrixError
+from separatrix.errors import INTERRUPTED, SeparatrixError
 from separatrix.version import __version__
 
 
@@ -26,6 +29,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SeparatrixError as error:
         print(f"separatrix-discover: {error}", file=sys.stderr)
         return error.code
+    except KeyboardInterrupt:
+        print("separatrix-discover: interrupted, nothing was written", file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 
@@ -39,13 +45,20 @@ def _run(chosen: argparse.Namespace) -> None:
         candidates=chosen.effects and tuple(chosen.effects),
         progress=(lambda stage, done: None) if chosen.quiet else Progress(),
     )
+    require_writable(chosen.out)
     verdict, findings = investigate(chosen.base, chosen.records, chosen.hold_out, options, chosen.rest)
-    written = write_all(chosen.out, verdict, findings)
-    written += write_report(chosen.out, chosen.base, options)
+    with replacing(chosen.out) as draft:
+        write_results(draft, verdict, findings)
+        write_report(draft, chosen.base, options)
     for line in summary(verdict):
         print(line)
-    for path in written:
-        print(f"wrote {path}")
+    for path in (chosen.out / name for name in FILES):
+        if path.exists():
+            print(f"wrote {path}")
+
+
+# the report has the last tenth of the steps and takes about a third of the time
+_STEPS, _TIMES = (0.0, 0.9, 1.0), (0.0, 0.67, 1.0)
 
 
 class Progress:
@@ -56,8 +69,9 @@ class Progress:
         self.began = time.monotonic()
 
     def __call__(self, stage: str, done: float) -> None:
-        """Report that `stage` begins, `done` of the whole being over."""
+        """Report that `stage` begins, `done` of the steps being over."""
         passed = time.monotonic() - self.began
+        done = float(np.interp(done, _STEPS, _TIMES))
         left = f", about {passed * (1 - done) / done:.0f} s left" if done > 0.1 and passed > 1 else ""
         print(f"[{100 * done:3.0f} %] {stage} ({passed:.1f} s{left})", file=sys.stderr, flush=True)
 
@@ -74,8 +88,7 @@ def summary(verdict: dict) -> list[str]:
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):
-            unit = "" if found["unit"] == "1" else f" {found['unit']}"
-            lines.append(f"  {path} = {found['value']:.4g} +- {found['standard_error']:.2g}{unit}")
+            lines.append(f"  {path} = {with_error(found, 4)}")
     for use, gap in verdict["gap"].items():
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"
@@ -91,7 +104,8 @@ def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
-        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write.",
+        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write, "
+        "130 interrupted.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

@@ -12,7 +12,7 @@ from separatrix.discovery.machine import Free
 from separatrix.discovery.preflight import Prepared
 from separatrix.discovery.problem import Problem
 from separatrix.discovery.rescue import rescued, suspicious
-from separatrix.discovery.segments import Segments, cut, padded
+from separatrix.discovery.segments import Segments, cut
 from separatrix.discovery.smoother import Smoothed, smooth
 
 # lengths of the stages over that of the longest segments
@@ -28,7 +28,6 @@ class Data:
 
     prepared: list[Prepared]
     smoothed: list[Smoothed]
-    lengths: list[int]
     stages: list[Segments]
 
     @property
@@ -88,7 +87,7 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
         cut([one.record for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
         for share in STAGES
     ]
-    return Data(prepared, smoothed, lengths, stages)
+    return Data(prepared, smoothed, stages)
 
 
 def _correlation_samples(x: np.ndarray) -> int:
@@ -159,11 +158,8 @@ def polished(
 
 def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:
     """The machine fitted to the other segments, evaluated on all."""
-    segments = problem.segments
-    kept = np.setdiff1d(np.arange(segments.count), suspects)
-    others = padded(segments.record[kept], segments.first[kept], segments.last[kept])
-    part = Problem(problem.model, problem.prepared, others, problem.free)
-    found = minimise(part, fit.values, fit.starts[kept], most=most, fixed=fixed)
+    kept = np.setdiff1d(np.arange(problem.segments.count), suspects)
+    found = minimise(problem.of_segments(kept), fit.values, fit.starts[kept], most=most, fixed=fixed)
     starts = fit.starts.copy()
     starts[kept] = found.starts
     return minimise(problem, found.values, starts, most=0)

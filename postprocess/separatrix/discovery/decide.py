@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from separatrix.discovery.base import copy_noise, renew_noise
 from separatrix.discovery.catalogue import BY_NAME, candidate
 from separatrix.discovery.ceiling import Ceiling, ceiling
-from separatrix.discovery.data import fit_stages
+from separatrix.discovery.fit import minimise
 from separatrix.discovery.heldout import Prediction
 from separatrix.discovery.judge import (
     Judged,
@@ -19,13 +19,17 @@ from separatrix.discovery.judge import (
     stable,
 )
 from separatrix.discovery.machine import with_values
-from separatrix.discovery.refit import Fitted, refit
+from separatrix.discovery.misfit import missed
+from separatrix.discovery.refit import Fitted, refit, shared_values
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.screen import screen, signature
 
 _PAIRS = 6
-_INCLUSION = 0.9
-_HARM = -3.0
+# how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
+_RENEWALS = 3
+_LEADERS = 3
+_LOWER = 1.0
+_LOWER_SHARE = 0.01
 
 
 @dataclass
@@ -44,7 +48,6 @@ class Decision:
     equivalent: bool = False
     # whether nothing is left to name
     complete: bool = True
-    shares: list[float] = field(default_factory=list)
 
 
 def decide(bench: Bench, base: Fitted) -> Decision:
@@ -53,59 +56,75 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     bench.options.progress("looking for a gap", 0.15)
     gap = ceiling(base.problem, base.fit, bench.scales.mass)
     first = run_round(bench, base, foretold, 0.2, 0.6)
-    again = remeasured(bench, first)
-    if again is not None:
-        base = again
-        foretold = bench.foretell(base)
+    for _ in range(_RENEWALS):
+        lower = renewed(bench, first)
+        if lower is None:
+            break
+        base = lower
         gap = ceiling(base.problem, base.fit, bench.scales.mass)
-        first = run_round(bench, base, foretold, 0.6, 0.75)
+        first = run_round(bench, base, bench.foretell(base, first.foretold), 0.6, 0.75, first)
+    foretold = first.foretold
     decision = Decision("none", [], [], [], [first], gap, foretold)
     if not first.judged:
         return _without_name(bench, decision)
     best, rivals = leaders(bench, first)
-    pass_gates(bench, best, base, rivals, len(first.judged))
-    if not best.gates["detect"]:
+    pass_gates(bench, best, base, rivals, first.screened.tests)
+    if not (best.gates["detect"] and best.gates["stable"]):
+        # what a few segments carry is not detected
         return _without_name(bench, decision)
-    share = _ceiling_of(bench, best, base)
-    decision.shares.append(share)
+    _judge_ceiling(bench, best)
     if best.gates["adequate"]:
-        return _conclude(decision, best, rivals)
+        return _conclude(bench, decision, best, rivals)
     return _with_more(bench, decision, base, best, rivals)
 
 
-def remeasured(bench: Bench, first: Round) -> Fitted | None:
-    """The base fitted again where the best candidate shows that the noise is another."""
-    leaders = [one for one in first.judged if one.fitted.fit.converged]
-    if not leaders:
+def renewed(bench: Bench, first: Round) -> Fitted | None:
+    """The base fitted again where candidates show that the noise is another or that it was not at its best.
+
+    A candidate may have left a minimum that the base was caught in: what the base reaches from there is no
+    merit of the candidate.
+    """
+    base = first.base
+    lowest_misfit = sorted(first.judged, key=lambda one: -one.training)[:_LEADERS]
+    best = next((one for one in first.judged if one.fitted.fit.converged), None)
+    if best is None:
         return None
-    best = leaders[0].fitted
-    if not renew_noise(bench.training, best.problem, best.fit, bench.scales.mass):
-        return None
-    if bench.held_out is not None and leaders[0].prediction is not None:
-        held = leaders[0].prediction
+    changed = renew_noise(bench.training, best.fitted.problem, best.fitted.fit, bench.scales.mass)
+    if bench.held_out is not None and best.prediction is not None and changed:
+        held = best.prediction
         renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
         copy_noise(bench.training, bench.held_out)
-    base = first.base
-    free = with_values(base.problem.free, base.fit.values)
-    stages = [bench.training.last]
-    problem, fit = fit_stages(bench.training, base.model, free, base.fit.values, stages=stages, most=30)
-    return Fitted(base.names, base.model, problem, fit, base.added)
+    fits = [minimise(base.problem, base.fit.values, base.fit.starts)]
+    for one in lowest_misfit:
+        values = shared_values(base, one.fitted)
+        fits.append(minimise(base.problem, values, one.fitted.fit.starts))
+    fits = [fit for fit in fits if fit.good.sum() >= fits[0].good.sum()]
+    lowest = min(fits, key=lambda fit: fit.total)
+    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * best.training):
+        return None
+    return Fitted(base.names, base.model, base.problem, lowest, base.added)
 
 
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    converged = [one for one in found.judged if one.fitted.fit.converged and admissible(one, found.base)[0]]
-    return foremost(converged or found.judged, bench.options.separation)
+    able = [one for one in found.judged if admissible(one, found.base, bench.options)[0]]
+    return foremost(able or found.judged, bench.options.separation)
 
 
 def foremost(pool: list[Judged], separation: float) -> tuple[Judged, list[Judged]]:
-    """Return the candidate of most evidence, and those that it does not beat clearly for its misfit."""
-    best, *others = sorted(pool, key=lambda one: -one.evidence)
+    """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
+
+    A fit that has not converged may not be named, but what it gained so far may stand against a name.
+    """
+    order = sorted(pool, key=lambda one: -one.evidence)
+    best = next((one for one in order if one.fitted.fit.converged), order[0])
     scale = max(1.0, best.fitted.fit.reduced_chi2)
-    return best, [one for one in others if best.evidence - one.evidence < separation * scale]
+    return best, [
+        one for one in order if one is not best and best.evidence - one.evidence < separation * scale
+    ]
 
 
-def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: int) -> None:
+def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
     """Set the p value of a candidate and every gate but the adequacy."""
     options = bench.options
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
@@ -114,45 +133,50 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
         helps = any(low > 0 for low, _ in bounds)
-        best.gates["hold-out"] = bool(helps and all(high > _HARM for _, high in bounds))
+        best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
     best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best, base)[0]
-    best.gates["stable"] = stable(best, base, options) >= _INCLUSION
+    best.gates["admissible"] = admissible(best, base, options)[0]
+    best.gates["stable"] = stable(best, base, options) >= options.inclusion
 
 
-def _ceiling_of(bench: Bench, one: Judged, base: Fitted) -> float:
+def _judge_ceiling(bench: Bench, one: Judged) -> None:
     one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
-    one.gates["adequate"], share = adequate(one, base, bench.options)
-    return share
+    one.gates["adequate"] = adequate(one, bench.options)
 
 
-def _conclude(decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
+def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
     """A name, if every gate is passed; else what it could be."""
-    decision.accepted = [best]
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
+    if not (best.gates["admissible"] and best.gates["converged"]):
+        return _without_name(bench, decision)
+    decision.accepted = [best]
     decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
-    if failed == []:
-        decision.outcome = "named"
-    elif failed == ["separate"] or rivals:
-        decision.outcome = "ambiguous"
-        decision.equivalent = all(_equivalent(decision, best, one) for one in rivals)
-    elif best.gates["admissible"] and best.gates["converged"]:
-        decision.outcome = "ambiguous"
-    else:
-        decision.outcome = "not-in-catalogue"
-        decision.accepted, decision.alternatives = [], []
+    decision.outcome = "ambiguous" if failed else "named"
+    decision.equivalent = bool(rivals) and all(_equivalent(best, one) for one in rivals)
     return decision
 
 
-def _equivalent(decision: Decision, one: Judged, other: Judged) -> bool:
-    return other.name in BY_NAME[one.name].equivalent
+def _equivalent(one: Judged, other: Judged) -> bool:
+    """Whether what two fits do not share is two names of the same motion."""
+    mine, theirs = set(one.fitted.names), set(other.fitted.names)
+    left, right = mine - theirs, theirs - mine
+    return len(left) == len(right) == 1 and right.pop() in BY_NAME[left.pop()].equivalent
 
 
 def _without_name(bench: Bench, decision: Decision) -> Decision:
     """Nothing in the catalogue helps: either there is no gap, or the catalogue lacks what makes it."""
-    if decision.base_ceiling.p < 0.3 * bench.options.detection_level:
+    fits = [(bench.training, decision.rounds[0].base)]
+    if bench.held_out is not None and decision.foretold is not None:
+        fits.append((bench.held_out, decision.foretold))
+    left = [one for data, fitted in fits for one in missed(data, fitted.fit, bench.options)]
+    if left:
+        decision.outcome = "not-in-catalogue"
+        decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
+    elif fits[0][1].fit.reduced_chi2 > bench.options.adequate_chi2:
+        decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
+    if decision.base_ceiling.p < bench.options.gap_share * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
             f"forces that depend on {decision.base_ceiling.best.name} would explain more, no effect does"
@@ -176,22 +200,22 @@ def _with_more(
             if made is not None:
                 pairs.append(over_base(bench, base, decision.foretold, made))
                 tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if one.fitted.fit.converged and admissible(one, base)[0]]
+    pairs = [one for one in pairs if admissible(one, base, bench.options)[0]]
     if not pairs:
         return _give_up(decision)
     pair, close = foremost(pairs, bench.options.separation)
-    pass_gates(bench, pair, base, close, len(second.judged))
+    pass_gates(bench, pair, base, close, second.screened.tests)
     # both must be needed: each over the other alone
+    needed = bench.options.needed * bench.options.separation
     singles = {one.name: one for one in decision.rounds[0].judged}
     for name in pair.fitted.names:
         others = [other for other in pair.fitted.names if other != name]
         without = singles.get(others[0]) if len(others) == 1 else None
-        if without is not None and pair.evidence - without.evidence < 2 * bench.options.separation:
+        if without is not None and pair.evidence - without.evidence < needed:
             pair.gates["drop"] = False
-    share = _ceiling_of(bench, pair, base)
-    decision.shares.append(share)
+    _judge_ceiling(bench, pair)
     if pair.gates["adequate"] and pair.gates.get("drop", True):
-        return _conclude(decision, pair, close)
+        return _conclude(bench, decision, pair, close)
     return _give_up(decision)
 
 

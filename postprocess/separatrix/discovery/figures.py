@@ -99,7 +99,7 @@ def ranking(verdict: dict) -> Figure | None:
         Line2D([], [], linestyle="", marker="s", color=AFTER, markerfacecolor="none", label="training"),
         Line2D([], [], linestyle="", marker="o", color=BEFORE, markersize=3, label="held out"),
     ]
-    right.legend(handles=handles, loc="lower right", frameon=True, edgecolor="none", framealpha=0.8)
+    figure.legend(handles=handles, loc="outside upper right", ncols=2)
     for letter, ax in zip("ab", (left, right), strict=True):
         ax.set_title(f"{letter})", loc="left")
     return figure
@@ -138,7 +138,9 @@ def _symlog(ax: Axes, name: str, threshold: float, largest: float, most: int = 3
     getattr(ax, f"set_{name}scale")("symlog", linthresh=threshold, linscale=0.8)
     decades = np.log10(max(largest / threshold, 1))
     step = max(1, int(np.ceil(decades / most)))
-    powers = np.arange(np.ceil(np.log10(threshold)), np.log10(max(largest, 1.0)) + 1e-9, step)
+    # many decades: the first label is so far from 0 as from the next
+    lowest = np.ceil(np.log10(threshold)) + step - 1
+    powers = np.arange(lowest, np.log10(max(largest, 1.0)) + 1e-9, step)
     ticks = 10.0**powers
     getattr(ax, f"set_{name}ticks")([*-ticks[::-1], 0, *ticks], minor=False)
     getattr(ax, f"{name}axis").set_minor_locator(NullLocator())

@@ -16,8 +16,12 @@ from separatrix.discovery.problem import Evaluation, Problem
 
 _HUBER = 1.5
 _TOLERANCE = 0.02
+_NEAR = 0.25
 _TINY = 1e-12
 _STRONGEST = 1e8
+_FINE = 0.03
+# steps in a row that gain next to nothing before a fit is left as it is
+_STALLS = 3
 
 
 @dataclass
@@ -35,11 +39,9 @@ class Reduced:
     matrix: np.ndarray
     gradient: np.ndarray
 
-    def total(self, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Sum over the segments, each counted `weights` times."""
-        if weights is None:
-            return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
-        return np.tensordot(weights, self.matrix, 1), np.tensordot(weights, self.gradient, 1)
+    def total(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sum over the segments."""
+        return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
 
 
 @dataclass
@@ -55,11 +57,15 @@ class Fit:
     decrement: float
     iterations: int
     at_bound: np.ndarray
+    movable: np.ndarray
+    # in a minimum that is known not to be the lowest
+    caught: bool = False
 
     @property
     def converged(self) -> bool:
-        """Certificate: no step is left that would matter."""
-        return bool(self.decrement < max(0.1, 1e-4 * self.total) and np.isfinite(self.decrement))
+        """Certificate: along every direction the minimum is within half a standard error."""
+        small = self.decrement < max(_NEAR, 1e-4 * self.total) and np.isfinite(self.decrement)
+        return bool(small and self.good.any() and not self.caught)
 
     @property
     def good(self) -> np.ndarray:
@@ -81,6 +87,12 @@ class Fit:
     def reduced_chi2(self) -> float:
         """Sum of squares per degree of freedom."""
         return self.total / max(1, self.freedom)
+
+    def like_noise(self, deviations: float) -> bool:
+        """Whether chi^2 is what noise alone would leave, within so many standard deviations or 3 %."""
+        if self.freedom <= 0:
+            return False
+        return self.reduced_chi2 < 1 + max(_FINE, deviations * np.sqrt(2 / self.freedom))
 
 
 def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:
@@ -160,8 +172,7 @@ def minimise(
     values = np.clip(values, lower, upper)
     damping = 1e-4
     current = problem.evaluate(values, starts)
-    decrement, iterations = np.inf, 0
-    open_ = movable
+    iterations = stalled = 0
     while iterations < most:
         iterations += 1
         weights, scale = _weights(current, robust)
@@ -189,33 +200,33 @@ def minimise(
         values, starts = tried, starts + start_step
         damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
         current = problem.evaluate(values, starts)
-        if gain < tolerance:
-            decrement = min(decrement, gain)
+        stalled = stalled + 1 if gain < tolerance else 0
+        if stalled > _STALLS:
             break
         if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():
             mean = before[both].sum() / max(1, current.used[both].sum())
             if mean > hopeless:
                 break
-    return _finished(problem, values, starts, current, decrement, iterations, ~_open_at(values, lower, upper))
+    return _finished(problem, values, starts, current, movable, iterations)
 
 
 def again(problem: Problem, fit: Fit) -> Fit:
     """The same values and starts, evaluated with the noise as it is known now."""
     current = problem.evaluate(fit.values, fit.starts)
-    return _finished(problem, fit.values, fit.starts, current, fit.decrement, fit.iterations, fit.at_bound)
+    return _finished(problem, fit.values, fit.starts, current, fit.movable, fit.iterations)
 
 
-def _finished(problem, values, starts, current, decrement, iterations, at_bound) -> Fit:
+def _finished(problem, values, starts, current, movable, iterations) -> Fit:
+    lower = np.array([one.lower for one in problem.free])
+    upper = np.array([one.upper for one in problem.free])
     weights = _weights(current, robust=False)[0]
     blocks = blocks_of(current.by_start, current.by_parameter, current.residual, weights)
+    _, _, decrement = gauss_newton_step(blocks, _open(blocks, values, lower, upper, movable))
+    at_bound = (values <= lower) | (values >= upper)
     reduced, _, _ = eliminate(blocks)
     chi2 = np.sum(current.used * current.residual**2, axis=1)
     counts = current.used.sum(axis=1)
-    return Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound)
-
-
-def _open_at(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    return (values > lower) & (values < upper)
+    return Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound, movable)
 
 
 def _open(

@@ -5,6 +5,9 @@
 Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its
 clock. The score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted
 parameters.
+
+Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
+forgiven more; what is held against such a machine is compared by squared errors alone.
 """
 
 from dataclasses import dataclass
@@ -12,9 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
-from separatrix.discovery.fit import Fit
-from separatrix.discovery.machine import Free, record_nuisances
+from separatrix.discovery.fit import Fit, minimise
+from separatrix.discovery.machine import Free, on_other_records
 from separatrix.discovery.problem import Problem
+
+# reduced chi^2 above which errors of the machine are larger than the noise
+_MISFIT = 1.5
 
 
 @dataclass
@@ -27,6 +33,8 @@ class Prediction:
     problem: Problem
     fit: Fit
     shared: int
+    # reduced chi^2 of the training records, at least 1
+    misfit: float
 
     @property
     def reduced_chi2(self) -> float:
@@ -36,18 +44,44 @@ class Prediction:
         return float(self.fit.chi2[good].sum() / max(1, freedom))
 
 
-def predict(data: Data, model, free: list[Free], values: np.ndarray, covariance: np.ndarray) -> Prediction:
-    """Score held-out records by the machine with `values`, known up to `covariance`."""
+def predict(
+    data: Data,
+    model,
+    free: list[Free],
+    values: np.ndarray,
+    covariance: np.ndarray,
+    misfit: float = 1.0,
+    guess: np.ndarray | None = None,
+) -> Prediction:
+    """Score held-out records by the machine with `values`, known up to `covariance`, of the given `misfit`.
+
+    `guess`: starts of segments that another machine found there, tried too.
+    """
     shared = [i for i, one in enumerate(free) if one.record is None]
-    own = record_nuisances([one.phase_known for one in data.prepared]) if data.prepared[0].frequency else []
-    whole = [free[i] for i in shared] + own
-    start = np.concatenate([values[shared], np.zeros(len(own))])
+    whole = on_other_records(free, data.prepared)
+    start = np.concatenate([values[shared], np.zeros(len(whole) - len(shared))])
     fixed = np.arange(len(whole)) < len(shared)
     problem, fit = _fit_own(data, model, whole, start, fixed)
+    if guess is not None:
+        other = minimise(problem, fit.values, guess, most=12, fixed=fixed)
+        if other.good.sum() >= fit.good.sum() and other.total < fit.total:
+            fit = other
     used = covariance[np.ix_(shared, shared)]
-    return Prediction(
-        _scores(fit, used, len(shared)), fit.good, problem.segments.record, problem, fit, len(shared)
-    )
+    score = _scores(fit, used, len(shared))
+    return Prediction(score, fit.good, problem.segments.record, problem, fit, len(shared), misfit)
+
+
+def gained(one: Prediction, other: Prediction) -> np.ndarray:
+    """What `one` foretells better than `other` by segment, in units of log density; 0 where one fails.
+
+    The difference of the scores. Where the `other` misses the records by far more than the noise, its density
+    means nothing, and it is the difference of squared errors (the comparison of Diebold and Mariano), both
+    machines taken as fitted. The machine that all candidates are held against chooses the measure, so that
+    what they gain can be compared.
+    """
+    wrong = other.misfit > _MISFIT
+    parts = 0.5 * (other.fit.chi2 - one.fit.chi2) if wrong else one.score - other.score
+    return np.where(one.good & other.good, parts, 0.0)
 
 
 def _fit_own(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evidence of the candidates and the five gates that a name has to pass."""
+"""Evidence of the candidates and the gates that a name has to pass."""
 
 from dataclasses import dataclass, field
 
@@ -8,13 +8,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from separatrix.discovery.ceiling import Ceiling
-from separatrix.discovery.heldout import Prediction
+from separatrix.discovery.heldout import Prediction, gained
 from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, gain_over
 
 _BLOCKS = 2
-# share of the base's segments that a candidate must be able to follow
-_FOLLOWED = 0.9
 
 
 @dataclass
@@ -49,25 +47,24 @@ def judged(
     training, _ = gain_over(fitted, base)
     parts = np.zeros(0)
     if prediction is not None:
-        both = prediction.good & foretold.good
-        parts = np.where(both, prediction.score - foretold.score, 0.0)
+        parts = gained(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
     return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
 
 
-def detection(one: Judged, tested: int, inflation: float) -> float:
-    """Family-wise p value of what a candidate gained, for as many candidates as were tested."""
+def detection(one: Judged, tested: float, inflation: float) -> float:
+    """Family-wise p value of what a candidate gained, for candidates worth so many independent tests."""
     single = chi2.sf(max(0.0, 2 * (one.training + one.held_out)) / inflation, one.parameters)
     return float(-np.expm1(tested * np.log1p(-min(single, 1 - 1e-16))))
 
 
 def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
-    """Lower and upper 5 % bound of the score gained in each held-out record, by block bootstrap."""
+    """Lower and upper 5 % bound of the gain in each held-out record, over the misfit, by block bootstrap."""
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
     for number in np.unique(one.prediction.record):
         parts = one.held_out_parts[one.prediction.record == number]
-        sums = _block_sums(parts, random, options.bootstraps)
+        sums = _block_sums(parts / one.prediction.misfit, random, options.bootstraps)
         bounds[int(number)] = (float(np.quantile(sums, 0.05)), float(np.quantile(sums, 0.95)))
     return bounds
 
@@ -94,7 +91,7 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     return float(np.mean(sums > one.parameters))
 
 
-def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
+def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     """Signs and bounds: the effect is inside of its own, is not nothing, and leaves the drive sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
     errors = np.sqrt(np.diag(one.fitted.covariance))
@@ -106,25 +103,26 @@ def admissible(one: Judged, base: Fitted) -> tuple[bool, str]:
         # the logarithm of a number says by its error whether the number is known at all
         size = 1.0 if free[i].positive else abs(fit.values[i])
         clear.append(size > 1.96 * errors[i] > 0)
-    if fit.good.sum() < _FOLLOWED * max(1, base_good):
+    if fit.good.sum() < options.followed * max(1, base_good):
         return False, "the machine with it cannot follow some segments that the base can"
     if not clear:
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear):
         return False, "its 95 % intervals contain zero"
-    fastest = float(np.abs(fit.evaluation.v[fit.good]).max(initial=0))
+    usual = float(np.sqrt(np.mean(fit.evaluation.v[fit.good] ** 2))) if fit.good.any() else 0.0
+    lowest, highest = options.drive_scales
     for i, value in enumerate(fit.values):
-        if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > fastest:
-            return False, "its velocity is beyond all speeds of the records, where it is Coulomb friction"
-        if free[i].path == "nuisance:drive_scale" and not 0.5 < value < 2:
+        if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
+            return False, "its velocity is above the usual speed, where it is Coulomb friction"
+        if free[i].path == "nuisance:drive_scale" and not lowest < value < highest:
             return False, f"it would need a drive {value:.3g} times the stated one"
     return True, ""
 
 
-def adequate(one: Judged, base: Fitted, options: Options) -> tuple[bool, float]:
-    """Whether what is left is noise, and the share of the closable gap that is closed."""
+def adequate(one: Judged, options: Options) -> bool:
+    """Whether what is left is noise, or little of a gap that was closed nearly all."""
     gained = max(0.0, 2 * one.training)
     share = gained / max(gained + one.ceiling.closable, 1e-300)
     clean = one.ceiling.p > options.detection_level
-    small = one.fitted.fit.reduced_chi2 <= options.adequate_chi2
-    return bool(small and (clean or (share >= options.adequate_share and one.ceiling.p > 1e-4))), share
+    closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
+    return bool(one.fitted.fit.reduced_chi2 <= options.adequate_chi2 and (clean or closed))

@@ -14,6 +14,9 @@ from separatrix.discovery.screen import screen, signature
 _LADDER = 4.0 ** np.arange(-3, 4)
 _RATIOS = np.linspace(0.6, 1.5, 19)
 _PERIODS = 3
+_STEPS = 60
+# usual sizes (some per cent of the machine's own) up to which a linearised size is told
+_BELIEVED = 100.0
 _ADVICE = {
     frozenset(
         ("offset_force", "asymmetric_friction")
@@ -34,22 +37,30 @@ _ADVICE = {
 
 
 def detectable(bench: Bench, found: Round) -> dict[str, dict]:
-    """Smallest size of each effect that these records would have shown at `visible` standard errors."""
+    """Smallest size of each effect that these records would have shown at `visible` standard errors.
+
+    None, with a reason, where no size can be told.
+    """
     sizes = {}
     for name, made in found.candidates.items():
         if name not in found.screened.names:
             continue
         path = made.free[made.added[0]].path
         unit = made.model.parameters[path].unit
-        if found.screened.live[name][:1].any():
-            size = (
-                bench.options.visible * float(found.screened.error[name][0]) * made.free[made.added[0]].size
-            )
+        reason = ""
+        if not found.screened.seen(name):
+            size, reason = None, "the base machine can imitate it"
+        elif found.screened.live[name][:1].any():
+            usual = made.free[made.added[0]].size
+            size = bench.options.visible * float(found.screened.error[name][0]) * usual
+            if size > _BELIEVED * usual:
+                size, reason = None, "the base machine can all but imitate it"
         elif not made.linear.any() and not bench.options.quick:
             size = _by_ladder(bench, found, made)
+            reason = "" if size is not None else "no size that was tried stands out so much"
         else:
             continue
-        sizes[name] = {"size": size, "path": path, "unit": unit}
+        sizes[name] = {"size": size, "path": path, "unit": unit, "reason": reason}
     return sizes
 
 
@@ -94,7 +105,7 @@ def separating_experiment(bench: Bench, one: Fitted, others: list[Fitted]) -> st
     if not others or bench.training.prepared[0].frequency is None:
         return ""
     other = others[0]
-    apart = [_distance(bench, one, other, float(ratio)) for ratio in _RATIOS]
+    apart = [distance(one, other, one.model.drive_frequency({"drive.ratio": float(r)})) for r in _RATIOS]
     if not np.isfinite(apart).any():
         return ""
     best = int(np.nanargmax(apart))
@@ -108,18 +119,27 @@ def _label(fitted: Fitted) -> str:
     return " with ".join(fitted.names)
 
 
-def _distance(bench: Bench, one: Fitted, other: Fitted, ratio: float) -> float:
-    """Root mean square of the difference of two machines over some periods from the starts of the records."""
-    starts = one.fit.starts[:: max(1, one.fit.starts.shape[0] // 12)]
+def distance(one: Fitted, other: Fitted, frequency: float) -> float:
+    """Root mean square of the difference of two machines [m] at a drive frequency [rad/s].
+
+    Over some periods, from starts and crank angles of the records; the drive is that of the first record.
+    """
+    rows = np.arange(0, one.fit.starts.shape[0], max(1, one.fit.starts.shape[0] // 12))
+    segments, prepared = one.problem.segments, one.problem.prepared
+    angles = [
+        one.problem.crank_angle(r, one.fit.values, float(prepared[r].record.t[first]))
+        for r, first in zip(segments.record[rows], segments.first[rows], strict=True)
+    ]
+    start = np.column_stack([one.fit.starts[rows], angles])
+    times = np.tile(np.linspace(0, _PERIODS * 2 * np.pi / frequency, _STEPS), rows.size)
+    first = np.arange(rows.size + 1) * _STEPS
     seen = []
     for fitted in (one, other):
-        values = fitted.problem.machine_values(0, fitted.fit.values) | {"drive.ratio": ratio}
-        period = 2 * np.pi / fitted.model.drive_frequency(values)
-        times = np.tile(np.linspace(0, _PERIODS * period, 60), len(starts))
-        state = np.column_stack([starts, np.zeros(len(starts))])
-        first = np.arange(len(starts) + 1) * 60
+        values = fitted.problem.machine_values(0, fitted.fit.values)
+        # the ratio is one to the natural frequency of each machine
+        values["drive.ratio"] *= frequency / fitted.model.drive_frequency(values)
         flown = fitted.model.segments(
-            list(values), np.array(list(values.values())), state, first, times, derivatives=False
+            list(values), np.array(list(values.values())), start, first, times, derivatives=False
         )
         seen.append(flown.x)
     difference = seen[0] - seen[1]

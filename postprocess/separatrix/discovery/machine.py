@@ -64,7 +64,7 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
         lower, upper = bounds_of(parameter)
         if path.endswith(_NEVER_ZERO):
             lower = max(lower, 1e-3 * value)
-        free.append(Free(path, value, lower, upper, _size(path, value, model)))
+        free.append(Free(path, value, lower, upper, abs(value) or 1.0))
     return free
 
 
@@ -87,10 +87,6 @@ def bounds_of(parameter) -> tuple[float, float]:
     lower = -np.inf if parameter.lower is None or parameter.lower < -_UNBOUNDED else float(parameter.lower)
     upper = np.inf if parameter.upper is None or parameter.upper > _UNBOUNDED else float(parameter.upper)
     return lower, upper
-
-
-def _size(path: str, value: float, model) -> float:
-    return abs(value) if value else 1.0
 
 
 def drive_amplitudes(model) -> dict[str, float]:
@@ -118,6 +114,14 @@ def record_nuisances(phase_known: list[bool]) -> list[Free]:
         Free("nuisance:phase", 0.0, size=0.01, record=i) for i, known in enumerate(phase_known) if not known
     ]
     return free + [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(len(phase_known))]
+
+
+def on_other_records(free: list[Free], prepared: list) -> list[Free]:
+    """What is free on other records: what `free` has for all of them, and what each record has of its own."""
+    shared = [one for one in free if one.record is None]
+    if not prepared[0].frequency:
+        return shared
+    return shared + record_nuisances([one.phase_known for one in prepared])
 
 
 def with_values(free: list[Free], values: np.ndarray) -> list[Free]:

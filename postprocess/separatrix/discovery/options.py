@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user may choose, and the thresholds of the decision in one place."""
+"""What a user may choose, and the thresholds of the gates; partial.py has those of names in part alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,11 +26,28 @@ class Options:
     candidates: tuple[str, ...] | None = None
     # family-wise error of the detection
     detection_level: float = 0.01
-    # log-likelihood by which a name must beat the next one
+    # of that error, the share for a gap that no effect closes: a flexible force is tried beside all effects
+    gap_share: float = 0.3
+    # log-likelihood by which a name must beat the next one: odds of 20 to 1
     separation: float = 3.0
+    # the same for a pair over each of its effects alone, over `separation`: pairs are chosen among many
+    needed: float = 2.0
+    # log score that a held-out record may lose by a name: as much as separates two names
+    harm: float = -3.0
+    # share of block bootstraps in which an effect has to pay for its parameters
+    inclusion: float = 0.9
+    # share of the segments of the base that the machine with the effect must follow too: losing more would
+    # pass for a gain
+    followed: float = 0.9
+    # scales of the drive beyond which it would be another drive
+    drive_scales: tuple[float, float] = (0.5, 2.0)
     # largest reduced chi^2 and smallest share of the closable gap of an adequate model
     adequate_chi2: float = 1.1
+    # reduced chi^2 above which a record of unstated noise is missed: that noise is an estimate
+    missed_chi2: float = 2.0
     adequate_share: float = 0.8
+    # p value of what is left below which no share is enough
+    adequate_p: float = 1e-4
     # size of what counts as visible, in standard errors
     visible: float = 5.0
     bootstraps: int = 400

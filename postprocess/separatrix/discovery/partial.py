@@ -4,27 +4,40 @@
 
 The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by
 one (the first two together, if only that helps) as long as each passes every gate but the adequacy, which
-here is not to be had; the verdict says that it is not complete.
+here is not to be had; the verdict says that it is not complete. Among wrong machines everything is
+significant in training, so held-out records choose: of the candidates that foretell no worse than the best,
+the one with the fewest parameters is taken, and each effect must close a share of the gap there that no
+other effect closes.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decide import Decision, fit_pair, foremost, leaders, over_base, pass_gates
-from separatrix.discovery.judge import Judged, admissible
+from separatrix.discovery.ceiling import ceiling
+from separatrix.discovery.decide import Decision, decide, fit_pair, over_base, pass_gates
+from separatrix.discovery.judge import Judged, adequate, admissible, held_out_bounds, judged
+from separatrix.discovery.options import Options
+from separatrix.discovery.refit import Fitted
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 
 _PAIRS = 12
+_LEADERS = 2
+# share of what free forces close that a force of one thing must close to be most of it
+_MOST = 0.5
+# share of the gap on held-out records that an effect must close to be worth a name
+_LEAST = 0.1
 
 
-def name_in_part(bench: Bench, decision: Decision) -> Decision:
-    """Return the decision with the effects that help on every record, though more is missing."""
+def decide_in_part(bench: Bench, base: Fitted) -> Decision:
+    """Return the strict decision on one effect, else the effects that help though more is missing."""
+    decision = decide(replace(bench, options=replace(bench.options, most_effects=1)), base)
+    if decision.outcome != "not-in-catalogue":
+        return decision
     base = decision.rounds[0].base
     rounds = decision.rounds[:1]
-    accepted = _next(bench, rounds[0])
-    if accepted is None:
-        accepted = _pair(bench, rounds[0])
+    accepted = _first(bench, rounds[0])
     last = None
     while accepted is not None:
         last = accepted
@@ -32,49 +45,176 @@ def name_in_part(bench: Bench, decision: Decision) -> Decision:
             break
         rounds.append(run_round(bench, last.fitted, last.prediction, 0.9, 0.98))
         accepted = _next(bench, rounds[-1])
+        if accepted is not None and not _all_needed(bench, rounds[0], accepted):
+            accepted = None
     if last is None:
         return decision
     whole = over_base(bench, base, rounds[0].foretold, last)
     whole.gates, whole.p = last.gates, last.p
+    whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
+    complete = adequate(whole, bench.options)
+    whole.gates["adequate"] = complete
     return replace(
         decision,
         outcome="named",
-        complete=False,
+        complete=complete,
         accepted=[whole],
         alternatives=[],
         rivals=[],
         rounds=rounds,
-        reasons=[*decision.reasons, "named in part: what is left is not in the catalogue"],
+        reasons=[] if complete else remaining(bench, whole),
     )
+
+
+def remaining(bench: Bench, whole: Judged) -> list[str]:
+    """What is left of the gap with the named effects, in words, by use of the records."""
+    said = ["named in part: what is left is not in the catalogue"]
+    fits = [("fitted", bench.training, whole.fitted, whole.fitted.fit.reduced_chi2)]
+    if whole.prediction is not None:
+        fits.append(("held-out", bench.held_out, whole.prediction, whole.prediction.reduced_chi2))
+    for use, data, found, left in fits:
+        families = ceiling(found.problem, found.fit, bench.scales.mass).families
+        free = next(one for one in families if one.name == "pieces")
+        best = max((one for one in families if one is not free), key=lambda one: one.gain)
+        names = ", ".join(one.record.name for one in data.prepared)
+        what = (
+            f"forces that depend on {best.name} would close most of it"
+            if best.gain > _MOST * free.gain
+            else "no force that depends on speed, place and time alone closes most of it, "
+            "as where the body or its drive is flexible"
+        )
+        said.append(f"a gap remains on the {use} record {names}, reduced chi^2 {left:.4g}: {what}")
+    return said
+
+
+def nearest(bench: Bench, decision: Decision) -> list[str]:
+    """Say which single effect passes where the strict decision names none."""
+    if decision.outcome != "not-in-catalogue":
+        return []
+    found = _next(bench, decision.rounds[0])
+    said = "passes every gate but the adequacy; --partial names what helps though a gap remains"
+    return [f"{found.name} {said}"] if found else []
 
 
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
-    if not found.judged:
-        return None
-    best, rivals = leaders(bench, found)
-    pass_gates(bench, best, found.base, rivals, len(found.judged))
-    return best if all(best.gates.values()) else None
+    pool = [one for one in found.judged if settled(one) and admissible(one, found.base, bench.options)[0]]
+    return _passing(bench, found, pool)
+
+
+def _first(bench: Bench, found: Round) -> Judged | None:
+    """One effect, or two where together they foretell clearly better than the one."""
+    single, pair = _next(bench, found), _pair(bench, found)
+    if single is None or pair is None:
+        return single or pair
+    return pair if _adds(pair, single, bench.options) else single
 
 
 def _pair(bench: Bench, found: Round) -> Judged | None:
     """Two effects that pass only together: each alone drives the base to where it should not be."""
-    pairs = []
+    seconds = []
+    for one in [one for one in found.judged if settled(one)][:_LEADERS]:
+        # some effects need another one: presliding needs dry friction
+        seconds.append(run_round(bench, one.fitted, one.prediction, 0.9, 0.95))
+    singles = [one for second in seconds for one in second.judged]
+    pairs = [over_base(bench, found.base, found.foretold, one) for one in singles]
+    tried = {frozenset(one.fitted.names) for one in pairs}
     for _, one, other in pair_gains(found)[:_PAIRS]:
+        if frozenset((one, other)) in tried:
+            continue
         fitted = fit_pair(bench, found, one, other)
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found)]
-    if not pairs:
-        return None
-    best, close = foremost(pairs, bench.options.separation)
-    pass_gates(bench, best, found.base, close, len(pairs))
-    return best if all(best.gates.values()) else None
+    pairs = [one for one in pairs if settled(one) and _both_clear(one, found, bench.options)]
+    best = _passing(bench, found, pairs)
+    return best if best is not None and _all_needed(bench, found, best) else None
 
 
-def _both_clear(pair: Judged, found: Round) -> bool:
+def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
     """Whether every parameter of both effects is inside its bounds and differs from nothing."""
     fit = pair.fitted.fit
     errors = np.sqrt(np.diag(pair.fitted.covariance))
     clear = [not fit.at_bound[i] and abs(fit.values[i]) > 1.96 * errors[i] for i in pair.fitted.added]
-    return all(clear) and admissible(pair, found.base)[0]
+    return all(clear) and admissible(pair, found.base, options)[0]
+
+
+def settled(one: Judged) -> bool:
+    """Whether a further step promises less than one residual: what sticks has kinks where no step fits."""
+    fit = one.fitted.fit
+    return fit.converged or fit.decrement < fit.reduced_chi2
+
+
+def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
+    """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
+    if not pool:
+        return None
+    best, rivals = preferred(pool, bench.options)
+    # the strict decision may have asked for it
+    best.gates.pop("adequate", None)
+    pass_gates(bench, best, found.base, rivals, found.screened.tests)
+    best.gates["converged"] = settled(best)
+    best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
+    return best if all(best.gates.values()) else None
+
+
+def preferred(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
+    """Return the simplest candidate that foretells no worse than the best, and those as simple and good."""
+    leader = max(pool, key=lambda one: one.evidence)
+    close = [leader, *(one for one in pool if one is not leader and not _clearly(leader, one, options))]
+    fewest = min(one.parameters for one in close)
+    simple = [one for one in close if one.parameters == fewest]
+    best = max(simple, key=lambda one: one.evidence)
+    scale = options.separation * best.fitted.fit.reduced_chi2
+    return best, [one for one in simple if one is not best and best.evidence - one.evidence < scale]
+
+
+def _clearly(one: Judged, other: Judged, options: Options) -> bool:
+    """Whether `one` foretells a held-out record better than `other` by more than chance."""
+    if one.prediction is None:
+        return one.evidence - other.evidence > options.separation * one.fitted.fit.reduced_chi2
+    over = judged(other.fitted, other.prediction, one.fitted, one.prediction)
+    return any(low > 0 for low, _ in held_out_bounds(over, options).values())
+
+
+def _adds(one: Judged, other: Judged, options: Options) -> bool:
+    """Whether `one` foretells better than `other` by more than chance and by enough."""
+    closes = one.prediction is None or _closes(other.prediction.reduced_chi2, one.prediction.reduced_chi2)
+    return closes and _clearly(one, other, options)
+
+
+def worth_a_name(one: Judged, found: Round) -> bool:
+    """Whether a candidate closes enough of the gap that its base leaves on held-out records."""
+    return one.prediction is None or _closes(found.foretold.reduced_chi2, one.prediction.reduced_chi2)
+
+
+def _closes(before: float, after: float) -> bool:
+    return before - after > _LEAST * max(before - 1.0, 0.0)
+
+
+def _all_needed(bench: Bench, first: Round, one: Judged) -> bool:
+    """Whether held-out records are foretold clearly worse without each of the effects; sets the gate 'drop'.
+
+    The effects are put in the order in which they are missed.
+    """
+    missed = {}
+    for name in one.fitted.names:
+        without = _without(bench, first, name, one.fitted.names)
+        if without is None:
+            missed[name] = np.inf
+            continue
+        over = judged(without.fitted, without.prediction, one.fitted, one.prediction)
+        needed = _adds(one, without, bench.options)
+        missed[name] = over.evidence if needed else -np.inf
+    one.gates["drop"] = all(size > 0 for size in missed.values())
+    one.fitted = replace(one.fitted, names=tuple(sorted(missed, key=lambda name: -missed[name])))
+    return one.gates["drop"]
+
+
+def _without(bench: Bench, first: Round, name: str, names: Iterable[str]) -> Judged | None:
+    """The machine with all effects but one; None where it cannot be fitted."""
+    others = [other for other in names if other != name]
+    singles = {one.name: one for one in first.judged}
+    if len(others) == 1:
+        return singles.get(others[0])
+    fitted: Fitted | None = fit_pair(bench, first, *others)
+    return None if fitted is None else over_base(bench, first.base, first.foretold, fitted)

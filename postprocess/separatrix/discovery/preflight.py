@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of a record before anything is fitted: noise, resolution, drive, delay of channels."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,8 +13,12 @@ from separatrix.errors import SeparatrixError
 _FOURTH = 70.0
 _FEWEST_PER_PERIOD = 12
 _FEWEST_PERIODS = 2.0
+# largest difference of the intervals of two pieces, over the interval, with a measured force
+_UNEVEN = 1e-2
 # sizes of a record against those of the machine beyond which a unit must be wrong
 _MOST_RATIO = 50.0
+# of the velocity over the slope of the position, beyond which its unit must be wrong
+_UNIT = 2.0
 
 
 @dataclass
@@ -38,11 +42,6 @@ class Prepared:
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
 
-    def note(self, text: str) -> None:
-        """Keep a remark once."""
-        if text not in self.notes:
-            self.notes.append(text)
-
     @property
     def period_samples(self) -> float | None:
         """Samples per drive period."""
@@ -54,11 +53,14 @@ class Prepared:
 def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     """Measure what the header does not say, and refuse what cannot be a record of this machine."""
     notes = list(record.warnings)
+    if record.v is not None:
+        _check_velocity(record, notes)
+    record = _with_its_force(record, model, notes)
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     sigma = _noise(record, rest, resolution, notes)
     if np.std(record.x) < 5 * sigma:
         raise SeparatrixError(
-            f"{record.name}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
+            f"{record.file}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
             "nothing but noise"
         )
     prepared = Prepared(
@@ -74,8 +76,6 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     prepared.velocity_sigma_stated = "sensor_noise_sigma_m_s" in record.header
     _find_drive(prepared, model)
     _check_size(prepared, model)
-    if record.v is not None:
-        _note_delay(prepared)
     return prepared
 
 
@@ -116,14 +116,15 @@ def _find_drive(prepared: Prepared, model) -> None:
     record = prepared.record
     ratio = model.parameters.get("drive.ratio")
     if ratio is None or not ratio.value:
-        if "drive.interval" in model.parameters and record.force is None:
-            raise SeparatrixError(
-                f"{record.name}: the machine has a measured force, the record has no column 'force'"
-            )
         return
     if record.phi is not None:
-        slope, start = np.polyfit(record.t - record.t[0], np.unwrap(record.phi), 1)
-        prepared.frequency, prepared.phase, prepared.phase_known = float(slope), float(start), True
+        prepared.frequency, prepared.phase = turning(record)
+        if prepared.frequency * record.duration < np.pi:
+            raise SeparatrixError(
+                f"{record.file}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
+                "not the angle of a turning crank"
+            )
+        prepared.origin, prepared.phase_known = float(record.t[0]), True
     else:
         header = record.header
         if "drive_frequency_rad_s" in header:
@@ -140,13 +141,70 @@ def _find_drive(prepared: Prepared, model) -> None:
     samples = prepared.period_samples
     if samples < _FEWEST_PER_PERIOD:
         raise SeparatrixError(
-            f"{record.name}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
+            f"{record.file}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
         )
     periods = record.duration / record.interval / samples
     if periods < _FEWEST_PERIODS:
         raise SeparatrixError(
-            f"{record.name}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
+            f"{record.file}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
         )
+
+
+def turning(record: Record) -> tuple[float, float]:
+    """Frequency of a measured crank angle [rad/s] and the angle at the first row.
+
+    Each piece is unwrapped by itself; the turns in a gap follow from the frequency within the pieces.
+    """
+    t = record.t - record.t[0]
+    angles = [np.unwrap(record.phi[first:last]) for first, last in record.pieces]
+    above = below = 0.0
+    for (first, last), angle in zip(record.pieces, angles, strict=True):
+        centred = t[first:last] - t[first:last].mean()
+        above += float(centred @ angle)
+        below += float(centred @ centred)
+    slope = above / below
+    ahead = np.concatenate(
+        [angle - slope * t[first:last] for (first, last), angle in zip(record.pieces, angles, strict=True)]
+    )
+    for first, last in record.pieces[1:]:
+        turns = np.round((np.mean(ahead[first:last]) - ahead[first - 1]) / (2 * np.pi))
+        ahead[first:last] -= 2 * np.pi * turns
+    more, start = np.polyfit(t, ahead, 1)
+    return slope + float(more), float(start)
+
+
+def even_interval(record: Record) -> float:
+    """Time between the samples of a record within its pieces [s]."""
+    steps = sum(last - 1 - first for first, last in record.pieces)
+    return float(sum(record.t[last - 1] - record.t[first] for first, last in record.pieces) / steps)
+
+
+def _with_its_force(record: Record, model, notes: list[str]) -> Record:
+    """The record with a force where the machine has one; all pieces must be sampled at one rate."""
+    wanted = 'law = "measured_force"' in model.to_text({})
+    if record.force is None:
+        if wanted:
+            raise SeparatrixError(
+                f"{record.file}: the machine has a measured force, the record has no column 'force'"
+            )
+        return record
+    if not wanted:
+        notes.append("the machine has no measured force: column 'force' is not used")
+        return replace(record, force=None)
+    usual = None
+    for first, last in record.pieces:
+        steps = last - 1 - first
+        # shorter ones are not fitted
+        if steps < _FEWEST_PER_PERIOD:
+            continue
+        interval = float((record.t[last - 1] - record.t[first]) / steps)
+        usual = usual or interval
+        if abs(interval - usual) > usual * max(_UNEVEN, 1 / steps):
+            raise SeparatrixError(
+                f"{record.file}, from row {first + 1}: samples every {interval:.6g} s, before every "
+                f"{usual:.6g} s: a measured force needs one rate"
+            )
+    return record
 
 
 def _check_size(prepared: Prepared, model) -> None:
@@ -165,7 +223,7 @@ def _check_size(prepared: Prepared, model) -> None:
     spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
     if not 1 / _MOST_RATIO < spread / expected < _MOST_RATIO:
         raise SeparatrixError(
-            f"{prepared.record.name}: x ranges over {spread:.3g} m, the machine over {expected:.3g} m: "
+            f"{prepared.record.file}: x ranges over {spread:.3g} m, the machine over {expected:.3g} m: "
             "wrong units, or a record of another machine"
         )
     for path, sign in (("contact.upper", 1), ("contact.lower", -1)):
@@ -176,7 +234,7 @@ def _check_size(prepared: Prepared, model) -> None:
         if np.median(beyond) > 0:
             row = int(np.argmax(beyond))
             raise SeparatrixError(
-                f"{prepared.record.name}: x lies beyond {path} = {barrier.value:g} m most of the time "
+                f"{prepared.record.file}: x lies beyond {path} = {barrier.value:g} m most of the time "
                 f"(row {row + 1}: {prepared.record.x[row]:g} m): a record of another machine"
             )
 
@@ -185,9 +243,10 @@ def _is_soft(model) -> bool:
     return "contact.stiffness" in model.parameters
 
 
-def _note_delay(prepared: Prepared) -> None:
-    """Delay of x behind v, from the best overlap of v with the slope of x."""
-    record = prepared.record
+def _check_velocity(record: Record, notes: list[str]) -> None:
+    """Compare v with the slope of x: another quantity, another unit, a delay."""
+    if np.ptp(record.v) == 0:
+        raise SeparatrixError(f"{record.file}: 'v' is constant")
     dt = record.interval
     slope = np.gradient(record.x, record.t)
     shifts = np.arange(-4, 5)
@@ -196,7 +255,13 @@ def _note_delay(prepared: Prepared) -> None:
     best = int(np.argmax(overlap))
     if overlap[best] < 0.5:
         raise SeparatrixError(
-            f"{record.name}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
+            f"{record.file}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
+        )
+    ratio = float(np.std(record.v[inner]) / np.std(slope[inner]))
+    # noise of either one moves the ratio by no more than the correlation
+    if not overlap[best] / _UNIT < ratio < _UNIT / overlap[best]:
+        raise SeparatrixError(
+            f"{record.file}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s"
         )
     if shifts[best]:
-        prepared.notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")
+        notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.machine import Free, drive_amplitudes
-from separatrix.discovery.preflight import Prepared
-from separatrix.discovery.segments import Segments
+from separatrix.discovery.preflight import Prepared, even_interval
+from separatrix.discovery.segments import Segments, padded
 from separatrix.errors import SeparatrixError
-
-_SCALE_STEP = 1e-5
-_CLOCK_STEP = 1e-6
 
 
 @dataclass
@@ -32,6 +29,8 @@ class Evaluation:
     v: np.ndarray
     # per record rows of segment (of that record), time, speed before, speed after, side
     impacts: list[np.ndarray | None]
+    # number of impacts of each segment
+    hits: np.ndarray
     by_start: np.ndarray | None = None
     by_parameter: np.ndarray | None = None
     # derivatives of x and v by the start, without noise: what a force does later follows from them
@@ -50,12 +49,11 @@ class Problem:
         self.amplitudes = drive_amplitudes(model)
         self._parts = [self._part(number) for number in range(len(prepared))]
 
-    def with_free(self, free: list[Free]) -> "Problem":
-        """The same segments with other free parameters."""
-        other = object.__new__(Problem)
-        other.__dict__.update(self.__dict__)
-        other.free = free
-        return other
+    def of_segments(self, rows: np.ndarray) -> "Problem":
+        """The same problem with these segments only; a segment may come several times."""
+        old = self.segments
+        chosen = padded(old.record[rows], old.first[rows], old.last[rows])
+        return Problem(self.model, self.prepared, chosen, self.free)
 
     @property
     def values(self) -> np.ndarray:
@@ -81,7 +79,7 @@ class Problem:
             "inside": self.segments.inside[rows],
             "x": record.x[samples],
             "v": None if record.v is None else record.v[samples],
-            "force": _force_argument(record, starts),
+            "force": _force_argument(record, first),
         }
 
     def evaluate(self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True) -> Evaluation:
@@ -98,6 +96,7 @@ class Problem:
             x=np.zeros(shape),
             v=np.zeros(shape),
             impacts=[None] * len(self._parts),
+            hits=np.zeros(count, int),
         )
         if derivatives:
             out.by_start = np.zeros((count, width, 2))
@@ -110,6 +109,10 @@ class Problem:
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
+        # what was not flown to its end says nothing
+        for table in (out.residual, out.by_start, out.by_parameter):
+            if table is not None:
+                table[out.failed] = 0
         out.residual = self.whitened(out.residual)
         if derivatives:
             out.by_start = self.whitened(out.by_start)
@@ -143,7 +146,7 @@ class Problem:
     ) -> None:
         prepared = self.prepared[number]
         active, given, chain = self._active(number, values, derivatives)
-        start = np.column_stack([starts[part["rows"]], self._crank(number, part, values)])
+        start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
         result = self._simulate(part, active, given, start, derivatives)
         rows, inside = part["rows"], part["inside"]
         length = inside.shape[1]
@@ -153,6 +156,7 @@ class Problem:
         out.failed[rows] = failed
         out.x[rows] = _padded(result.x, inside)
         out.v[rows] = _padded(result.v, inside)
+        out.hits[rows] = result.impacts
         hits = result.impact
         out.impacts[number] = np.column_stack(
             [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side]
@@ -160,8 +164,7 @@ class Problem:
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
-            jacobians, steady = self._derivatives(number, part, active, given, chain, start, values, result)
-            out.steady[rows] &= steady
+            jacobians = self._derivatives(number, part, active, chain, result)
             n = len(active)
             out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
@@ -194,10 +197,10 @@ class Problem:
             if not one.is_nuisance
         }
         prepared = self.prepared[number]
-        scale = prepared.drive_scale * self._nuisance("nuisance:drive_scale", number, values, 1.0)
-        if scale != 1.0 or prepared.drive_scale != 1.0:
+        scale = self._nuisance("nuisance:drive_scale", number, values, None)
+        if scale is not None or prepared.drive_scale != 1.0:
             for path, value in self.amplitudes.items():
-                chosen[path] = scale * value
+                chosen[path] = prepared.drive_scale * (1.0 if scale is None else scale) * value
         if prepared.frequency is not None:
             frequency = prepared.frequency * (1 + self._nuisance("nuisance:clock", number, values, 0.0))
             ratio = self.model.parameters["drive.ratio"].value
@@ -205,26 +208,23 @@ class Problem:
             chosen["drive.ratio"] = ratio * frequency / self.model.drive_frequency(chosen)
         return chosen
 
-    def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float) -> float:
+    def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float | None) -> float | None:
         for one, value in zip(self.free, values, strict=True):
             if one.path == path and one.record in (None, number):
                 return float(value)
         return absent
 
-    def crank_angle(self, number: int, values: np.ndarray, t: float) -> float:
-        """Angle of the crank at time `t` of a record [rad]."""
-        return float(self._crank(number, {"starts": np.array([t])}, values)[0])
-
-    def _crank(self, number: int, part: dict, values: np.ndarray) -> np.ndarray:
+    def crank_angle(self, number: int, values: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Angle of the crank at times `t` of a record [rad]; 0 without a crank."""
         prepared = self.prepared[number]
         if prepared.frequency is None:
-            return np.zeros(part["starts"].size)
+            return np.zeros(np.shape(t))
         clock = self._nuisance("nuisance:clock", number, values, 0.0)
         phase = prepared.phase + self._nuisance("nuisance:phase", number, values, 0.0)
-        return phase + prepared.frequency * (1 + clock) * (part["starts"] - prepared.origin)
+        return phase + prepared.frequency * (1 + clock) * (t - prepared.origin)
 
     def _active(self, number: int, values: np.ndarray, derivatives: bool) -> tuple:
-        """Paths, their values and d(values)/d(free parameters); the scale of the drive is differenced."""
+        """Paths, their values and d(values)/d(free parameters)."""
         chosen = self.machine_values(number, values)
         active = list(chosen)
         given = np.array([chosen[path] for path in active])
@@ -232,20 +232,22 @@ class Problem:
             return active, given, None
         chain = np.zeros((len(active), len(self.free)))
         for j, one in enumerate(self.free):
-            if one.is_nuisance:
-                continue
-            chain[active.index(one.path), j] = one.slope(values[j])
+            if one.path == "nuisance:drive_scale":
+                for path, value in self.amplitudes.items():
+                    chain[active.index(path), j] = self.prepared[number].drive_scale * value
+            elif not one.is_nuisance:
+                chain[active.index(one.path), j] = one.slope(values[j])
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):
-                chain[row, j] = self._ratio_slope(one, number, chosen) * one.slope(values[j])
+                chain[row, j] = self._ratio_slope(one, values[j], number, chosen) * one.slope(values[j])
         return active, given, chain
 
-    def _ratio_slope(self, one: Free, number: int, chosen: dict[str, float]) -> float:
+    def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
         """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
         ratio = chosen["drive.ratio"]
         if one.path == "nuisance:clock" and one.record == number:
-            return ratio
+            return ratio / (1 + value)
         if one.path not in ("restoring.stiffness", "restoring.moment", "body.mass"):
             return 0.0
         step = 1e-5 * abs(chosen[one.path])
@@ -256,44 +258,21 @@ class Problem:
         slope = (ends[0] - ends[1]) / (2 * step)
         return -ratio * slope / (0.5 * (ends[0] + ends[1]))
 
-    def _derivatives(self, number, part, active, given, chain, start, values, result) -> tuple:
+    def _derivatives(self, number: int, part: dict, active: list[str], chain: np.ndarray, result) -> list:
+        """Derivatives of x and v by the start, and by the free parameters through `active` and the crank."""
         n = len(active)
         prepared = self.prepared[number]
-        lengths = np.diff(part["offsets"])
         crank = np.zeros((part["starts"].size, len(self.free)))
-        scale_column = None
         for j, one in enumerate(self.free):
             if one.path == "nuisance:phase" and one.record == number:
                 crank[:, j] = 1
             elif one.path == "nuisance:clock" and one.record == number:
                 crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
-            elif one.path == "nuisance:drive_scale":
-                scale_column = j
-        crank = np.repeat(crank, lengths, axis=0)
-        jacobians, steady = [], np.ones(part["rows"].size, bool)
-        for whole in (result.jacobian, result.velocity_jacobian):
-            by_parameter = whole[:, :n] @ chain + whole[:, n + 2 : n + 3] * crank
-            jacobians.append((whole[:, n : n + 2], by_parameter))
-        if scale_column is not None:
-            slopes, steady = self._scale_slopes(part, active, given, start, values[scale_column])
-            for (_, by_parameter), slope in zip(jacobians, slopes, strict=True):
-                by_parameter[:, scale_column] = slope
-        return jacobians, steady
-
-    def _scale_slopes(self, part, active, given, start, scale: float) -> tuple:
-        amplitude = np.array([path in self.amplitudes for path in active])
-        base = np.where(amplitude, given / scale, 0.0)
-        if not amplitude.any():
-            active = [*active, *self.amplitudes]
-            base = np.concatenate([np.zeros(given.size), list(self.amplitudes.values())])
-            given = np.concatenate([given, list(self.amplitudes.values())])
-        ends = [
-            self._simulate(part, active, given + sign * _SCALE_STEP * base, start, False) for sign in (1, -1)
-        ]
-        steady = np.asarray(ends[0].impacts) == np.asarray(ends[1].impacts)
+        crank = np.repeat(crank, np.diff(part["offsets"]), axis=0)
         return [
-            (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * _SCALE_STEP) for name in ("x", "v")
-        ], steady
+            (whole[:, n : n + 2], whole[:, :n] @ chain + whole[:, n + 2 : n + 3] * crank)
+            for whole in (result.jacobian, result.velocity_jacobian)
+        ]
 
 
 def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -302,9 +281,13 @@ def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
     return table
 
 
-def _force_argument(record, starts: np.ndarray):
+def _force_argument(record, first: np.ndarray):
+    """Force of a record for segments that begin at the samples `first`.
+
+    Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
+    there are leaves room for the last times, which need not be quite even.
+    """
     if record.force is None:
         return None
-    # the mean, so that the series ends where the record does
-    interval = (record.t[-1] - record.t[0]) / (record.t.size - 1)
-    return starts - record.t[0], interval, record.force
+    interval = even_interval(record)
+    return first * interval, interval, np.append(record.force, record.force[-1])

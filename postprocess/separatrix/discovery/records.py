@@ -4,7 +4,8 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import pairwise
+from difflib import get_close_matches
+from itertools import count, pairwise
 from pathlib import Path
 
 import h5py
@@ -33,6 +34,11 @@ _FEWEST_SAMPLES = 60
 _GAP = 1.5
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.02
+# likeness of a header key to a known one that makes it a misspelling
+_NEAR = 0.7
+# steps to and from a sample, over the usual largest ones and over all others, that no motion makes
+_SPIKE = (5.0, 3.0)
+_MOST_SPIKES = 3
 
 
 @dataclass
@@ -49,6 +55,8 @@ class Record:
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    # as it was given
+    file: str = ""
 
     @property
     def interval(self) -> float:
@@ -61,20 +69,26 @@ class Record:
         return float(self.t[-1] - self.t[0])
 
 
-def read_record(path: Path) -> Record:
-    """Read and check one record; whatever is wrong is refused with file, row and reason."""
+def read_record(path: Path, at_rest: bool = False) -> Record:
+    """Read and check one record; whatever is wrong is refused with file, row and reason.
+
+    `at_rest`: of a body that does not move, whose positions may all be the same.
+    """
     path = Path(path)
     if not path.is_file():
         raise SeparatrixError(f"{path}: no such file", NO_INPUT)
     with path.open("rb") as file:
         is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
     header, columns, first_row = _read_hdf5(path) if is_hdf5 else _read_csv(path)
-    return _checked(path, header, columns, first_row)
+    return _checked(path, header, columns, first_row, at_rest)
 
 
-def make_record(name: str, columns: dict[str, np.ndarray], header: dict | None = None) -> Record:
+def make_record(
+    name: str, columns: dict[str, np.ndarray], header: dict | None = None, at_rest: bool = False
+) -> Record:
     """Check arrays that did not come from a file as if they had."""
-    return _checked(Path(name), {key: str(value) for key, value in (header or {}).items()}, columns, None)
+    texts = {key: str(value) for key, value in (header or {}).items()}
+    return _checked(Path(name), texts, columns, None, at_rest)
 
 
 def _read_csv(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], int]:
@@ -83,7 +97,7 @@ def _read_csv(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray], int]:
     rows: list[list[float]] = []
     first_row = 0
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         raise SeparatrixError(f"{path}: neither HDF5 nor text: {error.reason}") from None
     for number, line in enumerate(lines, start=1):
@@ -159,14 +173,21 @@ def _text(value: object) -> str:
 
 
 def _checked(
-    path: Path, header: dict[str, str], columns: dict[str, np.ndarray], first_row: int | None
+    path: Path,
+    header: dict[str, str],
+    columns: dict[str, np.ndarray],
+    first_row: int | None,
+    at_rest: bool = False,
 ) -> Record:
+    kept = np.arange(columns["t"].size)
+
     def where(row: int) -> str:
-        return f"{path}, row {row + 1}" if first_row is None else f"{path}:{first_row + row}"
+        return f"{path}, row {kept[row] + 1}" if first_row is None else f"{path}:{first_row + kept[row]}"
 
     warnings: list[str] = []
     numbers = _header_numbers(path, header)
-    _scale(path, header, numbers, columns, warnings)
+    _doubt_header(header, numbers, warnings)
+    _scale(path, header, columns, warnings)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -181,21 +202,28 @@ def _checked(
         raise SeparatrixError(
             f"{where(row)}: time does not increase ({t[row]:.9g} s after {t[row - 1]:.9g} s)"
         )
+    if not at_rest:
+        spikes = _spikes(x, where, warnings)
+        kept = np.delete(kept, spikes)
+        columns = {name: column[kept] for name, column in columns.items()}
+        t, x = columns["t"], columns["x"]
+        steps = np.diff(t)
     usual = float(np.median(steps))
     rate = numbers.get("sampling_rate_hz")
     if rate is not None and not 0.99 < rate * usual < 1.01:
         raise SeparatrixError(
             f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
-    if np.ptp(x) == 0:
-        raise SeparatrixError(f"{path}: 'x' is constant")
     pieces = _pieces(t, usual, where, warnings)
-    _check_clipping(x, numbers, where, warnings)
+    if not at_rest:
+        if np.ptp(x) == 0:
+            raise SeparatrixError(f"{path}: 'x' is constant")
+        _check_clipping(x, where, warnings)
     unknown = [name for name in columns if name not in ("t", *CHANNELS)]
     if unknown:
         warnings.append(f"columns that are not used: {', '.join(unknown)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
-    return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, **channels)
+    return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, file=str(path), **channels)
 
 
 def _header_numbers(path: Path, header: dict[str, str]) -> dict[str, float]:
@@ -207,18 +235,27 @@ def _header_numbers(path: Path, header: dict[str, str]) -> dict[str, float]:
             raise SeparatrixError(f"{path}: '{key}' is '{header[key]}', expected a number") from None
         if not np.isfinite(numbers[key]):
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}")
-    for key in ("sampling_rate_hz", "drive_ratio", "drive_scale"):
+    for key in ("sampling_rate_hz", "drive_ratio", "drive_frequency_rad_s", "drive_scale"):
         if key in numbers and numbers[key] <= 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected more than 0")
-    for key in ("sensor_noise_sigma_m", "sensor_resolution_m"):
+    for key in ("sensor_noise_sigma_m", "sensor_noise_sigma_m_s", "sensor_resolution_m"):
         if key in numbers and numbers[key] < 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected at least 0")
     return numbers
 
 
-def _scale(
-    path: Path, header: dict[str, str], numbers: dict, columns: dict[str, np.ndarray], warnings: list[str]
-) -> None:
+def _doubt_header(header: dict[str, str], numbers: dict[str, float], warnings: list[str]) -> None:
+    """Warn of keys that look like misspelt ones, and of an angle that looks like degrees."""
+    known = sorted(_NUMBERS | {"units"})
+    for key in header:
+        near = [] if key in known else get_close_matches(key, known, 1, _NEAR)
+        if near:
+            warnings.append(f"header key '{key}' is not used: '{near[0]}'?")
+    if abs(numbers.get("phase", 0.0)) > 2 * np.pi:
+        warnings.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
+
+
+def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> None:
     """Turn time and position into s and m; the other channels and the header are in SI."""
     if "units" not in header:
         warnings.append("no 'units': read as s, m")
@@ -243,7 +280,24 @@ def _pieces(t: np.ndarray, usual: float, where, warnings: list[str]) -> list[tup
     return list(pairwise(edges))
 
 
-def _check_clipping(x: np.ndarray, numbers: dict, where, warnings: list[str]) -> None:
+def _spikes(x: np.ndarray, where, warnings: list[str]) -> np.ndarray:
+    """Rows of single samples that lie where no motion leads."""
+    steps = np.diff(x)
+    size = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:]))
+    usual = max(float(np.quantile(np.abs(steps), 0.9)), resolution_of(x))
+    rows = np.flatnonzero((steps[:-1] * steps[1:] < 0) & (size > _SPIKE[0] * usual)) + 1
+    others = np.abs(np.delete(steps, np.union1d(rows - 1, rows)))
+    rows = rows[size[rows - 1] > _SPIKE[1] * others.max(initial=0.0)]
+    said = [
+        f"{where(row)}: x is {x[row]:.6g} m between {x[row - 1]:.6g} and {x[row + 1]:.6g} m" for row in rows
+    ]
+    if rows.size > _MOST_SPIKES:
+        raise SeparatrixError(f"{said[0]}; {rows.size} such samples: clean the record")
+    warnings += [f"{text}: left out" for text in said]
+    return rows
+
+
+def _check_clipping(x: np.ndarray, where, warnings: list[str]) -> None:
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself."""
     grid = resolution_of(x)
     for name, extreme in (("largest", x.max()), ("smallest", x.min())):
@@ -280,8 +334,11 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def unique_names(records: Iterable[Record]) -> None:
     """Number the records whose files have the same name."""
-    seen: dict[str, int] = {}
+    records = list(records)
+    taken = {record.name for record in records}
+    seen: set[str] = set()
     for record in records:
-        seen[record.name] = seen.get(record.name, 0) + 1
-        if seen[record.name] > 1:
-            record.name = f"{record.name}_{seen[record.name]}"
+        if record.name in seen:
+            record.name = next(name for k in count(2) if (name := f"{record.name}_{k}") not in taken)
+            taken.add(record.name)
+        seen.add(record.name)

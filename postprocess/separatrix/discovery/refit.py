@@ -2,21 +2,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A candidate fitted with everything else free, from several starts; and two fits compared fairly."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from separatrix.discovery.catalogue import Candidate
 from separatrix.discovery.data import Data, fit_stages, polished
 from separatrix.discovery.fit import Fit, minimise
+from separatrix.discovery.machine import Free
 from separatrix.discovery.problem import Problem
 from separatrix.discovery.screen import Screened
 
-# a fit this good needs no other start
-_FINE = 1.03
+# a linearised estimate that reaches this share of what it promised needs no other start
+_DELIVERED = 0.8
+# reduced chi^2 of the base beyond which the linearised estimate promises nothing
+_BAD = 1.3
 _HOPELESS = 4.0
 # log-likelihood by which a candidate is out of the race
 _BEATEN = 15.0
+# segments that may be caught in a wrong minimum
+_SPARED = 3
+# share of segments that one fit may follow more than another without being better
+_FEW = 0.1
+# log-likelihood by which a machine that contains the base may be worse than it
+_WORSE = 1.0
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -31,11 +40,6 @@ class Fitted:
     fit: Fit
     added: tuple[int, ...]
     tries: int = 1
-
-    @property
-    def paths(self) -> list[str]:
-        """Paths of the parameters of the effect that was added last."""
-        return [self.problem.free[i].path for i in self.added]
 
     @property
     def covariance(self) -> np.ndarray:
@@ -58,31 +62,89 @@ def refit(
     screened: Screened | None,
     rival: Fitted | None = None,
     quick: bool = False,
+    known: Fitted | None = None,
 ) -> Fitted:
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
     Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
-    is not tried further.
+    is not tried further. A fit `known` from another noise is only carried on.
     """
     best = None
+    if known is not None:
+        best = carried_on(data, candidate, known)
+        if _delivers(best, base, candidate, screened):
+            return best
     values = _base_values(base, candidate)
-    settled = rival is not None and rival.fit.converged and rival.fit.reduced_chi2 < _FINE
+    settled = rival is not None and rival.fit.converged and rival.fit.like_noise(2)
     for tries, (kind, start) in enumerate(_starts(candidate, screened), start=1):
         tried = values.copy()
         tried[list(candidate.added)] = start
         problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
+        rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
+        if best is None and settled and beaten(rough, rival):
+            return rough
         fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        if best is None or gain_over(found, best)[0] > 0:
+        if best is None or _better(found, best):
             best = found
         best.tries = tries
-        if best.fit.converged and best.fit.reduced_chi2 < _FINE and (quick or kind != "far"):
+        promised = base.fit.reduced_chi2 < _BAD and kind == "linear"
+        if (promised or best.fit.like_noise(1)) and _delivers(best, base, candidate, screened):
             break
         if settled and gain_over(best, rival)[0] < -_BEATEN:
             break
         if quick and tries == 2:
             break
-    return best
+    return _above_base(data, best, base, candidate)
+
+
+def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
+    """The fit, or one from the base where that is better: a machine that contains the base is no worse.
+
+    What stays worse has not found its minimum, whatever its last step promised.
+    """
+    if not candidate.linear.any() or gain_over(best, base)[0] > -_WORSE:
+        return best
+    values = _base_values(base, candidate)
+    added = np.array(candidate.added)
+    values[added[candidate.linear]] = 0.0
+    problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+    fit = minimise(problem, values, base.fit.starts)
+    found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
+    best = found if _better(found, best) else best
+    if gain_over(best, base)[0] > -_WORSE:
+        return best
+    return replace(best, fit=replace(best.fit, caught=True))
+
+
+def beaten(one: Fitted, rival: Fitted) -> bool:
+    """Whether a fit is far behind even without the segments in which it is furthest behind."""
+    parts = np.sort(gain_over(one, rival)[1])
+    return bool(parts[_SPARED:].sum() < -2 * _BEATEN)
+
+
+def carried_on(data: Data, candidate: Candidate, known: Fitted) -> Fitted:
+    """An earlier fit, carried on with the noise of now."""
+    problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+    fit = minimise(problem, known.fit.values, known.fit.starts)
+    return Fitted(candidate.names, candidate.model, problem, fit, candidate.added, known.tries)
+
+
+def _delivers(found: Fitted, base: Fitted, candidate: Candidate, screened: Screened | None) -> bool:
+    """Whether a fit gained what the screen promised, as far as the base is good enough for a promise."""
+    if not found.fit.converged:
+        return False
+    believed = screened is not None and base.fit.reduced_chi2 < _BAD
+    promised = screened.gain.get(candidate.names[-1], 0.0) if believed else 0.0
+    return gain_over(found, base)[0] >= _DELIVERED * promised
+
+
+def _better(one: Fitted, other: Fitted) -> bool:
+    """Whether a fit follows clearly more segments, or as many and those more closely."""
+    counts = [fitted.fit.good.sum() for fitted in (one, other)]
+    if abs(counts[0] - counts[1]) > _FEW * max(counts):
+        return bool(counts[0] > counts[1])
+    return gain_over(one, other)[0] > 0
 
 
 def _try(
@@ -110,14 +172,25 @@ def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fit
     fit = minimise(one.problem, values, other.fit.starts, most=15)
     fit = polished(data, one.problem, fit, data.last, 8, guesses=(one.fit.starts,))
     found = Fitted(one.names, one.model, one.problem, fit, one.added, one.tries + 1)
-    return found if gain_over(found, one)[0] > 0 else one
+    return found if _better(found, one) else one
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
+    return _values_of(base, candidate.free)
+
+
+def shared_values(base: Fitted, other: Fitted) -> np.ndarray:
+    """Values of the base's parameters as another machine has them, its own where that has none."""
+    own = [replace(one, value=value) for one, value in zip(base.problem.free, base.fit.values, strict=True)]
+    return _values_of(other, own)
+
+
+def _values_of(fitted: Fitted, free: list[Free]) -> np.ndarray:
     known = {
-        (one.path, one.record): value for one, value in zip(base.problem.free, base.fit.values, strict=True)
+        (one.path, one.record): value
+        for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
     }
-    return np.array([known.get((one.path, one.record), one.value) for one in candidate.free])
+    return np.array([known.get((one.path, one.record), one.value) for one in free])
 
 
 def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, np.ndarray]]:

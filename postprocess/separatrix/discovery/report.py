@@ -3,7 +3,6 @@
 """The report of a discovery: report.html and report.pdf beside verdict.json, details.h5 and extended.toml."""
 
 import json
-import tempfile
 from pathlib import Path
 
 import h5py
@@ -11,15 +10,14 @@ from matplotlib.figure import Figure
 
 from separatrix import style
 from separatrix.discovery import figures, where_figures
-from separatrix.discovery.motion import compare
+from separatrix.discovery.comparison import compare
 from separatrix.discovery.options import Options
 from separatrix.discovery.pages import Picture, Section, write_html, write_pdf
 from separatrix.discovery.story import names, sections
-from separatrix.errors import CANNOT_CREATE, SeparatrixError
 from separatrix.open import reading
 
 
-def write_report(folder: Path, base: Path, options: Options | None = None) -> list[Path]:
+def write_report(folder: Path, base: Path, options: Options | None = None) -> tuple[Path, Path]:
     """Write both files from what separatrix-discover left in `folder`; `base` is the case that was compared.
 
     Quick options run no maps.
@@ -37,7 +35,11 @@ def write_report(folder: Path, base: Path, options: Options | None = None) -> li
         else:
             motion = compare(Path(base), folder / "extended.toml", verdict, details, options.progress)
         story = [motion if section.key == "motion" else section for section in story]
-        return _write(folder, f"Missing physics: {_title(verdict)}", story)
+        title = f"Missing physics: {_title(verdict)}"
+        made = folder / "report.html", folder / "report.pdf"
+        write_html(made[0], title, story)
+        write_pdf(made[1], title, story)
+        return made
 
 
 def _title(verdict: dict) -> str:
@@ -47,19 +49,6 @@ def _title(verdict: dict) -> str:
         "none": "none",
         "not-in-catalogue": "not in the catalogue",
     }[verdict["outcome"]]
-
-
-def _write(folder: Path, title: str, story: list[Section]) -> list[Path]:
-    try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as name:
-            made = [Path(name) / "report.html", Path(name) / "report.pdf"]
-            write_html(made[0], title, story)
-            write_pdf(made[1], title, story)
-            for path in made:
-                path.replace(folder / path.name)
-    except OSError as error:
-        raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
-    return [folder / path.name for path in made]
 
 
 def illustrated(verdict: dict, details: h5py.File) -> list[Section]:

@@ -6,12 +6,15 @@ import numpy as np
 
 from separatrix.discovery.fit import Fit
 from separatrix.discovery.problem import Evaluation, Problem
-from separatrix.discovery.segments import padded
 
 # reduced chi^2 of a segment, over that of the median one, that looks like a wrong minimum
 _SUSPECT = 1.7
 _MOST_SEGMENTS = 12
 _ITERATIONS = 10
+# starts of one segment with the same number of impacts that are followed
+_FOLLOWED = 2
+_LEAST_GAIN = 0.01
+_STRONGEST = 1.0
 # starts tried, in standard errors of the smoother
 _TRIED = np.array([(0, 0), (0, -3), (0, -1.5), (0, 1.5), (0, 3), (-2, 0), (2, 0), (-2, 2), (2, -2)], float)
 
@@ -21,7 +24,8 @@ def suspicious(fit: Fit) -> np.ndarray:
     reduced = fit.chi2 / np.maximum(1, fit.counts)
     usual = max(1.0, float(np.median(reduced[fit.good]))) if fit.good.any() else 1.0
     suspects = np.flatnonzero((reduced > _SUSPECT * usual) | ~fit.good)
-    return suspects[np.argsort(-reduced[suspects])][:_MOST_SEGMENTS]
+    badness = np.where(fit.evaluation.failed, np.inf, reduced)
+    return suspects[np.argsort(-badness[suspects], kind="stable")][:_MOST_SEGMENTS]
 
 
 def rescued(
@@ -36,45 +40,57 @@ def rescued(
     steps = np.tile(_TRIED, (len(guesses), 1))
     tries = len(steps)
     rows = np.repeat(suspects, tries)
-    segments = problem.segments
-    copies = Problem(
-        problem.model,
-        problem.prepared,
-        padded(segments.record[rows], segments.first[rows], segments.last[rows]),
-        problem.free,
-    )
+    copies = problem.of_segments(rows)
     places = np.tile(np.repeat(np.arange(len(guesses)), len(_TRIED)), suspects.size)
     begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
-    found, cost = solve_starts(copies, fit.values, begin)
-    cost = cost.reshape(suspects.size, tries)
-    best = np.argmin(cost, axis=1)
+    promising = _promising(copies.evaluate(fit.values, begin, derivatives=False), tries)
+    if not promising.size:
+        # from none of the tries can the segments be flown
+        return fit.starts.copy(), improved
+    rows, begin = rows[promising], begin[promising]
+    found, cost = solve_starts(copies.of_segments(promising), fit.values, begin)
     starts = fit.starts.copy()
-    before = np.where(fit.good[suspects], fit.chi2[suspects], np.inf)
-    better = cost[np.arange(suspects.size), best] < np.minimum(0.8 * before, before - 10)
-    for place in np.flatnonzero(better):
-        starts[suspects[place]] = found[place * tries + best[place]]
-        improved[suspects[place]] = True
+    for segment in np.unique(rows):
+        places = np.flatnonzero(rows == segment)
+        best = places[np.argmin(cost[places])]
+        before = fit.chi2[segment] if fit.good[segment] else np.inf
+        if cost[best] < min(0.8 * before, before - 10):
+            starts[segment] = found[best]
+            improved[segment] = True
     return starts, improved
+
+
+def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
+    """The best tries of each segment, those with one number of impacts apart from those with another."""
+    cost = _cost(evaluation)
+    hits = evaluation.hits
+    kept = []
+    for first in range(0, cost.size, tries):
+        mine = first + np.argsort(cost[first : first + tries], kind="stable")
+        for count in np.unique(hits[mine]):
+            kept.extend(mine[hits[mine] == count][:_FOLLOWED])
+    return np.sort([one for one in kept if np.isfinite(cost[one])]).astype(int)
 
 
 def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit the start of each segment by itself, the machine fixed; also the chi^2."""
     starts = starts.copy()
-    current = problem.evaluate(values, starts)
-    cost = _cost(current)
+    cost = _cost(problem.evaluate(values, starts, derivatives=False))
     damping = np.full(cost.size, 1e-3)
+    active = np.flatnonzero(np.isfinite(cost))
     for _ in range(_ITERATIONS):
-        step = _steps(current, damping)
-        trial = problem.evaluate(values, starts + step, derivatives=False)
-        reached = _cost(trial)
-        better = reached < cost
-        damping = np.where(better, 0.2 * damping, 10 * damping)
-        starts[better] += step[better]
-        idle = not np.any(better & ((cost == np.inf) | (reached < cost - 0.01)))
-        cost = np.where(better, reached, cost)
-        if idle:
+        if not active.size:
             break
-        current = problem.evaluate(values, starts)
+        part = problem.of_segments(active)
+        current = part.evaluate(values, starts[active])
+        tried = starts[active] + _steps(current, damping[active])
+        reached = _cost(part.evaluate(values, tried, derivatives=False))
+        before = cost[active]
+        better = reached < before
+        starts[active[better]] = tried[better]
+        cost[active[better]] = reached[better]
+        damping[active] *= np.where(better, 0.2, 10)
+        active = active[np.where(better, reached < before - _LEAST_GAIN, damping[active] < _STRONGEST)]
     return starts, cost
 
 
@@ -90,12 +106,8 @@ def _steps(evaluation: Evaluation, damping: np.ndarray) -> np.ndarray:
     diagonal = np.einsum("kii->ki", matrix)
     matrix[:, [0, 1], [0, 1]] = diagonal * (1 + damping[:, None]) + 1e-300
     determinant = matrix[:, 0, 0] * matrix[:, 1, 1] - matrix[:, 0, 1] ** 2
-    safe = np.where(determinant > 0, determinant, np.inf)
-    step = np.stack(
-        [
-            matrix[:, 1, 1] * gradient[:, 0] - matrix[:, 0, 1] * gradient[:, 1],
-            matrix[:, 0, 0] * gradient[:, 1] - matrix[:, 0, 1] * gradient[:, 0],
-        ],
-        axis=1,
-    )
-    return step / safe[:, None]
+    usable = np.isfinite(determinant) & (determinant > 0) & ~evaluation.failed
+    adjugate = np.stack([matrix[:, 1, 1], -matrix[:, 0, 1], -matrix[:, 0, 1], matrix[:, 0, 0]], axis=1)
+    inverse = np.zeros_like(adjugate)
+    inverse[usable] = adjugate[usable] / determinant[usable, None]
+    return (inverse.reshape(-1, 2, 2) @ gradient[:, :, None])[:, :, 0]

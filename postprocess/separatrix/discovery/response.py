@@ -16,46 +16,39 @@ _LOST = 1e-9
 
 def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
     """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples."""
-    segments = problem.segments
-    inside = segments.inside
-    transition = fit.evaluation.transition
-    times = sample_times(problem)
-    determinant = (
-        transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
-    )
-    # a body that sticks forgets: from there on a force does nothing
-    alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & inside, axis=1)
-    safe = np.where(alive, determinant, 1.0)
-    # second column of the inverse: a kick in v, carried back to the start
-    back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)
-    back[~alive] = 0
+    back, alive = _back(problem, fit)
     carried = back[:, :, :, None] * forces[:, :, None, :] / mass
-    steps = np.diff(times, axis=1)[:, :, None, None]
+    steps = np.diff(sample_times(problem), axis=1)[:, :, None, None]
     areas = 0.5 * steps * (carried[:, 1:] + carried[:, :-1])
     moved = np.concatenate([np.zeros_like(carried[:, :1]), np.cumsum(areas, axis=1)], axis=1)
-    moved = np.einsum("klij,kljq->kliq", transition, moved)
-    moved[~alive] = 0
-    return _as_columns(problem, fit, moved)
+    return _as_columns(problem, fit, moved, alive)
 
 
 def kick_columns(problem: Problem, fit: Fit, kicks: np.ndarray) -> np.ndarray:
     """Columns of sudden changes of velocity (segments, length, q) [m/s] at the samples."""
+    back, alive = _back(problem, fit)
+    return _as_columns(problem, fit, np.cumsum(back[:, :, :, None] * kicks[:, :, None, :], axis=1), alive)
+
+
+def _back(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """The change of the start that a kick in v at each sample amounts to, and where that has a meaning."""
     transition = fit.evaluation.transition
     determinant = (
         transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
     )
+    # a body that sticks forgets: from there on a force does nothing
     alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & problem.segments.inside, axis=1)
     safe = np.where(alive, determinant, 1.0)
+    # second column of the inverse
     back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)
     back[~alive] = 0
-    moved = np.cumsum(back[:, :, :, None] * kicks[:, :, None, :], axis=1)
-    moved = np.einsum("klij,kljq->kliq", transition, moved)
+    return back, alive
+
+
+def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarray) -> np.ndarray:
+    """What changes of the start do to x and v in units of the noise, as the residuals are laid out."""
+    moved = np.einsum("klij,kljq->kliq", fit.evaluation.transition, started)
     moved[~alive] = 0
-    return _as_columns(problem, fit, moved)
-
-
-def _as_columns(problem: Problem, fit: Fit, moved: np.ndarray) -> np.ndarray:
-    """Changes of x and v in units of the noise, as the residuals are laid out."""
     count, length = problem.segments.inside.shape
     width = fit.evaluation.residual.shape[1]
     columns = np.zeros((count, width, moved.shape[3]))

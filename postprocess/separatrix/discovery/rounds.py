@@ -13,7 +13,7 @@ from separatrix.discovery.heldout import Prediction, predict
 from separatrix.discovery.judge import Judged, judged
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, crossed, gain_over, refit
+from separatrix.discovery.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
@@ -26,6 +26,8 @@ _BAD = 1.3
 _CROSSED = 4
 _WORTH_CROSSING = 5.0
 _SHARE = 0.3
+# behind the best by less than so many separations: fitted to the end
+_NEAR = 3.0
 
 
 @dataclass
@@ -36,15 +38,17 @@ class Bench:
     held_out: Data | None
     scales: Scales
     options: Options
-    # why some candidates make no sense for this machine
+    # why some candidates make no sense for this machine, as the first round found
     absent: dict[str, str] = field(default_factory=dict)
 
-    def foretell(self, fitted: Fitted) -> Prediction | None:
-        """Score the held-out records."""
+    def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
+        """Score the held-out records; the starts that an `other` prediction found there are tried too."""
         if self.held_out is None:
             return None
-        fit = fitted.fit
-        return predict(self.held_out, fitted.model, fitted.problem.free, fit.values, fitted.covariance)
+        free, fit = fitted.problem.free, fitted.fit
+        guess = None if other is None else other.fit.starts
+        misfit = max(1.0, fit.reduced_chi2)
+        return predict(self.held_out, fitted.model, free, fit.values, fitted.covariance, misfit, guess)
 
 
 @dataclass
@@ -59,11 +63,22 @@ class Round:
     judged: list[Judged]
 
 
-def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: float, last: float) -> Round:
-    """Screen all candidates on top of `base` and refit those that matter."""
+def run_round(
+    bench: Bench,
+    base: Fitted,
+    foretold: Prediction | None,
+    first: float,
+    last: float,
+    earlier: Round | None = None,
+) -> Round:
+    """Screen all candidates on top of `base` and refit those that matter.
+
+    The fits of an `earlier` round on the same machine, made with another noise, are carried on.
+    """
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
+    absent: dict[str, str] = {}
     for effect in CATALOGUE:
         if effect.name in base.names or (options.candidates and effect.name not in options.candidates):
             continue
@@ -71,27 +86,71 @@ def run_round(bench: Bench, base: Fitted, foretold: Prediction | None, first: fl
             continue
         made = candidate(base.model, free, base.names, effect.name, bench.scales)
         if isinstance(made, str):
-            bench.absent.setdefault(effect.name, made)
+            absent[effect.name] = made
         else:
             candidates[effect.name] = made
     options.progress(f"screening {len(candidates)} effects", first)
-    signatures = [signature(base.problem, base.fit, one) for one in candidates.values()]
-    signatures = [one for one in signatures if one is not None]
-    for name in set(candidates) - {one.name for one in signatures}:
-        bench.absent.setdefault(name, "it changes nothing in these records")
+    shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
+    signatures = [one for one in shown.values() if one is not None]
+    absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
+    if not base.names:
+        bench.absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
     screened = screen(base.fit, signatures)
     chosen = choose(base, screened, options)
     found: list[Judged] = []
     rival = None
+    known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick)
+        fitted = refit(
+            bench.training, base, candidates[name], screened, rival, options.quick, known.get(name)
+        )
+        # what is far behind a machine that leaves only noise and foretells need not foretell
+        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
+        found.append(judged(base, foretold, fitted, told))
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
-        found.append(judged(base, foretold, fitted, bench.foretell(fitted)))
     found.sort(key=lambda one: -one.evidence)
+    _carry_on(bench, base, foretold, candidates, found)
     _cross(bench, base, foretold, candidates, found)
+    foretold, found = _fair(bench, base, foretold, found)
     return Round(base, foretold, candidates, signatures, screened, found)
+
+
+def _out_of_race(fitted: Fitted, found: list[Judged], rival: Fitted | None) -> bool:
+    first = next((one for one in found if one.fitted is rival), None)
+    return bool(
+        first is not None and first.held_out >= 0 and rival.fit.like_noise(2) and beaten(fitted, rival)
+    )
+
+
+def _fair(
+    bench: Bench, base: Fitted, foretold: Prediction | None, found: list[Judged]
+) -> tuple[Prediction | None, list[Judged]]:
+    """The base foretelling also from where the best candidate began, and all held against that."""
+    if foretold is None or not found or found[0].held_out < _WORTH:
+        return foretold, found
+    fairer = bench.foretell(base, found[0].prediction)
+    if fairer.score[fairer.good].sum() <= foretold.score[foretold.good].sum():
+        return foretold, found
+    again = [judged(base, fairer, one.fitted, one.prediction) for one in found]
+    return fairer, sorted(again, key=lambda one: -one.evidence)
+
+
+def _carry_on(
+    bench: Bench,
+    base: Fitted,
+    foretold: Prediction | None,
+    candidates: dict[str, Candidate],
+    found: list[Judged],
+) -> None:
+    """Fit those near the best to their end, however little effort they were thought worth before."""
+    for place, one in enumerate(found):
+        near = found[0].evidence - one.evidence < _NEAR * bench.options.separation
+        if near and not one.fitted.fit.converged:
+            fitted = carried_on(bench.training, candidates[one.name], one.fitted)
+            found[place] = judged(base, foretold, fitted, bench.foretell(fitted, one.prediction))
+    found.sort(key=lambda one: -one.evidence)
 
 
 def _cross(
@@ -112,13 +171,13 @@ def _cross(
             continue
         better = crossed(bench.training, one.fitted, best, candidates[one.name])
         if better is not one.fitted:
-            found[place] = judged(base, foretold, better, bench.foretell(better))
+            found[place] = judged(base, foretold, better, bench.foretell(better, found[0].prediction))
     found.sort(key=lambda one: -one.evidence)
 
 
 def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
-    order = sorted(screened.names, key=lambda name: -screened.gain[name])
+    order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
     if base.fit.reduced_chi2 > _BAD and not options.quick:
         return order
     return [

@@ -7,13 +7,22 @@ of the base machine can imitate is projected out; the rest decides whether the e
 whether it can be told from another (cosines) and how much of the residual it takes (score).
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from separatrix.discovery.catalogue import Candidate
 from separatrix.discovery.fit import Fit, blocks_of, eliminate, solve_scaled
 from separatrix.discovery.problem import Problem
+
+# bootstrap of the null
+_SEED = 22
+_DRAWS = 4000
+_TAIL = 0.05
+# share of a signature below which nothing is left of it
+_NOTHING = 1e-7
 
 
 @dataclass
@@ -39,6 +48,14 @@ class Screened:
     live: dict[str, np.ndarray]
     origin: dict[str, np.ndarray]
     cosines: np.ndarray
+    # what the base leaves of each signature
+    shares: dict[str, float]
+    # as many independent tests would be as likely to raise a false alarm
+    tests: float
+
+    def seen(self, name: str) -> bool:
+        """Whether something of a signature is left beside the base."""
+        return self.shares[name] > _NOTHING
 
     def cosine(self, one: str, other: str) -> float:
         """Largest cosine between what is left of two signatures."""
@@ -118,7 +135,34 @@ def screen(fit: Fit, signatures: list[Signature]) -> Screened:
             cosines[i, j] = cosines[j, i] = min(1.0, float(size))
     live = {one.name: one.live for one in signatures}
     origin = {one.name: one.origin for one in signatures}
-    return Screened(names, gain, step, error, live, origin, cosines)
+    # what the base can do itself is no candidate
+    raw = np.diag(matrix)[p:]
+    share = np.where(raw > 0, np.diag(left) / np.where(raw > 0, raw, 1), 0)
+    own = [float(share[first:last].max(initial=0)) for first, last in itertools.pairwise(edges)]
+    shares = dict(zip(names, own, strict=True))
+    tested = [root if size > _NOTHING else root[:0] for root, size in zip(roots, own, strict=True)]
+    tests = _independent_tests(left, edges, tested) if len(names) > 1 else float(len(names))
+    return Screened(names, gain, step, error, live, origin, cosines, shares, tests)
+
+
+def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarray]) -> float:
+    """How many independent tests the candidates are worth: parametric bootstrap of the linearised null.
+
+    Under a right base the scores of all candidates are Gaussian with the matrix `left` as covariance. The
+    smallest p value of a draw falls below its own 5 % quantile as often as that of so many tests would.
+    """
+    size = np.sqrt(np.maximum(np.diag(left), 1e-300))
+    values, vectors = np.linalg.eigh(left / np.outer(size, size))
+    half = vectors * np.sqrt(np.maximum(values, 0))
+    draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, size.size)) @ half.T * size
+    lowest = np.ones(_DRAWS)
+    for (first, last), root in zip(itertools.pairwise(edges), roots, strict=True):
+        if root.size:
+            squares = np.sum((draws[:, first:last] @ root.T) ** 2, axis=1)
+            lowest = np.minimum(lowest, chi2.sf(squares, root.shape[0]))
+    # signatures that all but vanish are rounding; there are never more tests than parameters
+    least = max(float(np.quantile(lowest, _TAIL)), np.finfo(float).tiny)
+    return float(np.clip(np.log1p(-_TAIL) / np.log1p(-least), 1.0, edges[-1]))
 
 
 def project(

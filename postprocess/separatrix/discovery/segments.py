@@ -33,11 +33,6 @@ class Segments:
         """Number of segments."""
         return self.record.size
 
-    @property
-    def samples(self) -> int:
-        """Number of samples in all segments."""
-        return int(self.inside.sum())
-
 
 def cut(records: list[Record], smoothed: list[Smoothed], lengths: list[int]) -> Segments:
     """Cut each record into segments of about `lengths` samples."""

@@ -27,17 +27,11 @@ class Smoothed:
     covariance: np.ndarray
     # index of the last sample before each impact
     impacts: np.ndarray
-    jerk: float
 
     @property
     def v(self) -> np.ndarray:
         """Velocity [m/s]."""
         return self.state[:, 1]
-
-    @property
-    def v_error(self) -> np.ndarray:
-        """Standard error of the velocity [m/s]."""
-        return np.sqrt(self.covariance[:, 1, 1])
 
 
 def smooth(t: np.ndarray, x: np.ndarray, sigma: float, period_samples: float | None = None) -> Smoothed:
@@ -46,7 +40,7 @@ def smooth(t: np.ndarray, x: np.ndarray, sigma: float, period_samples: float | N
     impacts = detect_impacts(t, x, sigma, window)
     jerk = _tuned_jerk(t, x, sigma, impacts)
     state, covariance, _ = _filter_and_smooth(t, x, sigma, jerk, impacts)
-    return Smoothed(t, state, covariance, impacts, jerk)
+    return Smoothed(t, state, covariance, impacts)
 
 
 def detect_impacts(t: np.ndarray, x: np.ndarray, sigma: float, window: int) -> np.ndarray:

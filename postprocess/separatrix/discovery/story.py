@@ -4,7 +4,7 @@
 
 from separatrix.discovery.options import Options
 from separatrix.discovery.pages import Section, Table
-from separatrix.discovery.wording import digits_of, number, probability, with_unit, words
+from separatrix.discovery.wording import digits_of, interval, number, probability, with_unit, words
 
 GATES = {
     "converged": "the fit converged",
@@ -45,7 +45,12 @@ def names(verdict: dict) -> str:
 def _summary(verdict: dict) -> Section:
     others = ", ".join(_pair(name) for name in verdict["alternatives"])
     said = {
-        "named": f"The base machine lacks: {names(verdict)}. All gates are passed.",
+        "named": f"The base machine lacks: {names(verdict)}. "
+        + (
+            "All gates are passed."
+            if verdict["complete"]
+            else "All gates but the adequacy are passed: a gap remains that the catalogue does not name."
+        ),
         "ambiguous": f"Something is missing that looks like {names(verdict)}, "
         + (f"but {others} would do about as well." if others else "but not every gate is passed."),
         "none": "No effect is missing that these records could show.",
@@ -55,9 +60,9 @@ def _summary(verdict: dict) -> Section:
     for path, one in verdict["parameters"].items():
         if path.startswith("effect."):
             digits = digits_of(one["value"], one["standard_error"])
-            low, high = (number(bound, digits) for bound in one["interval_95"])
+            known = "" if one["interval_95"] is None else "95 % interval "
             lines.append(
-                f"{path} = {with_unit(one['value'], one['unit'], digits)}, 95 % interval {low} to {high}."
+                f"{path} = {with_unit(one['value'], one['unit'], digits)}, {known}{interval(one, digits)}."
             )
     for use, one in verdict["gap"].items():
         change = (
@@ -255,13 +260,12 @@ def _parameters(verdict: dict) -> Section:
     rows = []
     for path, one in verdict["parameters"].items():
         digits = digits_of(one["value"], one["standard_error"])
-        low, high = (number(bound, digits) for bound in one["interval_95"])
         rows.append(
             [
                 path,
                 number(one["value"], digits),
-                number(one["standard_error"], 2),
-                f"{low} to {high}",
+                "-" if one["standard_error"] is None else number(one["standard_error"], 2),
+                interval(one, digits),
                 "" if one["unit"] == "1" else one["unit"],
             ]
         )
@@ -273,19 +277,18 @@ def _parameters(verdict: dict) -> Section:
 
 def _detectable(verdict: dict) -> Section:
     rows = [
-        [words(name), one["path"], with_unit(one["size"], one["unit"], 3)]
+        [words(name), one["path"], with_unit(one["size"], one["unit"], 3), one["reason"]]
         for name, one in verdict["detectable"].items()
     ]
     said = (
         f"The size that each effect would need to stand out by {Options().visible:g} standard errors in "
         "these records. "
-        "What is smaller may be there and could not have been seen; unknown: no size of the effect would "
-        "have shown."
+        "What is smaller may be there and could not have been seen."
     )
     return Section(
         "detectable",
         "What could not have been seen",
-        [said, Table(["effect", "parameter", "smallest size"], rows)],
+        [said, Table(["effect", "parameter", "smallest size", "why not known"], rows)],
     )
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.decide import Decision
+from separatrix.discovery.decoys import decoys
 from separatrix.discovery.judge import Judged
 from separatrix.discovery.limits import detectable, equivalents, separating_experiment
+from separatrix.discovery.misfit import doubted_noise, too_quiet
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.rounds import Bench, Round
 from separatrix.discovery.where import Map, sentences, where_maps
@@ -42,6 +44,7 @@ def verdict_of(findings: Findings) -> dict:
         "equivalent": decision.equivalent,
         "equivalences": equivalents([*final.names, *[names[-1] for names in decision.alternatives]]),
         "parameters": _parameters(final),
+        "base_parameters": _parameters(findings.base),
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "gates": best.gates if best else {},
@@ -51,6 +54,7 @@ def verdict_of(findings: Findings) -> dict:
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
         "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
+        "decoys": decoys(first, bench.options),
         "candidates": [_candidate(one) for one in first.judged],
         "ceiling": {
             one.name: {"gain": one.gain, "rank": one.rank, "p": one.p}
@@ -95,6 +99,12 @@ def _warnings(findings: Findings) -> list[str]:
         for one in (data.prepared if data else ())
         for note in one.notes
     ]
+    best = findings.decision.accepted[0] if findings.decision.accepted else None
+    fits = [(bench.training, best.fitted if best else findings.base)]
+    if bench.held_out is not None:
+        fits.append((bench.held_out, best.prediction if best else findings.decision.foretold))
+    for data, fitted in fits:
+        notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")
@@ -106,7 +116,10 @@ def _warnings(findings: Findings) -> list[str]:
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     if contact and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
-        notes.append(f"no impacts are seen in the records; the fitted machine has {hits}")
+        why = (
+            ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][1].fit) else ""
+        )
+        notes.append(f"no impacts are seen in the records{why}; the fitted machine has {hits}")
     return notes
 
 
@@ -123,6 +136,7 @@ def _records(findings: Findings) -> list[dict]:
                     "memory": one.memory,
                     "resolution": one.resolution,
                     "drive_frequency": one.frequency,
+                    "drive_scale": one.drive_scale,
                     "phase_known": one.phase_known,
                 }
             )
@@ -132,14 +146,19 @@ def _records(findings: Findings) -> list[dict]:
 def _parameters(fitted: Fitted) -> dict:
     errors = np.sqrt(np.diag(fitted.covariance))
     found = {}
-    for one, value, error in zip(fitted.problem.free, fitted.fit.values, errors, strict=True):
+    for one, value, error, held in zip(
+        fitted.problem.free, fitted.fit.values, errors, fitted.fit.at_bound, strict=True
+    ):
         if one.is_nuisance and one.record is not None:
             continue
         parameter = fitted.model.parameters.get(one.path)
+        known = error > 0 and not held
+        ends = [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)]
         found[one.path] = {
             "value": one.physical(value),
-            "standard_error": one.slope(value) * float(error),
-            "interval_95": [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)],
+            "standard_error": one.slope(value) * float(error) if known else None,
+            "interval_95": ends if known else None,
+            "note": "" if known else "at its bound" if held else "these records say nothing about it",
             "unit": parameter.unit if parameter else "1",
         }
     return found

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from separatrix.discovery.ceiling import after_impacts, motion
+from separatrix.discovery.ceiling import after_impacts, scaled_motion
 from separatrix.discovery.fit import blocks_of, eliminate
 from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted
@@ -39,7 +39,7 @@ class Map:
 def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     """Missing forces in the bins of all maps."""
     problem, fit = fitted.problem, fitted.fit
-    state = motion(problem, fit)
+    state = scaled_motion(problem, fit)
     evaluation = fit.evaluation
     x, v = evaluation.x, evaluation.v
     inside = problem.segments.inside & fit.good[:, None]

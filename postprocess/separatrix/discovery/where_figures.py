@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
 
 from separatrix import style
 from separatrix.discovery.figures import BEFORE, LINE, MEASURED
@@ -93,5 +94,7 @@ def where_plane(details: h5py.File) -> Figure | None:
             )  # fmt: skip
     ax.set_xlabel("position $x$ (m)")
     ax.set_ylabel("velocity $v$ (m/s)")
-    figure.colorbar(image, ax=ax, label="missing force (N)")
+    power = 10.0 ** np.floor(np.log10(largest))
+    bar = figure.colorbar(image, ax=ax, label="missing force (N)", ticks=[-power, 0.0, power])
+    bar.ax.yaxis.set_minor_locator(NullLocator())
     return figure

@@ -18,9 +18,24 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e6 else text
 
 
-def digits_of(value: float, error: float) -> int:
+def digits_of(value: float, error: float | None) -> int:
     """Digits that show a value to two digits of its standard error, at least 4."""
-    return 4 if not error > 0 or value == 0 else max(4, math.ceil(math.log10(abs(value) / error)) + 2)
+    return 4 if not error or value == 0 else max(4, math.ceil(math.log10(abs(value) / error)) + 2)
+
+
+def with_error(one: dict, digits: int) -> str:
+    """A parameter of the verdict with its standard error, or why it has none."""
+    unit = "" if one["unit"] == "1" else f" {one['unit']}"
+    if one["standard_error"] is None:
+        return f"{one['value']:.{digits}g}{unit}, {one['note']}"
+    return f"{one['value']:.{digits}g} +- {one['standard_error']:.2g}{unit}"
+
+
+def interval(one: dict, digits: int) -> str:
+    """The 95 % interval of a parameter of the verdict, or why it has none."""
+    if one["interval_95"] is None:
+        return one["note"]
+    return " to ".join(number(end, digits) for end in one["interval_95"])
 
 
 def probability(value: float) -> str:

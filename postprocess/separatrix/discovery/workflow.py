@@ -11,15 +11,15 @@ import numpy as np
 from separatrix.discovery.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.data import fit_stages, gather, scales_of
 from separatrix.discovery.decide import decide
-from separatrix.discovery.machine import record_nuisances, with_values
+from separatrix.discovery.machine import on_other_records, with_values
 from separatrix.discovery.options import Options
-from separatrix.discovery.partial import name_in_part
+from separatrix.discovery.partial import decide_in_part, nearest
 from separatrix.discovery.preflight import prepare
 from separatrix.discovery.records import Record, read_record, unique_names
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.rounds import Bench
 from separatrix.discovery.verdict import Findings, verdict_of
-from separatrix.errors import SeparatrixError
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
 
 
@@ -46,8 +46,9 @@ def investigate(
     options = options or Options()
     model = _model(base)
     training, held_out, chosen = _split([_record(one) for one in records], [_record(one) for one in hold_out])
+    _all_different([*training, *held_out])
     unique_names([*training, *held_out])
-    still = None if rest is None else _record(rest)
+    still = None if rest is None else _record(rest, at_rest=True)
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[prepare(one, model, still) for one in group] for group in (training, held_out)]
     data = gather(prepared[0], options.segment_periods, options.segment_seconds)
@@ -60,9 +61,11 @@ def investigate(
     if foretold is not None:
         _prepare_held_out(foretold, data, model, fitted, scales.mass)
     bench = Bench(data, foretold, scales, options)
-    decision = decide(bench, fitted)
-    if options.partial and decision.outcome == "not-in-catalogue":
-        decision = name_in_part(bench, decision)
+    if options.partial:
+        decision = decide_in_part(bench, fitted)
+    else:
+        decision = decide(bench, fitted)
+        decision.reasons += nearest(bench, decision)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)
@@ -73,13 +76,7 @@ def investigate(
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
     """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
     free = with_values(fitted.problem.free, fitted.fit.values)
-    shared = [one for one in free if one.record is None]
-    own = (
-        record_nuisances([one.phase_known for one in held_out.prepared])
-        if held_out.prepared[0].frequency
-        else []
-    )
-    whole = shared + own
+    whole = on_other_records(free, held_out.prepared)
     find_phases(held_out, model, whole)
     problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0, 1])
     measure_noise(held_out, problem, fit, mass)
@@ -92,8 +89,8 @@ def _model(base: object):
     return base
 
 
-def _record(one: Path | Record) -> Record:
-    return one if isinstance(one, Record) else read_record(Path(one))
+def _record(one: Path | Record, at_rest: bool = False) -> Record:
+    return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
 def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record], list[Record], str]:
@@ -109,6 +106,14 @@ def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record],
         [_cut(whole, at, whole.t.size, "_end")],
         "the last 30 % of the only record",
     )
+
+
+def _all_different(records: list[Record]) -> None:
+    """Refuse a record that is given twice: it would count twice, or foretell itself."""
+    for place, one in enumerate(records):
+        for other in records[:place]:
+            if np.array_equal(one.x, other.x) and np.array_equal(one.t, other.t):
+                raise SeparatrixError(f"{one.file}: the same record as {other.file}", USAGE)
 
 
 def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
@@ -133,5 +138,6 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         header=header,
         pieces=pieces,
         warnings=list(record.warnings),
+        file=record.file,
         **channels,
     )

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 
 from separatrix import style
 from separatrix.discovery.figures import AFTER, BEFORE, MEASURED
+from separatrix.discovery.machine import drive_amplitudes
 from separatrix.discovery.pages import Picture, Section
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
@@ -111,11 +112,13 @@ def _fill(
         ),
     ]
     start = start_of(details, held or list(marks))
+    scale = next(one["drive_scale"] for one in verdict["records"] if one["name"] == start.record)
     speeds = {}
     for stage, case in cases.items():
         progress(f"a long motion of the {_label(stage)}", 0.97)
         ratio = marks[start.record] / unit[stage]
-        speeds[stage] = impact_speeds(program, case, ratio, start, stage, folder)
+        scaled = case if scale == 1 else with_drive(case, scale, folder / f"{stage}.toml")
+        speeds[stage] = impact_speeds(program, scaled, ratio, start, stage, folder)
     if start.speeds.size or any(one.size for one in speeds.values()):
         section.body.append(
             Picture(
@@ -219,6 +222,14 @@ def start_of(details: h5py.File, names: list[str]) -> Start:
     return Start(
         name, float(state[0]), float(state[1]), angles, float(t[-1] - t[0]), np.abs(record["impacts"][:, 2])
     )
+
+
+def with_drive(case: Path, scale: float, target: Path) -> Path:
+    """The case with `scale` times its drive, written to `target`."""
+    model = Model.read(case)
+    scaled = {path: scale * value for path, value in drive_amplitudes(model).items()}
+    target.write_text(model.to_text(scaled), encoding="utf-8")
+    return target
 
 
 def impact_speeds(

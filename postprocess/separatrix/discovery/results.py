@@ -4,6 +4,8 @@
 
 import json
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import h5py
@@ -14,26 +16,57 @@ from separatrix.discovery.ceiling import sample_times
 from separatrix.discovery.refit import Fitted
 from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.verdict import Findings
+from separatrix.discovery.wording import with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
+FILES = ("details.h5", "extended.toml", "report.html", "report.pdf", "verdict.json")
+"""All that a run may leave in its folder."""
 
-def write_all(folder: Path, verdict: dict, findings: Findings) -> list[Path]:
-    """Write verdict.json, extended.toml (where effects were named) and details.h5; all or nothing."""
+
+@contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """Give a draft folder; at its end its files take the place of those in `folder`, and what it lacks goes.
+
+    After an error nothing has changed.
+    """
+    made = [one for one in (folder, *folder.parents) if not one.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as name:
-            work = Path(name)
-            made = [work / "verdict.json", work / "details.h5"]
-            made[0].write_text(json.dumps(plain(verdict), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-            write_details(made[1], findings)
-            if findings.decision.accepted:
-                made.append(work / "extended.toml")
-                made[-1].write_text(extended_case(verdict, findings), encoding="utf-8")
-            for path in made:
-                path.replace(folder / path.name)
-    except OSError as error:
-        raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
-    return [folder / path.name for path in made]
+            draft = Path(name)
+            yield draft
+            for file in FILES:
+                if (draft / file).exists():
+                    (draft / file).replace(folder / file)
+                else:
+                    # that of an earlier run would look like one of this
+                    (folder / file).unlink(missing_ok=True)
+    except BaseException as error:
+        with suppress(OSError):
+            for one in made:
+                one.rmdir()
+        if isinstance(error, OSError):
+            raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
+        raise
+
+
+def require_writable(folder: Path) -> None:
+    """Refuse a folder that no results could be written to, before any work; nothing is left behind."""
+    with suppress(_UndoneError), replacing(folder):
+        raise _UndoneError
+
+
+class _UndoneError(Exception):
+    """A draft that is not wanted."""
+
+
+def write_results(folder: Path, verdict: dict, findings: Findings) -> None:
+    """Write verdict.json, details.h5 and, where effects were named, extended.toml."""
+    text = json.dumps(plain(verdict), indent=2, allow_nan=False) + "\n"
+    (folder / "verdict.json").write_text(text, encoding="utf-8")
+    write_details(folder / "details.h5", findings)
+    if findings.decision.accepted:
+        (folder / "extended.toml").write_text(extended_case(verdict, findings), encoding="utf-8")
 
 
 def plain(value: object) -> object:
@@ -66,8 +99,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
     for path in fitted.model.parameters:
         found = verdict["parameters"].get(path)
         if found:
-            unit = "" if found["unit"] == "1" else f" {found['unit']}"
-            lines.append(f"# {path} = {found['value']:.6g} +- {found['standard_error']:.2g}{unit}")
+            lines.append(f"# {path} = {with_error(found, 6)}")
     return "\n".join([*lines, machine_text(fitted)])
 
 
@@ -155,7 +187,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             length = inside.shape[1]
             group["residual"] = fit.evaluation.residual[rows, :length][inside]
             group["good"] = fit.good[rows]
-            group.attrs["crank_angle"] = problem.crank_angle(number, fit.values, float(prepared.record.t[0]))
+            group.attrs["crank_angle"] = float(problem.crank_angle(number, fit.values, prepared.record.t[0]))
             impacts = fit.evaluation.impacts[number]
             group["impacts"] = np.zeros((0, 5)) if impacts is None else impacts
             group["impacts"].attrs["columns"] = "segment time speed_before speed_after side"

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records that a machine misses, and stated noise that cannot be right, by the chi^2 of each record."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from separatrix.discovery.data import Data
+from separatrix.discovery.fit import Fit
+from separatrix.discovery.noise import noise_of
+from separatrix.discovery.options import Options
+from separatrix.discovery.preflight import Prepared, white_noise
+from separatrix.discovery.problem import Problem
+
+# reduced chi^2 below which the noise must be smaller than stated
+_TOO_LITTLE = 0.5
+_ENOUGH = 50
+# factor of the scatter over the stated noise that is worth a word
+_DISAGREEMENT = 1.3
+
+
+def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
+    """Reduced chi^2 of each record and its degrees of freedom; the machine counts as known."""
+    record = data.stages[data.last].record
+    found = {}
+    for number in range(len(data.prepared)):
+        rows = (record == number) & fit.good
+        freedom = int(fit.counts[rows].sum() - 2 * rows.sum())
+        if freedom > 0:
+            found[number] = (float(fit.chi2[rows].sum() / freedom), freedom)
+    return found
+
+
+def missed(data: Data, fit: Fit, options: Options) -> list[str]:
+    """Return the records whose reduced chi^2 is that of no adequate model and no chance, in words."""
+    found = record_chi2(data, fit)
+    return [
+        f"{data.prepared[number].record.name} (reduced chi^2 {size:.4g})"
+        for number, (size, freedom) in found.items()
+        if size > _limit(data.prepared[number], options)
+        and chi2.sf(size * freedom, freedom) < options.detection_level / len(found)
+    ]
+
+
+def _limit(one: Prepared, options: Options) -> float:
+    """Reduced chi^2 above which a record is missed: noise that nobody stated is itself an estimate."""
+    return options.adequate_chi2 if one.sigma_stated else options.missed_chi2
+
+
+def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:
+    """Return in words what noise cannot be as stated, by the best machine that was found.
+
+    More scatter counts only if the fourth differences of the samples show it too: a machine that lacks
+    something leaves more than noise.
+    """
+    notes = []
+    factors, _ = noise_of(problem, fit, 0, mass)
+    found = record_chi2(data, fit)
+    for number, one in enumerate(data.prepared):
+        if not one.sigma_stated or number not in found:
+            continue
+        scatter = min(one.sigma * factors.get(number, 1.0), white_noise(one.record.x))
+        if scatter > _DISAGREEMENT * one.sigma:
+            notes.append(f"{_stated(one)} scatter by {scatter:.3g} m")
+        size, freedom = found[number]
+        if size < _TOO_LITTLE and freedom > _ENOUGH:
+            notes.append(
+                f"{_stated(one)} scatter by only {one.sigma * np.sqrt(size):.3g} m: "
+                "what is smaller than the stated noise is overlooked"
+            )
+    return notes
+
+
+def _stated(one: Prepared) -> str:
+    return f"{one.record.name}: noise is stated as {one.sigma:.3g} m, the samples"
+
+
+def too_quiet(data: Data, fit: Fit) -> bool:
+    """Whether records scatter by far less than their noise is said to be."""
+    found = record_chi2(data, fit)
+    return any(
+        data.prepared[number].sigma_stated and size < _TOO_LITTLE and freedom > _ENOUGH
+        for number, (size, freedom) in found.items()
+    )

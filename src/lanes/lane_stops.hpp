@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// Lanes where they are to stop: at the section, or before it.
+#ifndef SEPARATRIX_LANE_STOPS_HPP
+#define SEPARATRIX_LANE_STOPS_HPP
+
+#include "lane_motion.hpp"
+
+namespace {
+
+// The attractors that have captured points on the section, 0 = none; as `find_capture` of `attractors.f90`.
+inline vec captors(const lane_batch &batch, vec x, vec v) {
+  vec captor = {};
+  for (int i = batch.regions - 1; i >= 0; i--) {
+    const lane_region &r = batch.region[i];
+    vec dx = (x - r.x) * r.stretch_x, dv = (v - r.v) * r.stretch_v;
+    vec square = r.metric_xx * dx * dx + 2 * r.metric_xv * dv * dx + r.metric_vv * dv * dv;
+    put(captor, square <= r.reach, r.attractor);
+  }
+  return captor;
+}
+
+// Lanes `there`, where they are to stop. At the end of a period the clock starts anew, and those that need
+// not stop pass.
+template <bool damping>
+inline void take_stops(const lane_machine &m, mask there, const lane_batch &batch, lane_group &g) {
+  if (!any(there))
+    return;
+  kinematics k = evaluate<damping>(m, g, g.until - g.start);
+  mask section = there & (g.until >= m.period);
+  vec captor = captors(batch, k.x, k.v);
+  mask passing =
+      section & (g.sections > 0.5) & (magnitude(k.x) <= m.domain) & ((captor < 0.5) | (g.leaves < 0.5));
+  passing = batch.complete ? passing : mask{};
+  put(g.flights, there, g.flights + 1.0);
+  put(g.x, there, k.x);
+  put(g.v, there, k.v);
+  put(g.time, there, pick(section, vec{}, g.until));
+  put(g.start, section, g.start - m.period);
+  put(g.elapsed, passing, g.elapsed + m.period);
+  put(g.captor, passing, captor);
+  put(g.settled, passing, pick(captor < 0.5, -1, pick(g.settled < 0.0, g.elapsed, g.settled)));
+  put(g.sections, passing, g.sections - 1.0);
+  put(g.status, there & ~passing, lane_stopped);
+}
+
+} // namespace
+
+#endif

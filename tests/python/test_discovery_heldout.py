@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Two machines compared on held-out records, and the choice among machines that are all wrong."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from separatrix.discovery.heldout import Prediction, gained
+from separatrix.discovery.judge import Judged
+from separatrix.discovery.options import Options
+from separatrix.discovery.partial import preferred
+
+SEGMENTS = 40
+
+
+def prediction(chi2, score, misfit):
+    """A prediction of segments with these squared errors and scores."""
+    chi2 = np.asarray(chi2, float)
+    every = np.ones(chi2.size, bool)
+    fit = SimpleNamespace(chi2=chi2, counts=np.full(chi2.size, 50), good=every)
+    problem = SimpleNamespace(free=[])
+    return Prediction(np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, 0, misfit)
+
+
+def candidate(foretold, parameters, training):
+    """A candidate with nothing but what the choice needs."""
+    count = foretold.good.size
+    fit = SimpleNamespace(
+        reduced_chi2=foretold.misfit,
+        chi2=np.full(count, -2 * training / count),
+        good=foretold.good,
+        at_bound=np.zeros(parameters, bool),
+    )
+    fitted = SimpleNamespace(fit=fit, added=tuple(range(parameters)))
+    return Judged(fitted, foretold, training, 0.0, np.zeros(count), parameters)
+
+
+def test_of_two_wrong_machines_the_one_with_smaller_errors_wins_however_uncertain_the_other():
+    worse, better = prediction([900.0], [-10.0], 500.0), prediction([400.0], [-30.0], 80.0)
+    assert gained(better, worse) == pytest.approx([250.0])
+    assert gained(worse, better) == pytest.approx([-250.0])
+
+
+@pytest.mark.parametrize("misfit", [1.0, 1.4])
+def test_a_machine_near_the_noise_is_judged_by_its_predictive_density(misfit):
+    wrong, right = prediction([90.0], [-40.0], 1.3), prediction([50.0], [-27.0], misfit)
+    assert gained(right, wrong) == pytest.approx([13.0])
+
+
+def test_candidates_over_one_base_are_ranked_as_against_each_other():
+    """The density of a wrong base, its parameters hardly known, hides what a right machine gains over it."""
+    base = prediction([9000.0], [-300.0], 600.0)
+    wrong, right = prediction([900.0], [-100.0], 30.0), prediction([50.0], [-27.0], 1.0)
+    assert gained(right, base) - gained(wrong, base) == pytest.approx(gained(right, wrong))
+    assert gained(right, wrong) > 0
+
+
+def test_segments_that_one_machine_cannot_fly_count_for_neither():
+    one, other = prediction([4.0, 5.0], [-2.0, -2.5], 9.0), prediction([8.0, 9.0], [-4.0, -4.5], 9.0)
+    one.good = np.array([True, False])
+    assert gained(one, other) == pytest.approx([2.0, 0.0])
+
+
+@pytest.mark.parametrize(("lead", "chosen"), [(0.0, 1), (40.0, 2)])
+def test_more_parameters_are_taken_only_if_they_foretell_better_beyond_chance(lead, chosen):
+    scatter = np.random.default_rng(3).normal(0, 20, SEGMENTS)
+    simple = candidate(prediction(np.full(SEGMENTS, 400.0), np.zeros(SEGMENTS), 8.0), 1, 5000.0)
+    rich = candidate(prediction(400.0 - lead + scatter, np.zeros(SEGMENTS), 8.0), 2, 6000.0)
+    best, rivals = preferred([simple, rich], Options())
+    assert best.parameters == chosen
+    assert rivals == []

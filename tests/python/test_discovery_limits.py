@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The experiment that would tell rivals apart is one experiment; what the base imitates has no size."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from program import CASE
+from separatrix.discovery.fit import minimise
+from separatrix.discovery.limits import detectable, distance
+from separatrix.discovery.machine import Free, base_parameters
+from separatrix.discovery.options import Options
+from separatrix.discovery.preflight import prepare
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.records import make_record
+from separatrix.discovery.refit import Fitted
+from separatrix.discovery.segments import padded
+from separatrix.library import Model
+
+
+class Spy:
+    """A model that remembers what it was asked to fly."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.asked = model, []
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.model, name)
+
+    def segments(self, active: list[str], values: np.ndarray, start: np.ndarray, *more, **options) -> object:
+        self.asked.append((dict(zip(active, values, strict=True)), start))
+        return self.model.segments(active, values, start, *more, **options)
+
+
+def fitted(stiffness: float) -> Fitted:
+    """The machine with another stiffness, on a record of half of its drive that begins at 0.7 rad."""
+    t = np.arange(600) / 100
+    head = {"drive_ratio": 1.2, "phase": 0.7, "drive_scale": 0.5, "sensor_noise_sigma_m": 1e-3}
+    record = make_record("record", {"t": t, "x": 0.7 + 0.2 * np.cos(11.3 * t)}, head)
+    model = Spy(Model.from_text(CASE))
+    free = base_parameters(model, measured_force=False)
+    first = np.arange(0, 600, 50)
+    problem = Problem(model, [prepare(record, model)], padded(0 * first, first, first + 50), free)
+    values = np.array(
+        [stiffness * one.value if one.path.endswith("stiffness") else one.value for one in free]
+    )
+    fit = minimise(problem, values, np.column_stack([record.x[first], 0 * first]), most=0)
+    model.asked.clear()
+    return Fitted((), model, problem, fit, ())
+
+
+@pytest.fixture(autouse=True)
+def library(build_dir, monkeypatch) -> None:
+    """The library of the build that is tested."""
+    path = build_dir / "lib" / "libseparatrix.so"
+    if not path.is_file():
+        pytest.skip(f"{path} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
+
+
+def test_both_machines_get_the_same_drive_from_the_same_starts():
+    one, other = fitted(1.0), fitted(1.04)
+    assert distance(one, one, 9.0) == 0
+    one.model.asked.clear()
+    assert distance(one, other, 9.0) > 0
+    (values, start), (other_values, other_start) = one.model.asked[0], other.model.asked[0]
+    assert np.array_equal(start, other_start)
+    assert one.model.drive_frequency(values) == pytest.approx(9.0)
+    assert other.model.drive_frequency(other_values) == pytest.approx(9.0)
+    frequency = one.problem.prepared[0].frequency
+    assert start[:, 2] == pytest.approx(0.7 + frequency * 0.5 * np.arange(12))
+    amplitude = one.model.parameters["drive.cosine[1]"].value
+    assert values["drive.cosine[1]"] == other_values["drive.cosine[1]"] == pytest.approx(0.5 * amplitude)
+
+
+@pytest.mark.parametrize(
+    ("seen", "error", "size"), [(True, 0.4, 1.0), (True, 1e9, None), (False, 1e-9, None)]
+)
+def test_an_effect_that_the_base_imitates_has_no_smallest_size(seen, error, size):
+    path = "effect.coulomb.force"
+    parameters = {path: SimpleNamespace(unit="N")}
+    made = SimpleNamespace(
+        free=[Free(path, 0.0, size=0.5)], added=(0,), model=SimpleNamespace(parameters=parameters)
+    )
+    screened = SimpleNamespace(
+        names=["coulomb"], seen=lambda name: seen, live={"coulomb": np.array([True])},
+        error={"coulomb": np.array([error])},
+    )  # fmt: skip
+    found = detectable(
+        SimpleNamespace(options=Options(visible=5.0)),
+        SimpleNamespace(candidates={"coulomb": made}, screened=screened),
+    )["coulomb"]
+    assert found["size"] == (None if size is None else pytest.approx(size))
+    assert ("imitate" in found["reason"]) == (size is None)

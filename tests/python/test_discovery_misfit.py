@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A record that the machine misses is never passed over, and noise is doubted where the samples say so."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from separatrix.discovery import misfit
+from separatrix.discovery.decide import Decision, _without_name
+from separatrix.discovery.misfit import doubted_noise, missed, too_quiet
+from separatrix.discovery.options import Options
+
+SAMPLES, SEGMENTS = 50, 20
+
+
+def data(sigma: float, scatter: float) -> SimpleNamespace:
+    """Two records of a smooth motion whose samples scatter by `scatter`, the noise stated as `sigma`."""
+    t = np.arange(SAMPLES * SEGMENTS) / 500
+    noise = np.random.default_rng(4).standard_normal((2, t.size))
+    prepared = [
+        SimpleNamespace(
+            record=SimpleNamespace(name=name, x=np.sin(9 * t) + scatter * one),
+            sigma=sigma,
+            sigma_stated=True,
+        )
+        for name, one in zip(("first", "second"), noise, strict=True)
+    ]
+    stages = [SimpleNamespace(record=np.repeat([0, 1], SEGMENTS))]
+    return SimpleNamespace(prepared=prepared, stages=stages, last=0)
+
+
+def fit(first: float, second: float) -> SimpleNamespace:
+    """A fit that leaves these reduced chi^2 of the two records."""
+    size = np.repeat([first, second], SEGMENTS)
+    return SimpleNamespace(
+        chi2=size * (SAMPLES - 2),
+        counts=np.full(2 * SEGMENTS, SAMPLES),
+        good=np.ones(2 * SEGMENTS, bool),
+        reduced_chi2=0.5 * (first + second),
+    )
+
+
+def test_the_records_that_are_missed_are_named():
+    assert missed(data(1, 1), fit(1.05, 1.0), Options()) == []
+    assert missed(data(1, 1), fit(1.0, 1.4), Options()) == ["second (reduced chi^2 1.4)"]
+
+
+@pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])
+def test_nothing_is_missing_only_if_all_records_are_explained(training, held_out, outcome):
+    bench = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
+    first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
+    foretold = SimpleNamespace(fit=fit(1, held_out))
+    decision = Decision("none", [], [], [], [first], SimpleNamespace(p=0.5), foretold)
+    assert _without_name(bench, decision).outcome == (outcome or "not-in-catalogue")
+    assert bool(decision.reasons) == (not outcome)
+
+
+def test_stated_noise_is_doubted_where_the_samples_show_another(monkeypatch):
+    """Scatter that only the fit shows is what the machine lacks."""
+    monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 30.0, 1: 30.0}, 0.0))
+    assert doubted_noise(data(1e-3, 1e-3), None, fit(900, 900), 1) == []
+    said = doubted_noise(data(1e-4, 1e-3), None, fit(900, 900), 1)
+    assert [text.split(":")[0] for text in said] == ["first", "second"]
+    assert "stated as 0.0001 m" in said[0]
+
+
+def test_noise_that_is_stated_too_large_is_doubted(monkeypatch):
+    monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 0.01, 1: 0.01}, 0.0))
+    said = doubted_noise(data(0.1, 1e-3), None, fit(1e-4, 1e-4), 1)
+    assert all("scatter by only 0.001 m" in text for text in said)
+    assert len(said) == 2
+    assert too_quiet(data(0.1, 1e-3), fit(1e-4, 1))
+    assert not too_quiet(data(0.1, 0.1), fit(1, 1))

@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drive and force of a record are taken at the right time: also after a gap, and in a part of a record."""
+
+import numpy as np
+import pytest
+from program import CASE
+from separatrix.discovery.preflight import prepare
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.records import Record, make_record
+from separatrix.discovery.segments import padded
+from separatrix.discovery.workflow import _split
+from separatrix.errors import SeparatrixError
+from separatrix.library import Model
+
+PUSHED = """\
+[body]
+mass = 2
+[restoring]
+law = "none"
+[drive]
+law = "measured_force"
+interval = 1
+force = [0, 0]
+"""
+RATE, START = 9.9, 0.7
+
+
+@pytest.fixture(autouse=True)
+def library(build_dir, monkeypatch) -> None:
+    """The library of the build that is tested."""
+    path = build_dir / "lib" / "libseparatrix.so"
+    if not path.is_file():
+        pytest.skip(f"{path} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
+
+
+def driven(t: np.ndarray, **header) -> Record:
+    """A record of the size of the machine with its measured crank angle, turned back to 0 to 2 pi."""
+    x = 0.8 + 0.2 * np.cos(RATE * t)
+    phi = np.mod(START + RATE * t, 2 * np.pi)
+    return make_record("driven", {"t": t, "x": x, "phi": phi}, {"sensor_noise_sigma_m": 1e-4, **header})
+
+
+def test_a_measured_crank_angle_counts_from_the_rows_that_it_is_fitted_to():
+    model = Model.from_text(CASE)
+    record = driven(np.arange(800) / 100, phase=START)
+    training, held_out, _ = _split([record], [])
+    for part in (*training, *held_out):
+        prepared = prepare(part, model)
+        angle = prepared.phase + prepared.frequency * (part.t - prepared.origin)
+        assert np.cos(angle - START - RATE * part.t) == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.3, 2.0, 61.7])
+def test_a_measured_crank_angle_is_followed_across_a_gap(gap):
+    t = np.arange(800) / 100
+    t[300:] += gap
+    prepared = prepare(driven(t), Model.from_text(CASE))
+    assert prepared.frequency == pytest.approx(RATE, rel=1e-9)
+    angle = prepared.phase + prepared.frequency * (t - prepared.origin)
+    assert np.cos(angle - START - RATE * t) == pytest.approx(1, abs=1e-9)
+
+
+def pushed(t: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns and velocity of a mass of 2 kg under 3 cos(2 t) N."""
+    x, v = -0.375 * np.cos(2 * t), 0.75 * np.sin(2 * t)
+    return {"t": t, "x": x, "force": 3 * np.cos(2 * t)}, v
+
+
+def test_a_measured_force_acts_at_its_time_after_a_gap():
+    t = np.arange(2000) * 0.005
+    kept = (t < 4) | (t >= 6.003)
+    columns, v = pushed(t[kept])
+    record = make_record("pushed", columns, {"sensor_noise_sigma_m": 1e-4})
+    model = Model.from_text(PUSHED)
+    edge = record.pieces[1][0]
+    first = np.array([0, edge - 100, edge, record.t.size - 100])
+    problem = Problem(model, [prepare(record, model)], padded(np.zeros(4, int), first, first + 100), [])
+    found = problem.evaluate(np.zeros(0), np.column_stack([record.x[first], v[first]]), derivatives=False)
+    assert not found.failed.any()
+    # linear interpolation between samples is good to 1e-5 of the force
+    assert np.abs(found.residual).max() < 0.2
+
+
+def test_a_measured_force_at_two_rates_is_refused():
+    t = np.concatenate([np.arange(500) * 0.005, 4 + np.arange(500) * 0.006])
+    columns, _ = pushed(t)
+    with pytest.raises(SeparatrixError, match=r"row 501.*0\.006 s.*0\.005 s"):
+        prepare(make_record("pushed", columns), Model.from_text(PUSHED))
+
+
+def test_a_machine_under_measured_force_needs_one():
+    columns, _ = pushed(np.arange(500) * 0.005)
+    del columns["force"]
+    with pytest.raises(SeparatrixError, match="no column 'force'"):
+        prepare(make_record("pushed", columns), Model.from_text(PUSHED))
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "words"),
+    [
+        ("phi", 0, "'phi' advances by 0 rad"),
+        ("v", 0, "'v' is constant"),
+        ("v", 1000, r"'v' is 100\d times the slope of 'x'.*m/s"),
+        ("v", -1, "'v' is not the velocity of 'x'"),
+    ],
+)
+def test_channels_that_cannot_be_what_they_are_called_are_refused(channel, factor, words):
+    t = np.arange(800) / 100
+    x = 0.8 + 0.2 * np.cos(RATE * t)
+    true = {"phi": RATE * t, "v": -0.2 * RATE * np.sin(RATE * t) + 0.01 * np.cos(333 * t)}
+    record = make_record("odd", {"t": t, "x": x, channel: factor * true[channel]}, {"phase": 0})
+    with pytest.raises(SeparatrixError, match=words):
+        prepare(record, Model.from_text(CASE))

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Derivatives of the short-segment likelihood are those of its residuals."""
+
+import numpy as np
+import pytest
+from program import CASE
+from separatrix.discovery.ceiling import ceiling
+from separatrix.discovery.fit import minimise
+from separatrix.discovery.machine import base_parameters, drive_nuisances
+from separatrix.discovery.preflight import prepare
+from separatrix.discovery.problem import Problem
+from separatrix.discovery.records import make_record
+from separatrix.discovery.segments import padded
+from separatrix.library import Model
+
+RATE, LENGTH = 200, 60
+
+
+@pytest.fixture
+def flown(build_dir, monkeypatch) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """Two records with v at different drives, all free; values off those of the case, and starts."""
+    library = build_dir / "lib" / "libseparatrix.so"
+    if not library.is_file():
+        pytest.skip(f"{library} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+    model = Model.from_text(CASE)
+    t = np.arange(1200) / RATE
+    prepared = []
+    for number, (ratio, scale) in enumerate(((0.9, 1.2), (1.2, 0.95))):
+        values = {"drive.ratio": ratio}
+        values |= {
+            path: scale * one.value
+            for path, one in model.parameters.items()
+            if path.startswith(("drive.cosine", "drive.sine"))
+        }
+        start = np.array([(0.6, 2.0, 0.4 + number)])
+        motion = model.segments(list(values), np.array(list(values.values())), start, [0, t.size], t)
+        head = {"drive_ratio": ratio, "drive_scale": scale, "phase": 0.4 + number}
+        head |= {"sensor_noise_sigma_m": 1e-3, "sensor_noise_sigma_m_s": 1e-2}
+        prepared.append(
+            prepare(make_record(f"r{number}", {"t": t, "x": motion.x, "v": motion.v}, head), model)
+        )
+        prepared[-1].memory = 0.3 * number
+    first = np.tile(np.arange(0, t.size, LENGTH), 2)
+    record = np.repeat([0, 1], first.size // 2)
+    free = base_parameters(model, measured_force=False) + drive_nuisances(model, [False, False])
+    problem = Problem(model, prepared, padded(record, first, first + LENGTH), free)
+    off = {"nuisance:drive_scale": 1.03, "nuisance:clock": 0.015, "nuisance:phase": 0.02}
+    values = np.array([off.get(one.path, 1.01 * one.value) for one in free])
+    starts = np.array(
+        [(prepared[r].record.x[k], prepared[r].record.v[k]) for r, k in zip(record, first, strict=True)]
+    )
+    return problem, values, starts
+
+
+def test_derivatives_are_central_differences(flown):
+    problem, values, starts = flown
+    found = problem.evaluate(values, starts)
+    good = found.steady & ~found.failed
+    # samples next to impacts and a channel of velocities take part
+    assert (found.hits[good] > 0).sum() >= 5
+    assert found.residual.shape[1] == 2 * LENGTH
+    names = [one.path for one in problem.free]
+    assert {"nuisance:drive_scale", "nuisance:phase", "nuisance:clock", "restoring.stiffness"} <= set(names)
+
+    def slope(by_values: np.ndarray, by_starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Central difference of minus the residuals, and where no impact passes a sample meanwhile."""
+        ends = [
+            problem.evaluate(values + s * by_values, starts + s * by_starts, derivatives=False).residual[good]
+            for s in (1, 0.5, -0.5, -1)
+        ]
+        whole, half = -(ends[0] - ends[3]) / 2, -(ends[1] - ends[2])
+        return whole, np.abs(whole - half) < 1e-3 * np.abs(whole).max() + 1e-9
+
+    for j, one in enumerate(problem.free):
+        step = np.zeros(values.size)
+        step[j] = 1e-6 * (abs(values[j]) if abs(values[j]) > 0.1 else 1.0)
+        wanted, smooth = slope(step, 0 * starts)
+        wanted /= step[j]
+        assert smooth.mean() > 0.999, one
+        size = np.abs(wanted).max()
+        assert size > 0, one
+        assert np.abs(found.by_parameter[good, :, j] - wanted)[smooth].max() < 2e-4 * size, one
+    for k in range(2):
+        step = np.zeros(2)
+        step[k] = 1e-7
+        wanted, smooth = slope(0 * values, step)
+        wanted /= 1e-7
+        assert smooth.mean() > 0.999
+        assert np.abs(found.by_start[good, :, k] - wanted)[smooth].max() < 2e-4 * np.abs(wanted).max()
+
+
+def test_kicks_at_impacts_are_among_what_is_tried(flown):
+    """The barrier is an upper one: the speed falls at its impacts."""
+    problem, values, starts = flown
+    fit = minimise(problem, values, starts, most=0)
+    found = {one.name: one for one in ceiling(problem, fit, 1.0).families}
+    # constant, with speed, its square and cube, and with time and its square
+    assert found["impacts"].rank == 6

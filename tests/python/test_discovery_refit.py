@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A machine that contains the base fits no worse, or its fit is not taken for converged."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from separatrix.discovery import refit
+from separatrix.discovery.fit import Fit
+from separatrix.discovery.machine import Free
+from separatrix.discovery.refit import Fitted
+
+FREE = [Free("restoring.stiffness", 9.0), Free("effect.viscous.damping", 0.5, lower=0.0)]
+
+
+def fit(values: list[float], chi2: float) -> Fit:
+    """A fit of four segments that seems converged."""
+    ones = np.ones(4)
+    flown = SimpleNamespace(steady=ones > 0, failed=ones < 0)
+    starts, open_ = np.zeros((4, 2)), np.zeros(len(values), bool)
+    return Fit(np.array(values), starts, flown, None, chi2 * ones, 50 * ones, 0.0, 1, open_, ~open_)
+
+
+@pytest.mark.parametrize(("linear", "lowest", "wanted", "converged"), [
+    (True, 100.0, [8.0, 0.0], True),
+    (True, 120.0, [8.0, 0.0], False),
+    (False, 100.0, [9.0, 0.5], True),
+])  # fmt: skip
+def test_a_candidate_is_fitted_from_the_base_before_it_is_worse(
+    monkeypatch, linear, lowest, wanted, converged
+):
+    monkeypatch.setattr(refit, "Problem", lambda *_: None)
+    monkeypatch.setattr(refit, "minimise", lambda problem, values, starts: fit(values, lowest))
+    data = SimpleNamespace(prepared=[], stages=[None], last=0)
+    base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 100.0), ())
+    candidate = SimpleNamespace(
+        names=("viscous",), model=None, free=FREE, added=(1,), linear=np.array([linear])
+    )
+    poor = Fitted(("viscous",), None, SimpleNamespace(free=FREE), fit([9.0, 0.5], 900.0), (1,))
+    assert poor.fit.converged
+    found = refit._above_base(data, poor, base, candidate)
+    assert found.fit.values.tolist() == wanted
+    assert found.fit.converged == converged

@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What two bodies must show: every line within its bar, and on docs/published_pair.md."""
+
+import importlib
+import sys
+
+import pytest
+
+# the contacts are in tests/integrator/test_contact_flight.pf, and take longer here
+SECTIONS = ("pair", "impacts", "books", "hard")
+
+
+@pytest.fixture(scope="module")
+def page(source_dir):
+    sys.path.insert(0, str(source_dir / "scripts"))
+    yield importlib.import_module("published_pair")
+    sys.path.remove(str(source_dir / "scripts"))
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_line_is_within_its_bar_and_on_the_page(page, separatrix, source_dir, tmp_path, section):
+    text = (source_dir / "docs" / "published_pair.md").read_text()
+    program = page.Program(separatrix, tmp_path)
+    items = [item for function in page.SECTIONS[section] for item in function(program)]
+    assert [item.name for item in items if not item.met] == []
+    # differences are rounding, the other cells are printed with digits that do not change
+    for item in items:
+        cells = page.row(item)
+        assert f"| {cells[0]} | " in text
+        if section != "books":
+            assert f" | {cells[2]} | " in text
