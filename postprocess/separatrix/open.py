@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.errors import BAD_DATA, NO_INPUT, SeparatrixError
+from separatrix.trial import try_first
 from separatrix.version import __version__
 
 FORMAT = "separatrix"
@@ -28,6 +29,8 @@ def open_result(path: str | Path) -> xr.Dataset:
     the texts and attributes of `/provenance` are attributes (`resolved_case`, `provenance_version`, ...).
     Raises SeparatrixError for a missing, foreign, incomplete or too new file.
     """
+    if Path(path).is_file():
+        try_first(path, lambda: _read_header(Path(path)))
     with reading(path):
         attributes, texts, groups = _read_header(Path(path))
     parts: list[xr.Dataset] = []
