@@ -17,6 +17,8 @@ _TOO_LITTLE = 0.5
 _ENOUGH = 50
 # factor of the scatter over the stated noise that is worth a word
 _DISAGREEMENT = 1.3
+# share of the noise that is rounding from which on its size is no known one
+_ROUNDING = 0.2
 
 
 def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
@@ -43,8 +45,12 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
 
 
 def _limit(one: Prepared, options: Options) -> float:
-    """Reduced chi^2 above which a record is missed: noise that nobody stated is itself an estimate."""
-    return options.adequate_chi2 if one.sigma_stated else options.missed_chi2
+    """Reduced chi^2 above which a record is missed.
+
+    Noise that nobody stated is itself an estimate, and rounding follows the motion instead of chance.
+    """
+    rounding = one.resolution**2 / 12 > _ROUNDING * one.sigma**2
+    return options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2
 
 
 def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:
