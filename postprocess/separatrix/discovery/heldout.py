@@ -10,14 +10,15 @@ Where the machine is wrong, its parameters count as less known, and the worse of
 forgiven more; what is held against such a machine is compared by squared errors alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from separatrix.discovery.data import Data, fit_stages
-from separatrix.discovery.fit import Fit, minimise
-from separatrix.discovery.machine import Free, on_other_records
+from separatrix.discovery.fit import Fit, again, minimise
+from separatrix.discovery.machine import Free, drive_amplitudes, on_other_records
 from separatrix.discovery.problem import Problem
+from separatrix.errors import SeparatrixError
 
 # reduced chi^2 above which errors of the machine are larger than the noise
 _MISFIT = 1.5
@@ -61,11 +62,9 @@ def predict(
     whole = on_other_records(free, data.prepared)
     start = np.concatenate([values[shared], np.zeros(len(whole) - len(shared))])
     fixed = np.arange(len(whole)) < len(shared)
-    problem, fit = _fit_own(data, model, whole, start, fixed)
-    if guess is not None:
-        other = minimise(problem, fit.values, guess, most=12, fixed=fixed)
-        if other.good.sum() >= fit.good.sum() and other.total < fit.total:
-            fit = other
+    fit = _fit_own(data, model, whole, start, fixed, guess)
+    problem = Problem(model, data.prepared, data.stages[-1], whole)
+    fit = again(problem, fit)
     used = covariance[np.ix_(shared, shared)]
     score = _scores(fit, used, len(shared))
     return Prediction(score, fit.good, problem.segments.record, problem, fit, len(shared), misfit)
@@ -85,9 +84,36 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
 
 
 def _fit_own(
-    data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray
-) -> tuple[Problem, Fit]:
-    return fit_stages(data, model, free, values, stages=list(range(len(data.stages))), most=12, fixed=fixed)
+    data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray, guess: np.ndarray | None
+) -> Fit:
+    """Fit what belongs to the records; the rest is written into the machine and not differentiated by."""
+    known = [(one, value) for one, value, settled in zip(free, values, fixed, strict=True) if settled]
+    own = ~fixed
+    settled = _with(model, known)
+    if settled is None:
+        settled, own = model, np.ones(values.size, bool)
+    kept = [one for one, mine in zip(free, own, strict=True) if mine]
+    stages = list(range(len(data.stages)))
+    problem, fit = fit_stages(data, settled, kept, values[own], stages=stages, most=12, fixed=fixed[own])
+    if guess is not None:
+        other = minimise(problem, fit.values, guess, most=12, fixed=fixed[own])
+        if other.good.sum() >= fit.good.sum() and other.total < fit.total:
+            fit = other
+    found = values.copy()
+    found[own] = fit.values
+    return replace(fit, values=found, movable=~fixed)
+
+
+def _with(model, known: list[tuple[Free, float]]):
+    """The machine with values written in; None where they make no case."""
+    chosen = {one.path: one.physical(value) for one, value in known if not one.is_nuisance}
+    for one, value in known:
+        if one.path == "nuisance:drive_scale":
+            chosen |= {path: value * amplitude for path, amplitude in drive_amplitudes(model).items()}
+    try:
+        return type(model).from_text(model.to_text(chosen))
+    except SeparatrixError:
+        return None
 
 
 def _scores(fit: Fit, covariance: np.ndarray, shared: int) -> np.ndarray:
