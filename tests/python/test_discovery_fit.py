@@ -7,7 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
+from separatrix.discovery import partial as partial_module
 from separatrix.discovery import rounds
+from separatrix.discovery import screen as screen_module
 from separatrix.discovery.fit import blocks_of, eliminate, gauss_newton_step
 from separatrix.discovery.options import Options
 from separatrix.discovery.preflight import white_noise
@@ -141,3 +143,15 @@ def test_what_was_not_tested_is_that_of_the_first_round_in_the_order_of_the_cata
         rounds.run_round(bench, base, None, 0, 1)
         assert list(bench.absent) == names
         assert bench.absent["dahl"] == "the machine has no friction"
+
+
+def test_signatures_that_vanish_do_not_stop_the_screen():
+    # of two signatures one is rounding: its square is nothing, its products with the other are not
+    left = np.array([[4.0, 1e-17], [1e-17, 0.0]])
+    tests = screen_module._independent_tests(left, np.array([0, 1, 2]), [np.array([[0.5]]), np.zeros((0, 1))])
+    assert 1 <= tests <= 2
+
+
+def test_a_candidate_that_was_not_asked_to_foretell_is_clearly_behind():
+    far = SimpleNamespace(prediction=None)
+    assert partial_module._clearly(SimpleNamespace(prediction=object()), far, None)

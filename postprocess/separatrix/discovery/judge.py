@@ -46,7 +46,7 @@ def judged(
     """Evidence of a candidate over the base."""
     training, _ = gain_over(fitted, base)
     parts = np.zeros(0)
-    if prediction is not None:
+    if prediction is not None and foretold is not None:
         parts = gained(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
     return Judged(fitted, prediction, training, float(parts.sum()), parts, live)

@@ -172,6 +172,9 @@ def _clearly(one: Judged, other: Judged, options: Options) -> bool:
     """Whether `one` foretells a held-out record better than `other` by more than chance."""
     if one.prediction is None:
         return one.evidence - other.evidence > options.separation * one.fitted.fit.reduced_chi2
+    if other.prediction is None:
+        # so far behind that it was not asked to foretell
+        return True
     over = judged(other.fitted, other.prediction, one.fitted, one.prediction)
     return any(low > 0 for low, _ in held_out_bounds(over, options).values())
 
@@ -199,7 +202,8 @@ def _all_needed(bench: Bench, first: Round, one: Judged) -> bool:
     missed = {}
     for name in one.fitted.names:
         without = _without(bench, first, name, one.fitted.names)
-        if without is None:
+        if without is None or (without.prediction is None and one.prediction is not None):
+            # it cannot be flown, or is so far behind that it was not asked to foretell
             missed[name] = np.inf
             continue
         over = judged(without.fitted, without.prediction, one.fitted, one.prediction)

@@ -144,11 +144,12 @@ def _carry_on(
     candidates: dict[str, Candidate],
     found: list[Judged],
 ) -> None:
-    """Fit those near the best to their end, however little effort they were thought worth before."""
+    """Fit those near the best to their end and let them foretell, however little they were thought worth."""
     for place, one in enumerate(found):
         near = found[0].evidence - one.evidence < _NEAR * bench.options.separation
-        if near and not one.fitted.fit.converged:
-            fitted = carried_on(bench.training, candidates[one.name], one.fitted)
+        done = one.fitted.fit.converged
+        if near and not (done and (one.prediction or bench.held_out is None)):
+            fitted = one.fitted if done else carried_on(bench.training, candidates[one.name], one.fitted)
             found[place] = judged(base, foretold, fitted, bench.foretell(fitted, one.prediction))
     found.sort(key=lambda one: -one.evidence)
 

@@ -21,6 +21,8 @@ from separatrix.discovery.problem import Problem
 _SEED = 22
 _DRAWS = 4000
 _TAIL = 0.05
+# size of a signature, in units of its noise, that is rounding
+_NOTHING = 1e-100
 # share of a signature below which nothing is left of it
 _NOTHING = 1e-7
 
@@ -151,8 +153,10 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
     Under a right base the scores of all candidates are Gaussian with the matrix `left` as covariance. The
     smallest p value of a draw falls below its own 5 % quantile as often as that of so many tests would.
     """
-    size = np.sqrt(np.maximum(np.diag(left), 1e-300))
-    values, vectors = np.linalg.eigh(left / np.outer(size, size))
+    size = np.sqrt(np.maximum(np.diag(left), 0))
+    # what the base can do itself leaves nothing but rounding, which has no direction
+    scale = np.where(size > _NOTHING, size, np.inf)
+    values, vectors = np.linalg.eigh(np.clip(left / np.outer(scale, scale), -1, 1))
     half = vectors * np.sqrt(np.maximum(values, 0))
     draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, size.size)) @ half.T * size
     lowest = np.ones(_DRAWS)
