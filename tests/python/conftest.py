@@ -49,6 +49,16 @@ def mpi_separatrix(separatrix: Path) -> Path:
     return separatrix
 
 
+@pytest.fixture
+def library(build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The library of the build that is tested, as the one in use; skips where it has not been built."""
+    path = build_dir / "lib" / "libseparatrix.so"
+    if not path.is_file():
+        pytest.skip(f"{path} has not been built")
+    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
+    return path
+
+
 @pytest.fixture(scope="session")
 def results(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Files of every kind, beside the case and the list that they are made from. Not to be changed."""

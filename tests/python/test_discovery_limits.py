@@ -18,6 +18,8 @@ from separatrix.discovery.refit import Fitted
 from separatrix.discovery.segments import padded
 from separatrix.library import Model
 
+pytestmark = pytest.mark.usefixtures("library")
+
 
 class Spy:
     """A model that remembers what it was asked to fly."""
@@ -48,15 +50,6 @@ def fitted(stiffness: float) -> Fitted:
     fit = minimise(problem, values, np.column_stack([record.x[first], 0 * first]), most=0)
     model.asked.clear()
     return Fitted((), model, problem, fit, ())
-
-
-@pytest.fixture(autouse=True)
-def library(build_dir, monkeypatch) -> None:
-    """The library of the build that is tested."""
-    path = build_dir / "lib" / "libseparatrix.so"
-    if not path.is_file():
-        pytest.skip(f"{path} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
 
 
 def test_both_machines_get_the_same_drive_from_the_same_starts():

@@ -23,6 +23,7 @@ def data(sigma: float, scatter: float) -> SimpleNamespace:
             record=SimpleNamespace(name=name, x=np.sin(9 * t) + scatter * one),
             sigma=sigma,
             sigma_stated=True,
+            resolution=0.0,
         )
         for name, one in zip(("first", "second"), noise, strict=True)
     ]

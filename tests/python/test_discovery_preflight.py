@@ -13,6 +13,8 @@ from separatrix.discovery.workflow import _split
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 
+pytestmark = pytest.mark.usefixtures("library")
+
 PUSHED = """\
 [body]
 mass = 2
@@ -24,15 +26,6 @@ interval = 1
 force = [0, 0]
 """
 RATE, START = 9.9, 0.7
-
-
-@pytest.fixture(autouse=True)
-def library(build_dir, monkeypatch) -> None:
-    """The library of the build that is tested."""
-    path = build_dir / "lib" / "libseparatrix.so"
-    if not path.is_file():
-        pytest.skip(f"{path} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
 
 
 def driven(t: np.ndarray, **header) -> Record:

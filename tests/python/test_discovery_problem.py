@@ -18,12 +18,8 @@ RATE, LENGTH = 200, 60
 
 
 @pytest.fixture
-def flown(build_dir, monkeypatch) -> tuple[Problem, np.ndarray, np.ndarray]:
+def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
     """Two records with v at different drives, all free; values off those of the case, and starts."""
-    library = build_dir / "lib" / "libseparatrix.so"
-    if not library.is_file():
-        pytest.skip(f"{library} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
     model = Model.from_text(CASE)
     t = np.arange(1200) / RATE
     prepared = []

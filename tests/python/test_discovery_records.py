@@ -136,11 +136,7 @@ def test_records_get_names_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize("fault", ["nan", "other machine", "coarse", "no such file"])
-def test_nothing_is_left_behind(tmp_path, build_dir, monkeypatch, capsys, fault):
-    library = build_dir / "lib" / "libseparatrix.so"
-    if not library.is_file():
-        pytest.skip(f"{library} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+def test_nothing_is_left_behind(tmp_path, library, capsys, fault):
     (tmp_path / "base.toml").write_text(CASE)
     good = write(tmp_path / "good.csv", *rows())
     t, x = rows()
@@ -245,11 +241,7 @@ def test_impacts_and_steps_of_the_sensor_are_no_stray_samples():
         assert make_record("record", {"t": t, "x": x}).t.size == t.size
 
 
-def test_the_same_record_is_not_taken_twice(tmp_path, build_dir, monkeypatch, capsys):
-    library = build_dir / "lib" / "libseparatrix.so"
-    if not library.is_file():
-        pytest.skip(f"{library} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
+def test_the_same_record_is_not_taken_twice(tmp_path, library, capsys):
     (tmp_path / "base.toml").write_text(CASE)
     (tmp_path / "copies").mkdir()
     first = write(tmp_path / "first.csv", *rows())

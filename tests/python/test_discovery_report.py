@@ -309,12 +309,8 @@ def test_a_record_without_impacts_says_so(tmp_path: Path) -> None:
 
 
 def test_maps_before_and_after(
-    separatrix: Path, build_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    separatrix: Path, library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    library = build_dir / "lib" / "libseparatrix.so"
-    if not library.is_file():
-        pytest.skip(f"{library} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(library))
     monkeypatch.setenv("SEPARATRIX_PROGRAM", str(separatrix))
     make(tmp_path, "named")
     (tmp_path / "base.toml").write_text(CASE)

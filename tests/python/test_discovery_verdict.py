@@ -15,16 +15,9 @@ from separatrix.discovery.machine import Free
 from separatrix.discovery.verdict import _parameters
 from separatrix.discovery.wording import with_error
 
+pytestmark = pytest.mark.usefixtures("library")
+
 RATIOS = {"first": 0.8, "second": 1.25, "held_out": 0.95}
-
-
-@pytest.fixture(autouse=True)
-def library(build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The library of the build that is tested."""
-    path = build_dir / "lib" / "libseparatrix.so"
-    if not path.is_file():
-        pytest.skip(f"{path} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
 
 
 def records(separatrix: Path, folder: Path, effect: str) -> list[Path]:

@@ -11,17 +11,9 @@ import pytest
 from program import CASE
 from separatrix.library import CaseError, Model, effects, library_path
 
+pytestmark = pytest.mark.usefixtures("library")
+
 TIMES = np.linspace(0.0, 0.3, 7)
-
-
-@pytest.fixture(autouse=True)
-def library(build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The library of the build that is tested."""
-    path = build_dir / "lib" / "libseparatrix.so"
-    if not path.is_file():
-        pytest.skip(f"{path} has not been built")
-    monkeypatch.setenv("SEPARATRIX_LIBRARY", str(path))
-    return path
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ would show that names come from what the base lacks altogether and not from the 
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
+from separatrix.discovery.judge import family_wise
 from separatrix.discovery.options import Options
 from separatrix.discovery.rounds import Round
 from separatrix.discovery.screen import Signature, screen
@@ -27,8 +27,7 @@ def decoys(found: Round, options: Options) -> dict:
     scale = max(1.0, base.fit.reduced_chi2)
     gains = {one.name: screened.gain[one.name] - one.columns.shape[2] for one in made}
     best = max(made, key=lambda one: gains[one.name])
-    single = chi2.sf(2 * screened.gain[best.name] / scale, best.columns.shape[2])
-    p = float(-np.expm1(screened.tests * np.log1p(-min(single, 1 - 1e-16))))
+    p = family_wise(2 * screened.gain[best.name] / scale, best.columns.shape[2], screened.tests)
     real = max((one.training - one.parameters for one in found.judged), default=0.0)
     return {
         "tested": len(made),

@@ -54,7 +54,12 @@ def judged(
 
 def detection(one: Judged, tested: float, inflation: float) -> float:
     """Family-wise p value of what a candidate gained, for candidates worth so many independent tests."""
-    single = chi2.sf(max(0.0, 2 * (one.training + one.held_out)) / inflation, one.parameters)
+    return family_wise(2 * (one.training + one.held_out) / inflation, one.parameters, tested)
+
+
+def family_wise(gain: float, parameters: int, tested: float) -> float:
+    """Probability that the best of `tested` independent candidates lowers chi^2 by as much by chance."""
+    single = chi2.sf(max(0.0, gain), parameters)
     return float(-np.expm1(tested * np.log1p(-min(single, 1 - 1e-16))))
 
 
