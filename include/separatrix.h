@@ -54,7 +54,9 @@ int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, 
  *
  * In:
  *   chosen, values [chosen_count]
- *     parameters with values of their own, by which the samples are differentiated
+ *     parameters with values of their own
+ *   directions [direction_count][chosen_count]
+ *     directions along which the samples are differentiated: the change of each chosen parameter per unit
  *   start [segment_count][3]
  *     x [m], v [m/s] and crank angle [rad] at the time 0 of each segment
  *   first [segment_count + 1]
@@ -73,8 +75,8 @@ int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, 
  * Out:
  *   x, v [m]
  *     position as the sensor shows it, and velocity
- *   jacobian, velocity_jacobian [m][chosen_count + 3]
- *     their derivatives by the chosen parameters, then by x, v and crank angle of the start
+ *   jacobian, velocity_jacobian [m][direction_count + 3]
+ *     their derivatives along the directions, then by x, v and crank angle of the start
  *   impacts [segment_count]
  *     number of impacts
  *   steady [segment_count]
@@ -91,12 +93,12 @@ int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, 
  *
  * Results depend on a segment and the arguments common to all, not on the other segments. */
 int separatrix_segments(const separatrix_model *model, int chosen_count, const int *chosen,
-                        const double *values, int segment_count, const double *start, const int *first,
-                        const double *times, int force_count, double force_interval, const double *force,
-                        int derivatives, double tolerance, double *x, double *v, double *jacobian,
-                        double *velocity_jacobian, int *impacts, int *steady, int *reason,
-                        int impact_capacity, int *impact_count, int *impact_segment, double *impact,
-                        char *message, size_t message_size);
+                        const double *values, int direction_count, const double *directions,
+                        int segment_count, const double *start, const int *first, const double *times,
+                        int force_count, double force_interval, const double *force, int derivatives,
+                        double tolerance, double *x, double *v, double *jacobian, double *velocity_jacobian,
+                        int *impacts, int *steady, int *reason, int impact_capacity, int *impact_count,
+                        int *impact_segment, double *impact, char *message, size_t message_size);
 
 /* The resolved case with other values in the parameters chosen[chosen_count]: an ordinary case file. Writes
  * at most text_size characters, the null character included, and the length of the whole text without it. */

@@ -132,12 +132,14 @@ class Model:
         force: tuple[np.ndarray, float, np.ndarray] | None = None,
         derivatives: bool = True,
         tolerance: float = 1e-9,
+        directions: np.ndarray | None = None,
     ) -> Segments:
         """Fly many segments, each from its own start, and sample them.
 
-        `active` are the paths of the parameters with the `values` to use and to differentiate by. `start`
-        is (n, 3): x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of
-        segment i are at `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
+        `active` are the paths of the parameters with the `values` to use. The rows of `directions` are the
+        directions in their space to differentiate along; None: each parameter by itself. `start` is (n, 3):
+        x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are at
+        `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
         `tolerance` is that of the adaptive flight.
 
         `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
@@ -149,13 +151,16 @@ class Model:
         chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
         start = np.asarray(start, float)
         start = _array(start, (len(start), 3), "start")
+        if directions is None:
+            directions = np.eye(len(active))
+        directions = _array(directions, (len(directions), len(active)), "directions")
         count = len(start)
         first = np.ascontiguousarray(first, np.int32)
         if first.shape != (count + 1,):
             raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
         times = _array(times, (int(first[-1]),), "times")
         start, interval, series = _with_force(start, first, times, force)
-        m, columns = len(times), len(active) + 3
+        m, columns = len(times), len(directions) + 3
         x, v = np.empty(m), np.empty(m)
         slopes = [np.empty((m, columns)) for _ in range(2)] if derivatives else [None, None]
         report = np.zeros((3, count), np.int32)
@@ -167,6 +172,8 @@ class Model:
                 "separatrix_segments",
                 self._handle,
                 *chosen,
+                len(directions),
+                _pointer(directions),
                 count,
                 *(_pointer(array) for array in (start, first, times)),
                 len(series),

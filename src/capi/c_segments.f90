@@ -13,6 +13,7 @@ module c_segments
   use status, only: exit_usage
   use text, only: to_text
   use variants, only: family_t, prepare_family
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none
   private
 
@@ -23,16 +24,17 @@ module c_segments
 
 contains
 
-  integer(c_int) function separatrix_segments(model, chosen_count, chosen, values, segment_count, start, first, times, &
-      force_count, force_interval, force, derivatives, tolerance, x, v, jacobian, velocity_jacobian, impacts, steady, &
-      reason, impact_capacity, impact_count, impact_segment, impact, message, message_size) bind(c) result(code)
+  integer(c_int) function separatrix_segments(model, chosen_count, chosen, values, direction_count, directions, segment_count, &
+      start, first, times, force_count, force_interval, force, derivatives, tolerance, x, v, jacobian, velocity_jacobian, &
+      impacts, steady, reason, impact_capacity, impact_count, impact_segment, impact, message, message_size) bind(c) result(code)
     type(c_ptr), value :: model, force
-    integer(c_int), value :: chosen_count, segment_count, force_count, derivatives, impact_capacity
+    integer(c_int), value :: chosen_count, direction_count, segment_count, force_count, derivatives, impact_capacity
     integer(c_int), intent(in) :: chosen(chosen_count), first(segment_count + 1)
     real(c_double), value :: force_interval, tolerance
     real(c_double), intent(in) :: values(chosen_count), start(3, segment_count), times(*)
+    real(c_double), intent(in) :: directions(chosen_count, direction_count)
     real(c_double), intent(inout) :: x(*), v(*)
-    real(c_double), intent(inout) :: jacobian(chosen_count + 3, *), velocity_jacobian(chosen_count + 3, *)
+    real(c_double), intent(inout) :: jacobian(direction_count + 3, *), velocity_jacobian(direction_count + 3, *)
     integer(c_int), intent(inout) :: impacts(segment_count), steady(segment_count), reason(segment_count)
     integer(c_int), intent(out) :: impact_count
     integer(c_int), intent(inout) :: impact_segment(impact_capacity)
@@ -53,8 +55,8 @@ contains
     impact_count = 0
     call check_samples(segment_count, first, times, error)
     if (.not. allocated(error)) then
-      call fly(self, chosen + 1, values, start, first, times(:first(segment_count + 1)), force_interval, own_force, &
-               derivatives /= 0, tolerance, samples, report, error)
+      call fly(self, chosen + 1, values, directions, start, first, times(:first(segment_count + 1)), force_interval, &
+               own_force, derivatives /= 0, tolerance, samples, report, error)
     end if
     if (.not. allocated(error)) then
       x(:size(samples%x)) = samples%x
@@ -74,10 +76,11 @@ contains
     code = answer(error, message, message_size)
   end function separatrix_segments
 
-  subroutine fly(self, chosen, values, start, first, times, interval, force, derivatives, tolerance, samples, report, error)
+  subroutine fly(self, chosen, values, directions, start, first, times, interval, force, derivatives, tolerance, samples, &
+                 report, error)
     type(model_t), intent(in) :: self
     integer, intent(in) :: chosen(:), first(:)
-    real(wp), intent(in) :: values(:), start(:, :), times(:), interval, force(:), tolerance
+    real(wp), intent(in) :: values(:), directions(:, :), start(:, :), times(:), interval, force(:), tolerance
     logical, intent(in) :: derivatives
     type(samples_t), intent(out) :: samples
     type(report_t), intent(out) :: report
@@ -86,13 +89,18 @@ contains
     type(family_t) :: family
     call check_values(self, chosen, values, error)
     if (allocated(error)) return
+    if (.not. all(ieee_is_finite(directions))) then
+      call fail(error, exit_usage, 'directions: not finite')
+      return
+    end if
     if (.not. (tolerance >= 1e-15_wp .and. tolerance <= 1e-3_wp)) then
       call fail(error, exit_usage, 'tolerance: found '//to_text(tolerance)//', allowed from 1e-15 to 1e-3')
       return
     end if
     call laws_with_force(self, interval, force, laws, error)
     if (allocated(error)) return
-    call prepare_family(laws, model_options(self, tolerance), self%parameters(chosen), values, derivatives, family, error)
+    call prepare_family(laws, model_options(self, tolerance), self%parameters(chosen), values, directions, derivatives, &
+                        family, error)
     if (.not. allocated(error)) call check_length(family, times, error)
     if (.not. allocated(error)) call propagate(family, start, first, times, derivatives, samples, report)
   end subroutine fly

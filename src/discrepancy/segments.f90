@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Many short stretches of a motion, each from a start of its own, sampled at given times, with the derivatives of the samples
-!> with respect to parameters of the machine and to the start. This is what a record is compared with, stretch by stretch, so
+!> along directions in the space of the machine's parameters and by the start. This is what a record is compared with, stretch by stretch, so
 !> that a small error of the model does not grow into another motion.
 module segments
   use contact_law, only: barrier_positions
@@ -12,7 +12,7 @@ module segments
   use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
     state_t, tally_t
   use status, only: exit_bad_case
-  use variants, only: family_t, of_the_machine, sensor_bias, sensor_delay, sensor_gain, variant_t
+  use variants, only: family_t, sensor_bias, sensor_delay, sensor_gain, variant_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -22,7 +22,7 @@ module segments
   !> Samples of all segments, one after the other.
   type, public :: samples_t
     real(wp), allocatable :: x(:), v(:)
-    !> Derivatives: row = chosen parameters, then x, v and crank angle of the start; column = sample.
+    !> Derivatives: row = directions, then x, v and crank angle of the start; column = sample.
     real(wp), allocatable :: x_slope(:, :), v_slope(:, :)
   end type samples_t
 
@@ -231,13 +231,13 @@ contains
       if (any(open)) steady = .false.
     end do
     do row = 1, size(family%further)
-      if (family%further(row)%role /= of_the_machine) cycle
+      if (.not. abs(family%further(row)%step) > 0) cycle
       if (untouched(family%moving, family%further(row), base)) cycle
       open = .true.
       if (family%further(row)%leaves_exact) then
-        call step_parameter(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
+        call step_along(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
       else
-        call step_parameter(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+        call step_along(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
       end if
       if (any(open)) steady = .false.
     end do
@@ -250,24 +250,23 @@ contains
     type(family_t), intent(in) :: family
     type(run_t), intent(in) :: base
     real(wp), intent(inout) :: x_slope(:, :), v_slope(:, :)
+    real(wp) :: behind
     integer :: row, crank
     crank = size(x_slope, 1)
     if (abs(family%moving%machine%sensor%gain) > 0) x_slope = (1 + family%moving%machine%sensor%gain)*x_slope
     do row = 1, size(family%further)
-      select case (family%further(row)%role)
-      case (sensor_bias)
-        x_slope(row, :) = 1
-      case (sensor_gain)
-        x_slope(row, :) = base%x(:size(x_slope, 2))
-      case (sensor_delay)
-        x_slope(row, :) = -family%moving%machine%drive_frequency*x_slope(crank, :)
-        v_slope(row, :) = -family%moving%machine%drive_frequency*v_slope(crank, :)
-      end select
+      associate (along => family%of_sensor(:, row))
+        if (.not. any(abs(along) > 0)) cycle
+        behind = along(sensor_delay)*family%moving%machine%drive_frequency
+        x_slope(row, :) = x_slope(row, :) + along(sensor_bias) + along(sensor_gain)*base%x(:size(x_slope, 2)) &
+                          - behind*x_slope(crank, :)
+        v_slope(row, :) = v_slope(row, :) - behind*v_slope(crank, :)
+      end associate
     end do
   end subroutine differentiate_sensor
 
-  !> The difference that a step of the parameter `k` makes.
-  pure subroutine step_parameter(family, k, start, times, base, other, open, x_slope, v_slope, steady)
+  !> The difference that a step along direction `k` makes.
+  pure subroutine step_along(family, k, start, times, base, other, open, x_slope, v_slope, steady)
     type(family_t), intent(in) :: family
     integer, intent(in) :: k
     real(wp), intent(in) :: start(3), times(:)
@@ -279,7 +278,7 @@ contains
       call compare(further%moving, start, further%step, times, base, other, open, x_slope, v_slope, steady)
       if (any(open)) call compare(back%moving, start, back%step, times, base, other, open, x_slope, v_slope, steady)
     end associate
-  end subroutine step_parameter
+  end subroutine step_along
 
   !> The difference that a step of the start in coordinate `k`, forth or back, makes, where the barriers allow it.
   pure subroutine step_start(family, start, k, sense, times, base, other, open, x_slope, v_slope, steady)

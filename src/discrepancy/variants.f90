@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A machine and its neighbours: for every chosen parameter the machine with that parameter a step further, and the one with
-!> it a step back. They are built once for all segments.
+!> A machine and its neighbours: for every direction in the space of the chosen parameters the machine a step further along
+!> it, and the one a step back. They are built once for all segments.
 !> A difference over a step e of a natural size has the error e of the series cut off and the error s/e of the results'
 !> own error s: both are least at e = sqrt(s), s being rounding for exact flights and, for adaptive ones, the part of the
 !> tolerance that neighbours do not share.
@@ -29,9 +29,9 @@ module variants
   !> A parameter smaller than this share of its natural size is stepped as if it had that size.
   real(wp), parameter :: smallest_share = 0.1_wp
 
-  !> What a parameter of the sensor is: its derivative follows from the samples and from those by the crank angle, and needs
-  !> no machine.
-  integer, parameter, public :: of_the_machine = 0, sensor_bias = 1, sensor_gain = 2, sensor_delay = 3
+  !> Parameters of the sensor: derivatives by them follow from the samples and from those by the crank angle, and need no
+  !> machine.
+  integer, parameter, public :: sensor_bias = 1, sensor_gain = 2, sensor_delay = 3
   character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
     'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
 
@@ -39,12 +39,11 @@ module variants
   character(len=*), parameter :: contact_tables(4) = [character(len=26) :: &
     'contact', 'effect.restitution_slope', 'effect.compliant_contact', 'effect.second_barrier']
 
-  !> A machine one parameter of which is a step away.
+  !> A machine that is a step away.
   type, public :: variant_t
     type(motion_t) :: moving
-    !> Signed step of the parameter, SI; 0 where there is no such machine.
+    !> Signed step in units of the direction; 0 where there is no such machine.
     real(wp) :: step = 0
-    integer :: role = of_the_machine
     !> Only what happens at the barriers differs, so a motion that reaches none is the same.
     logical :: contact_only = .false.
     !> It leaves the closed form that the machine itself has, as an effect of size 0 does: it is compared with the machine
@@ -56,8 +55,10 @@ module variants
     type(motion_t) :: moving
     !> The same machine flown adaptively, where a variant needs it.
     type(motion_t), allocatable :: adaptive
-    !> One per chosen parameter: a step further; and a step back.
+    !> One per direction: a step further; and a step back.
     type(variant_t), allocatable :: further(:), back(:)
+    !> Components of the directions along bias, gain and delay of the sensor, by column.
+    real(wp), allocatable :: of_sensor(:, :)
     !> Steps of x [m], v [m/s] and crank angle [rad] of a start.
     real(wp) :: start_step(3) = 0
     !> Distance to a barrier [m] and speed of an impact [m/s] below which a motion grazes: there a step changes the speed of
@@ -70,26 +71,27 @@ module variants
     type(law_choice_t), allocatable :: laws(:)
     type(options_t) :: options
     type(parameter_t), allocatable :: chosen(:)
-    real(wp), allocatable :: values(:)
+    real(wp), allocatable :: values(:), directions(:, :)
     type(scales_t) :: scales
   end type plan_t
 
 contains
 
-  !> Builds the machine of `laws` with `values` in the parameters `chosen`, and its neighbours if `derivatives`. Code 65 if
-  !> a machine cannot be built or has two bodies.
-  pure subroutine prepare_family(laws, options, chosen, values, derivatives, family, error)
+  !> Builds the machine of `laws` with `values` in the parameters `chosen`, and if `derivatives` its neighbours: column j of
+  !> `directions` is direction j, its change of each chosen parameter (in the unit of that) per unit of the way along it.
+  !> Code 65 if a machine cannot be built or has two bodies.
+  pure subroutine prepare_family(laws, options, chosen, values, directions, derivatives, family, error)
     type(law_choice_t), intent(in) :: laws(:)
     type(options_t), intent(in) :: options
     type(parameter_t), intent(in) :: chosen(:)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:), directions(:, :)
     logical, intent(in) :: derivatives
     type(family_t), intent(out) :: family
     type(error_t), allocatable, intent(out) :: error
     type(plan_t) :: plan
     real(wp) :: share
-    integer :: i
-    plan = plan_t(laws, options, chosen, values)
+    integer :: i, place
+    plan = plan_t(laws, options, chosen, values, directions)
     call build(plan, values, .false., family%moving, error)
     if (allocated(error)) return
     if (allocated(family%moving%pair)) then
@@ -102,10 +104,16 @@ contains
     family%start_step = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
     family%least_clearance = 10*family%start_step(1)
     family%least_speed = 10*sqrt(share)*plan%scales%length/plan%scales%time
-    allocate (family%further(size(chosen)), family%back(size(chosen)))
-    do i = 1, size(chosen)
-      family%further(i)%role = findloc(sensor_paths == chosen(i)%path, .true., dim=1)
-      if (family%further(i)%role /= of_the_machine) cycle
+    allocate (family%further(size(directions, 2)), family%back(size(directions, 2)))
+    allocate (family%of_sensor(size(sensor_paths), size(directions, 2)), source=0.0_wp)
+    do i = 1, size(sensor_paths)
+      place = findloc(chosen%path == sensor_paths(i), .true., dim=1)
+      if (place == 0) cycle
+      family%of_sensor(i, :) = directions(place, :)
+      plan%directions(place, :) = 0
+    end do
+    do i = 1, size(directions, 2)
+      if (.not. any(abs(plan%directions(:, i)) > 0)) cycle
       call build_neighbours(plan, i, all_exact(family%moving), family%further(i), family%back(i), error)
       if (allocated(error)) return
       if (.not. family%further(i)%leaves_exact .or. allocated(family%adaptive)) cycle
@@ -145,7 +153,7 @@ contains
     moving%transit%available = .false.
   end subroutine build
 
-  !> The neighbours of parameter `which`. If the first cannot be built, the other takes its place.
+  !> The neighbours along direction `which`. If the first cannot be built, the other takes its place.
   pure subroutine build_neighbours(plan, which, exact, further, back, error)
     type(plan_t), intent(in) :: plan
     integer, intent(in) :: which
@@ -174,10 +182,13 @@ contains
       variant%leaves_exact = .true.
       call take_step(plan, which, sense, share_of(plan%options, .false.), .true., variant, error)
     end if
-    associate (path => plan%chosen(which)%path)
-      variant%contact_only = any(contact_tables == path(:index(path, '.', back=.true.) - 1))
-    end associate
+    variant%contact_only = all(abs(plan%directions(:, which)) <= 0 .or. of_contact(plan%chosen%path))
   end subroutine build_variant
+
+  pure elemental logical function of_contact(path)
+    character(len=*), intent(in) :: path
+    of_contact = any(contact_tables == path(:index(path, '.', back=.true.) - 1))
+  end function of_contact
 
   pure subroutine take_step(plan, which, sense, share, adaptive, variant, error)
     type(plan_t), intent(in) :: plan
@@ -186,22 +197,42 @@ contains
     logical, intent(in) :: adaptive
     type(variant_t), intent(inout) :: variant
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: moved(size(plan%values)), length
-    moved = plan%values
-    associate (one => plan%chosen(which), value => plan%values(which))
-      length = share
-      ! Whole exponents are powers by products: a neighbour goes another way and shares no error.
-      if (index(one%path, 'exponent') > 0) length = max(share, sqrt(plan%options%tolerance))
-      moved(which) = value + sense*length*max(abs(value), smallest_share*natural_size(trim(one%unit), plan%scales))
-      variant%step = moved(which) - value
-      if (moved(which) < one%lower .or. moved(which) > one%upper .or. (one%lower_open .and. moved(which) <= one%lower)) then
-        variant%step = 0
-        call fail(error, exit_bad_case, 'parameter '//trim(one%path)//': no room for a step within its bounds')
-        return
-      end if
+    real(wp) :: moved(size(plan%values))
+    associate (direction => plan%directions(:, which))
+      variant%step = sense*minval(natural_step(plan%chosen, plan%values)/abs(direction), mask=abs(direction) > 0)
+      moved = plan%values + variant%step*direction
     end associate
+    call check_bounds(plan%chosen, moved, error)
+    if (allocated(error)) variant%step = 0
+    if (allocated(error)) return
     call build(plan, moved, adaptive, variant%moving, error)
     if (allocated(error)) variant%step = 0
+  contains
+    !> Size of a step of one parameter.
+    pure elemental real(wp) function natural_step(one, value)
+      type(parameter_t), intent(in) :: one
+      real(wp), intent(in) :: value
+      natural_step = share
+      ! Whole exponents are powers by products: a neighbour goes another way and shares no error.
+      if (index(one%path, 'exponent') > 0) natural_step = max(share, sqrt(plan%options%tolerance))
+      natural_step = natural_step*max(abs(value), smallest_share*natural_size(trim(one%unit), plan%scales))
+    end function natural_step
   end subroutine take_step
+
+  !> Code 65 if a step has left the bounds of a parameter.
+  pure subroutine check_bounds(chosen, moved, error)
+    type(parameter_t), intent(in) :: chosen(:)
+    real(wp), intent(in) :: moved(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    do i = 1, size(chosen)
+      associate (one => chosen(i), value => moved(i))
+        if (value < one%lower .or. value > one%upper .or. (one%lower_open .and. value <= one%lower)) then
+          call fail(error, exit_bad_case, 'parameter '//trim(one%path)//': no room for a step within its bounds')
+          return
+        end if
+      end associate
+    end do
+  end subroutine check_bounds
 
 end module variants

@@ -115,6 +115,30 @@ def test_derivatives_are_those_of_other_calls(model: Model) -> None:
             )
 
 
+def test_derivatives_along_directions_are_sums(model: Model) -> None:
+    """Of those by each parameter, at the machine and at the sensor; directions of nothing give nothing."""
+    active = ["drive.cosine[1]", "drive.sine[1]", "contact.restitution", "restoring.stiffness"]
+    values = np.array([model.parameters[path].value for path in active])
+    starts = np.array([(0.5, 1.0, 0.3), (1.0, 4.0, 1.0), (0.6, 0.2, 4.0)])
+    directions = np.array([[0.3, -0.2, 0, 0], [0, 0, 1e-3, 2.0], [0, 0, 0, 0]])
+    single = fly(model, active, values, starts)
+    along = fly(model, active, values, starts, directions=directions)
+    for name in ("jacobian", "velocity_jacobian"):
+        parts, sums = getattr(single, name), getattr(along, name)
+        expected = parts[:, :4] @ directions.T
+        assert np.abs(expected[:, :2]).max() > 1e-3
+        np.testing.assert_allclose(sums[:, :3], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+        np.testing.assert_array_equal(sums[:, 3:], parts[:, 4:])
+    sensor = Model.from_text(CASE + "[effect.sensor_gain]\ngain = 0.01\n[effect.sensor_bias]\nbias = 0.002\n")
+    names = ["effect.sensor_bias.bias", "effect.sensor_gain.gain", "restoring.stiffness"]
+    values = np.array([sensor.parameters[path].value for path in names])
+    parts = fly(sensor, names, values, starts).jacobian[:, :3]
+    both = fly(sensor, names, values, starts, directions=[[2.0, 3.0, 0.5]]).jacobian[:, 0]
+    np.testing.assert_allclose(both, parts @ [2.0, 3.0, 0.5], rtol=0, atol=1e-6)
+    with pytest.raises(CaseError, match="directions"):
+        fly(model, active, [1.0, 1.0, 0.5, 90.0], starts, directions=np.full((1, 4), np.nan))
+
+
 def test_impacts_are_listed(model: Model) -> None:
     """Speeds after and before an impact are in the ratio of the restitution."""
     result = fly(model, start=[(0.5, 0.0, 0.0), (1.0, 4.0, 0.0), (1.05, 3.0, 1.0)], derivatives=False)

@@ -20,6 +20,7 @@ from separatrix.discovery.judge import (
 )
 from separatrix.discovery.machine import with_values
 from separatrix.discovery.misfit import missed
+from separatrix.discovery.options import Options
 from separatrix.discovery.refit import Fitted, refit, shared_values
 from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.screen import screen, signature
@@ -108,10 +109,10 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
     able = [one for one in found.judged if admissible(one, found.base, bench.options)[0]]
-    return foremost(able or found.judged, bench.options.separation)
+    return foremost(able or found.judged, bench.options)
 
 
-def foremost(pool: list[Judged], separation: float) -> tuple[Judged, list[Judged]]:
+def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
     """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
 
     A fit that has not converged may not be named, but what it gained so far may stand against a name.
@@ -119,8 +120,12 @@ def foremost(pool: list[Judged], separation: float) -> tuple[Judged, list[Judged
     order = sorted(pool, key=lambda one: -one.evidence)
     best = next((one for one in order if one.fitted.fit.converged), order[0])
     scale = max(1.0, best.fitted.fit.reduced_chi2)
+    margin = options.separation * scale
     return best, [
-        one for one in order if one is not best and best.evidence - one.evidence < separation * scale
+        one
+        for one in order
+        if one is not best
+        and best.evidence - one.evidence < margin * (options.equivalent if _equivalent(best, one) else 1)
     ]
 
 
@@ -203,7 +208,7 @@ def _with_more(
     pairs = [one for one in pairs if admissible(one, base, bench.options)[0]]
     if not pairs:
         return _give_up(decision)
-    pair, close = foremost(pairs, bench.options.separation)
+    pair, close = foremost(pairs, bench.options)
     pass_gates(bench, pair, base, close, second.screened.tests)
     # both must be needed: each over the other alone
     needed = bench.options.needed * bench.options.separation

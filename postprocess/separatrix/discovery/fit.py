@@ -8,7 +8,7 @@ coupled only through the parameters. Their Schur complement has the size of the 
 (tests/python/test_discovery_fit.py compares it with the dense step).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from separatrix.discovery.problem import Evaluation, Problem
 _HUBER = 1.5
 _TOLERANCE = 0.02
 _NEAR = 0.25
+_KINK = 4.0
 _TINY = 1e-12
 _STRONGEST = 1e8
 _FINE = 0.03
@@ -60,12 +61,18 @@ class Fit:
     movable: np.ndarray
     # in a minimum that is known not to be the lowest
     caught: bool = False
+    # whether steps of every length were tried and gained next to nothing
+    exhausted: bool = False
 
     @property
     def converged(self) -> bool:
-        """Certificate: along every direction the minimum is within half a standard error."""
-        small = self.decrement < max(_NEAR, 1e-4 * self.total) and np.isfinite(self.decrement)
-        return bool(small and self.good.any() and not self.caught)
+        """Certificate: along every direction the minimum is within half a standard error.
+
+        Where a body sticks, chi^2 has kinks: a step that promises more and gains nothing at any length ends
+        there too, within two standard errors.
+        """
+        most = max(_NEAR, 1e-4 * self.total, _KINK * max(1.0, self.reduced_chi2) if self.exhausted else 0.0)
+        return bool(self.decrement < most and self.good.any() and not self.caught)
 
     @property
     def good(self) -> np.ndarray:
@@ -173,6 +180,7 @@ def minimise(
     damping = 1e-4
     current = problem.evaluate(values, starts)
     iterations = stalled = 0
+    exhausted = False
     while iterations < most:
         iterations += 1
         weights, scale = _weights(current, robust)
@@ -196,24 +204,27 @@ def minimise(
                 break
             damping = max(10 * damping, 1e-6)
         if not accepted:
+            exhausted = True
             break
         values, starts = tried, starts + start_step
         damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
         current = problem.evaluate(values, starts)
         stalled = stalled + 1 if gain < tolerance else 0
         if stalled > _STALLS:
+            exhausted = True
             break
         if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():
             mean = before[both].sum() / max(1, current.used[both].sum())
             if mean > hopeless:
                 break
-    return _finished(problem, values, starts, current, movable, iterations)
+    return replace(_finished(problem, values, starts, current, movable, iterations), exhausted=exhausted)
 
 
 def again(problem: Problem, fit: Fit) -> Fit:
     """The same values and starts, evaluated with the noise as it is known now."""
     current = problem.evaluate(fit.values, fit.starts)
-    return _finished(problem, fit.values, fit.starts, current, fit.movable, fit.iterations)
+    found = _finished(problem, fit.values, fit.starts, current, fit.movable, fit.iterations)
+    return replace(found, exhausted=fit.exhausted)
 
 
 def _finished(problem, values, starts, current, movable, iterations) -> Fit:

@@ -84,15 +84,20 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 
 
 def stable(one: Judged, base: Fitted, options: Options) -> float:
-    """Share of block bootstraps of the segments in which the effect pays for its parameters."""
+    """Share of block bootstraps of all segments in which the effect pays for its parameters.
+
+    0 where it does not pay in the training records themselves.
+    """
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
     added = added[~fit.at_bound[added]]
-    if not added.size:
+    gain, parts = gain_over(one.fitted, base)
+    if not added.size or gain <= one.parameters:
         return 0.0
     random = np.random.default_rng([options.seed, 12])
-    _, parts = gain_over(one.fitted, base)
     sums = _block_sums(parts, random, options.bootstraps)
+    if one.held_out_parts.size:
+        sums = sums + _block_sums(one.held_out_parts / one.prediction.misfit, random, options.bootstraps)
     return float(np.mean(sums > one.parameters))
 
 

@@ -30,6 +30,8 @@ class Options:
     gap_share: float = 0.3
     # log-likelihood by which a name must beat the next one: odds of 20 to 1
     separation: float = 3.0
+    # the same for two names of one motion, over `separation`: only what sticks tells them apart
+    equivalent: float = 2.0
     # the same for a pair over each of its effects alone, over `separation`: pairs are chosen among many
     needed: float = 2.0
     # log score that a held-out record may lose by a name: as much as separates two names

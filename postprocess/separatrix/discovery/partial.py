@@ -98,7 +98,11 @@ def nearest(bench: Bench, decision: Decision) -> list[str]:
 
 def _next(bench: Bench, found: Round) -> Judged | None:
     """The best candidate of a round, if it passes every gate."""
-    pool = [one for one in found.judged if settled(one) and admissible(one, found.base, bench.options)[0]]
+    pool = [
+        one
+        for one in found.judged
+        if one.fitted.fit.converged and admissible(one, found.base, bench.options)[0]
+    ]
     return _passing(bench, found, pool)
 
 
@@ -113,7 +117,7 @@ def _first(bench: Bench, found: Round) -> Judged | None:
 def _pair(bench: Bench, found: Round) -> Judged | None:
     """Two effects that pass only together: each alone drives the base to where it should not be."""
     seconds = []
-    for one in [one for one in found.judged if settled(one)][:_LEADERS]:
+    for one in [one for one in found.judged if one.fitted.fit.converged][:_LEADERS]:
         # some effects need another one: presliding needs dry friction
         seconds.append(run_round(bench, one.fitted, one.prediction, 0.9, 0.95))
     singles = [one for second in seconds for one in second.judged]
@@ -125,7 +129,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
         fitted = fit_pair(bench, found, one, other)
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if settled(one) and _both_clear(one, found, bench.options)]
+    pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found, bench.options)]
     best = _passing(bench, found, pairs)
     return best if best is not None and _all_needed(bench, found, best) else None
 
@@ -138,12 +142,6 @@ def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
     return all(clear) and admissible(pair, found.base, options)[0]
 
 
-def settled(one: Judged) -> bool:
-    """Whether a further step promises less than one residual: what sticks has kinks where no step fits."""
-    fit = one.fitted.fit
-    return fit.converged or fit.decrement < fit.reduced_chi2
-
-
 def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
     if not pool:
@@ -152,7 +150,6 @@ def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     # the strict decision may have asked for it
     best.gates.pop("adequate", None)
     pass_gates(bench, best, found.base, rivals, found.screened.tests)
-    best.gates["converged"] = settled(best)
     best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
     return best if all(best.gates.values()) else None
 

@@ -147,7 +147,7 @@ class Problem:
         prepared = self.prepared[number]
         active, given, chain = self._active(number, values, derivatives)
         start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
-        result = self._simulate(part, active, given, start, derivatives)
+        result = self._simulate(part, active, given, start, chain)
         rows, inside = part["rows"], part["inside"]
         length = inside.shape[1]
         failed = np.asarray(result.reason) != 0
@@ -164,8 +164,8 @@ class Problem:
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
-            jacobians = self._derivatives(number, part, active, chain, result)
-            n = len(active)
+            jacobians = self._derivatives(number, part, chain, result)
+            n = np.count_nonzero(chain.any(axis=0))
             out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
         for channel, (measured, computed, sigma) in enumerate(
@@ -182,11 +182,13 @@ class Problem:
                 out.by_parameter[rows, columns] = np.nan_to_num(_padded(by_parameter / sigma, inside))
 
     def _simulate(
-        self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, derivatives: bool
+        self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, chain: np.ndarray | None
     ):
         more = {} if part["force"] is None else {"force": part["force"]}
+        if chain is not None:
+            more["directions"] = chain.T[chain.any(axis=0)]
         return self.model.segments(
-            active, given, start, part["offsets"], part["times"], derivatives=derivatives, **more
+            active, given, start, part["offsets"], part["times"], derivatives=chain is not None, **more
         )
 
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
@@ -258,9 +260,10 @@ class Problem:
         slope = (ends[0] - ends[1]) / (2 * step)
         return -ratio * slope / (0.5 * (ends[0] + ends[1]))
 
-    def _derivatives(self, number: int, part: dict, active: list[str], chain: np.ndarray, result) -> list:
-        """Derivatives of x and v by the start, and by the free parameters through `active` and the crank."""
-        n = len(active)
+    def _derivatives(self, number: int, part: dict, chain: np.ndarray, result) -> list:
+        """Derivatives of x and v by the start, and by the free parameters through machine and crank."""
+        moves = chain.any(axis=0)
+        n = np.count_nonzero(moves)
         prepared = self.prepared[number]
         crank = np.zeros((part["starts"].size, len(self.free)))
         for j, one in enumerate(self.free):
@@ -269,10 +272,12 @@ class Problem:
             elif one.path == "nuisance:clock" and one.record == number:
                 crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
         crank = np.repeat(crank, np.diff(part["offsets"]), axis=0)
-        return [
-            (whole[:, n : n + 2], whole[:, :n] @ chain + whole[:, n + 2 : n + 3] * crank)
-            for whole in (result.jacobian, result.velocity_jacobian)
-        ]
+        found = []
+        for whole in (result.jacobian, result.velocity_jacobian):
+            by_parameter = whole[:, n + 2 : n + 3] * crank
+            by_parameter[:, moves] += whole[:, :n]
+            found.append((whole[:, n : n + 2], by_parameter))
+        return found
 
 
 def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -10,13 +10,13 @@ from separatrix.discovery.problem import Evaluation, Problem
 # reduced chi^2 of a segment, over that of the median one, that looks like a wrong minimum
 _SUSPECT = 1.7
 _MOST_SEGMENTS = 12
-_ITERATIONS = 10
+_ITERATIONS = 15
 # starts of one segment with the same number of impacts that are followed
 _FOLLOWED = 2
 _LEAST_GAIN = 0.01
-_STRONGEST = 1.0
+_STRONGEST = 1e3
 # starts tried, in standard errors of the smoother
-_TRIED = np.array([(0, 0), (0, -3), (0, -1.5), (0, 1.5), (0, 3), (-2, 0), (2, 0), (-2, 2), (2, -2)], float)
+_TRIED = np.array([(i, j) for i in (0, -4, -2, 2, 4) for j in (0, -3, -1.5, 1.5, 3)], float)
 
 
 def suspicious(fit: Fit) -> np.ndarray:
@@ -73,9 +73,13 @@ def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
 
 
 def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the start of each segment by itself, the machine fixed; also the chi^2."""
+    """Fit the start of each segment by itself, the machine fixed; also the chi^2.
+
+    Each keeps its number of impacts: next to a graze a step would leave the minimum with one more unseen.
+    """
     starts = starts.copy()
-    cost = _cost(problem.evaluate(values, starts, derivatives=False))
+    begun = problem.evaluate(values, starts, derivatives=False)
+    cost, hits = _cost(begun), begun.hits
     damping = np.full(cost.size, 1e-3)
     active = np.flatnonzero(np.isfinite(cost))
     for _ in range(_ITERATIONS):
@@ -84,9 +88,9 @@ def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tu
         part = problem.of_segments(active)
         current = part.evaluate(values, starts[active])
         tried = starts[active] + _steps(current, damping[active])
-        reached = _cost(part.evaluate(values, tried, derivatives=False))
-        before = cost[active]
-        better = reached < before
+        ended = part.evaluate(values, tried, derivatives=False)
+        reached, before = _cost(ended), cost[active]
+        better = (reached < before) & (ended.hits == hits[active])
         starts[active[better]] = tried[better]
         cost[active[better]] = reached[better]
         damping[active] *= np.where(better, 0.2, 10)

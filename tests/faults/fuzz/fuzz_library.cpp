@@ -40,9 +40,10 @@ extern "C" int fuzz_library(const char *bytes, int64_t length, int *message_leng
     const int first[2] = {0, 2};
     double x[2], v[2], slopes[8], velocity_slopes[8], impact[4];
     int impacts = 0, steady = 0, reason = 0, met = 0, segment = 0;
-    code = separatrix_segments(model, some, &chosen, &value, 1, start, first, times, 0, 0.0, nullptr, 1, 1e-6,
-                               x, v, slopes, velocity_slopes, &impacts, &steady, &reason, 1, &met, &segment,
-                               impact, message, size);
+    const double direction = 1;
+    code = separatrix_segments(model, some, &chosen, &value, some, &direction, 1, start, first, times, 0, 0.0,
+                               nullptr, 1, 1e-6, x, v, slopes, velocity_slopes, &impacts, &steady, &reason, 1,
+                               &met, &segment, impact, message, size);
   }
   separatrix_model_free(model);
   *message_length = static_cast<int>(std::strlen(message));

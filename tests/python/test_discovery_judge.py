@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a name needs: to pay in most resamplings, to beat its rivals, and a fit that is at its end."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from separatrix.discovery.decide import foremost
+from separatrix.discovery.fit import Fit
+from separatrix.discovery.judge import Judged, stable
+from separatrix.discovery.machine import Free
+from separatrix.discovery.options import Options
+from separatrix.discovery.refit import Fitted
+
+COUNT = 20
+OPTIONS = Options()
+
+
+def fit(chi2: np.ndarray, decrement: float = 0.0) -> Fit:
+    """One parameter, inside its bounds."""
+    ones = np.ones(chi2.size)
+    flown = SimpleNamespace(steady=ones > 0, failed=ones < 0)
+    starts, open_ = np.zeros((chi2.size, 2)), np.zeros(1, bool)
+    return Fit(np.ones(1), starts, flown, None, chi2, 50 * ones, decrement, 1, open_, ~open_)
+
+
+def fitted(name: str, chi2: np.ndarray) -> Fitted:
+    problem = SimpleNamespace(free=[Free(f"effect.{name}.force", 1.0)])
+    return Fitted((name,) if name else (), None, problem, fit(chi2), (0,))
+
+
+def judged(gains: np.ndarray, held_out: np.ndarray) -> Judged:
+    """A candidate that gains so much log-likelihood by segment over a base with chi^2 of 100 in each."""
+    one = fitted("coulomb", 100 - 2 * gains)
+    prediction = SimpleNamespace(misfit=1.0)
+    return Judged(one, prediction, float(gains.sum()), float(held_out.sum()), held_out, 1)
+
+
+def test_an_effect_that_a_few_segments_carry_needs_the_held_out_record():
+    base = fitted("", np.full(COUNT, 100.0))
+    few, even = np.zeros(COUNT), np.full(COUNT, 2.0)
+    few[0] = 40.0
+    assert stable(judged(even, 0 * even), base, OPTIONS) > OPTIONS.inclusion
+    assert stable(judged(few, 0 * even), base, OPTIONS) < OPTIONS.inclusion
+    assert stable(judged(few, even), base, OPTIONS) > OPTIONS.inclusion
+    # a record that was never fitted makes no name by itself
+    assert stable(judged(0.02 * even, even), base, OPTIONS) == 0
+
+
+def contender(name: str, evidence: float) -> Judged:
+    one = fitted(name, np.full(COUNT, 47.0))
+    return Judged(one, None, evidence + 1, 0.0, np.zeros(0), 1)
+
+
+@pytest.mark.parametrize(("other", "behind", "rivals"), [
+    ("stribeck", 2.9, ["stribeck"]),
+    ("stribeck", 3.1, []),
+    ("asymmetric_friction", 5.9, ["asymmetric_friction"]),
+    ("asymmetric_friction", 6.1, []),
+])  # fmt: skip
+def test_two_names_of_one_motion_need_more_to_be_told_apart(other, behind, rivals):
+    pool = [contender("offset_force", 50.0), contender(other, 50.0 - behind)]
+    best, close = foremost(pool, OPTIONS)
+    assert best.name == "offset_force"
+    assert [one.name for one in close] == rivals
+
+
+@pytest.mark.parametrize(("decrement", "exhausted", "converged"), [
+    (0.1, False, True),
+    (2.0, False, False),
+    (2.0, True, True),
+    (5.0, True, False),
+    (np.nan, True, False),
+])  # fmt: skip
+def test_a_kink_ends_a_fit_within_two_standard_errors(decrement, exhausted, converged):
+    """Chi^2 is that of the noise, so that one standard error is 1."""
+    one = replace(fit(np.full(COUNT, 47.0), decrement), exhausted=exhausted)
+    assert one.reduced_chi2 == pytest.approx(1, abs=0.05)
+    assert one.converged == converged
