@@ -75,7 +75,12 @@ CATALOGUE: tuple[Effect, ...] = (
         ("excess",),
         ("velocity",),
     ),
-    Effect("static_excess", lambda s: {"force": [0.05 * s.force]}, ("force",)),
+    # a body that does not stick without it shows nothing of a small one
+    Effect(
+        "static_excess",
+        lambda s: {"force": [share * s.force for share in (0.1, 0.03, 0.3)]},
+        positive=("force",),
+    ),
     Effect(
         "dahl",
         lambda s: {"stiffness": [s.friction / (share * s.length) for share in (0.02, 0.005, 0.1)]},

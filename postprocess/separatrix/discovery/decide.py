@@ -68,15 +68,33 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     decision = Decision("none", [], [], [], [first], gap, foretold)
     if not first.judged:
         return _without_name(bench, decision)
-    best, rivals = leaders(bench, first)
-    pass_gates(bench, best, base, rivals, first.screened.tests)
-    if not (best.gates["detect"] and best.gates["stable"]):
-        # what a few segments carry is not detected
+    best, rivals = _lead(bench, first)
+    if not _detected(best):
         return _without_name(bench, decision)
-    _judge_ceiling(bench, best)
+    if not (best.gates["adequate"] or bench.options.quick):
+        # the linear screen may have passed over the effect that closes the gap
+        first = run_round(bench, base, foretold, 0.75, 0.8, first, everything=True)
+        decision.rounds, decision.foretold = [first], first.foretold
+        best, rivals = _lead(bench, first)
+        if not _detected(best):
+            return _without_name(bench, decision)
     if best.gates["adequate"]:
         return _conclude(bench, decision, best, rivals)
     return _with_more(bench, decision, base, best, rivals)
+
+
+def _lead(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
+    """The best candidate of a round with its gates, and its rivals."""
+    best, rivals = leaders(bench, found)
+    pass_gates(bench, best, found.base, rivals, found.screened.tests)
+    if _detected(best):
+        _judge_ceiling(bench, best)
+    return best, rivals
+
+
+def _detected(one: Judged) -> bool:
+    """Whether a gain is more than chance and what a few segments carry."""
+    return one.gates["detect"] and one.gates["stable"]
 
 
 def renewed(bench: Bench, first: Round) -> Fitted | None:
@@ -195,7 +213,7 @@ def _with_more(
     """One effect is not enough: try a second on top of the best, and the pairs that the screen finds."""
     if bench.options.most_effects < 2:
         return _give_up(decision)
-    second = run_round(bench, best.fitted, best.prediction, 0.75, 0.9)
+    second = run_round(bench, best.fitted, best.prediction, 0.8, 0.9)
     decision.rounds.append(second)
     pairs = [over_base(bench, base, decision.foretold, one) for one in second.judged]
     tried = {frozenset(one.fitted.names) for one in pairs}

@@ -84,19 +84,19 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 
 
 def stable(one: Judged, base: Fitted, options: Options) -> float:
-    """Share of block bootstraps of all segments in which the effect pays for its parameters.
+    """Share of block bootstraps of the segments in which the effect pays for its parameters.
 
-    0 where it does not pay in the training records themselves.
+    Held-out segments are drawn too where the training records themselves tell the effect from nothing.
     """
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
     added = added[~fit.at_bound[added]]
     gain, parts = gain_over(one.fitted, base)
-    if not added.size or gain <= one.parameters:
+    if not added.size:
         return 0.0
     random = np.random.default_rng([options.seed, 12])
     sums = _block_sums(parts, random, options.bootstraps)
-    if one.held_out_parts.size:
+    if one.held_out_parts.size and gain - one.parameters > options.separation:
         sums = sums + _block_sums(one.held_out_parts / one.prediction.misfit, random, options.bootstraps)
     return float(np.mean(sums > one.parameters))
 

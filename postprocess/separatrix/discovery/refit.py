@@ -83,7 +83,8 @@ def refit(
         rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None and settled and beaten(rough, rival):
             return rough
-        fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
+        if not _far_off(fit, base):
+            fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None or _better(found, best):
             best = found
@@ -96,6 +97,12 @@ def refit(
         if quick and tries == 2:
             break
     return _above_base(data, best, base, candidate)
+
+
+def _far_off(fit: Fit, base: Fitted) -> bool:
+    """Whether most segments are followed so badly that no wrong minimum of a few can be the reason."""
+    usual = float(np.median(fit.chi2 / np.maximum(1, fit.counts)))
+    return usual > _HOPELESS * max(1.0, base.fit.reduced_chi2)
 
 
 def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:

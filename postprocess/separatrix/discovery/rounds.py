@@ -70,10 +70,11 @@ def run_round(
     first: float,
     last: float,
     earlier: Round | None = None,
+    everything: bool = False,
 ) -> Round:
-    """Screen all candidates on top of `base` and refit those that matter.
+    """Screen all candidates on top of `base` and refit those that matter, or `everything` that is seen.
 
-    The fits of an `earlier` round on the same machine, made with another noise, are carried on.
+    The fits of an `earlier` round on the same machine are carried on; the noise may be another now.
     """
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
@@ -96,7 +97,7 @@ def run_round(
     if not base.names:
         bench.absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
     screened = screen(base.fit, signatures)
-    chosen = choose(base, screened, options)
+    chosen = choose(base, screened, options, everything)
     found: list[Judged] = []
     rival = None
     known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
@@ -176,10 +177,10 @@ def _cross(
     found.sort(key=lambda one: -one.evidence)
 
 
-def choose(base: Fitted, screened: Screened, options: Options) -> list[str]:
+def choose(base: Fitted, screened: Screened, options: Options, everything: bool = False) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
     order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
-    if base.fit.reduced_chi2 > _BAD and not options.quick:
+    if everything or (base.fit.reduced_chi2 > _BAD and not options.quick):
         return order
     return [
         name
