@@ -183,11 +183,11 @@ def main() -> int:
     """Run or summarise; return the exit code."""
     parser = argparse.ArgumentParser(prog="discovery_campaign")
     parser.add_argument("--cases", type=int, default=520)
-    parser.add_argument("--seed", type=int, default=2027)
+    parser.add_argument("--seed", type=int, default=2028)
     parser.add_argument("--subset", choices=["ci"])
     parser.add_argument("--out", type=Path, default=SOURCE / "out" / "discovery")
     parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "discovery.md")
-    parser.add_argument("--limit", type=float, default=200.0)
+    parser.add_argument("--limit", type=float, default=300.0)
     parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
