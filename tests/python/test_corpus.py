@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from program import CASE, STARTS, Outcome, run, write_case
 from separatrix import SeparatrixError, open_result
-from separatrix.discovery.records import read_record
+from separatrix.discovery.measured.records import read_record
 from separatrix.open import reading
 
 CORPUS = Path(__file__).resolve().parents[1] / "faults" / "corpus"

@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
-from separatrix.discovery import partial as partial_module
-from separatrix.discovery import rounds
-from separatrix.discovery import screen as screen_module
-from separatrix.discovery.fit import blocks_of, eliminate, gauss_newton_step
+from separatrix.discovery.decision import partial as partial_module
+from separatrix.discovery.decision import rounds
+from separatrix.discovery.decision.where import benjamini_hochberg
+from separatrix.discovery.fitting import screen as screen_module
+from separatrix.discovery.fitting.fit import blocks_of, eliminate, gauss_newton_step
+from separatrix.discovery.fitting.screen import project
+from separatrix.discovery.measured.preflight import white_noise
+from separatrix.discovery.measured.smoother import impact_table, smooth
 from separatrix.discovery.options import Options
-from separatrix.discovery.preflight import white_noise
-from separatrix.discovery.screen import project
-from separatrix.discovery.smoother import impact_table, smooth
-from separatrix.discovery.where import benjamini_hochberg
 
 SEGMENTS, SAMPLES, PARAMETERS = 7, 12, 4
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.heldout import Prediction, gained
-from separatrix.discovery.judge import Judged
+from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.partial import preferred
+from separatrix.discovery.fitting.heldout import Prediction, gained
 from separatrix.discovery.options import Options
-from separatrix.discovery.partial import preferred
 
 SEGMENTS = 40
 

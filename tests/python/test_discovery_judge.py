@@ -7,12 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decide import foremost
-from separatrix.discovery.fit import Fit
-from separatrix.discovery.judge import Judged, stable
-from separatrix.discovery.machine import Free
+from separatrix.discovery.decision.decide import foremost
+from separatrix.discovery.decision.judge import Judged, stable
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted
 
 COUNT = 20
 OPTIONS = Options()

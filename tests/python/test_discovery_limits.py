@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.fit import minimise
-from separatrix.discovery.limits import detectable, distance
-from separatrix.discovery.machine import Free, base_parameters
+from separatrix.discovery.decision.limits import detectable, distance
+from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.machine import Free, base_parameters
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import make_record
+from separatrix.discovery.measured.segments import padded
 from separatrix.discovery.options import Options
-from separatrix.discovery.preflight import prepare
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.records import make_record
-from separatrix.discovery.refit import Fitted
-from separatrix.discovery.segments import padded
 from separatrix.library import Model
 
 pytestmark = pytest.mark.usefixtures("library")

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery import misfit
-from separatrix.discovery.decide import Decision, _without_name
-from separatrix.discovery.misfit import doubted_noise, missed, too_quiet
+from separatrix.discovery.decision import misfit
+from separatrix.discovery.decision.decide import Decision, _without_name
+from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet
 from separatrix.discovery.options import Options
 
 SAMPLES, SEGMENTS = 50, 20

@@ -5,10 +5,10 @@
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.preflight import prepare
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.records import Record, make_record
-from separatrix.discovery.segments import padded
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import Record, make_record
+from separatrix.discovery.measured.segments import padded
 from separatrix.discovery.workflow import _split
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model

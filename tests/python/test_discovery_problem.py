@@ -5,13 +5,13 @@
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.ceiling import ceiling
-from separatrix.discovery.fit import minimise
-from separatrix.discovery.machine import base_parameters, drive_nuisances
-from separatrix.discovery.preflight import prepare
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.records import make_record
-from separatrix.discovery.segments import padded
+from separatrix.discovery.fitting.ceiling import ceiling
+from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.machine import base_parameters, drive_nuisances
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import make_record
+from separatrix.discovery.measured.segments import padded
 from separatrix.library import Model
 
 RATE, LENGTH = 200, 60

@@ -10,7 +10,7 @@ import pytest
 from program import CASE, listing
 from separatrix.discovery import cli
 from separatrix.discovery.cli import main
-from separatrix.discovery.records import make_record, read_record, unique_names
+from separatrix.discovery.measured.records import make_record, read_record, unique_names
 from separatrix.discovery.results import FILES
 from separatrix.errors import SeparatrixError
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery import refit
-from separatrix.discovery.fit import Fit
-from separatrix.discovery.machine import Free
-from separatrix.discovery.refit import Fitted
+from separatrix.discovery.fitting import refit
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.refit import Fitted
 
 FREE = [Free("restoring.stiffness", 9.0), Free("effect.viscous.damping", 0.5, lower=0.0)]
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from program import CASE
-from separatrix.discovery import comparison
 from separatrix.discovery.options import Options
-from separatrix.discovery.report import write_report
-from separatrix.discovery.story import sections
+from separatrix.discovery.report import comparison
+from separatrix.discovery.report.document import write_report
+from separatrix.discovery.report.story import sections
 from separatrix.library import Model
 
 SECTIONS = [

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.machine import base_parameters
-from separatrix.discovery.preflight import prepare
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.records import make_record
-from separatrix.discovery.rescue import rescued, solve_starts
-from separatrix.discovery.segments import padded
+from separatrix.discovery.fitting.machine import base_parameters
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.rescue import rescued, solve_starts
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import make_record
+from separatrix.discovery.measured.segments import padded
 from separatrix.library import Model
 
 pytestmark = pytest.mark.usefixtures("library")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from program import CASE, succeed
 from separatrix.discovery.cli import main
-from separatrix.discovery.machine import Free
-from separatrix.discovery.verdict import _parameters
+from separatrix.discovery.decision.verdict import _parameters
+from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.wording import with_error
 
 pytestmark = pytest.mark.usefixtures("library")

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.arguments import Parser, list_of, positive, whole_number
-from separatrix.discovery.catalogue import BY_NAME
+from separatrix.discovery.fitting.catalogue import BY_NAME
 from separatrix.discovery.options import Options
-from separatrix.discovery.report import write_report
+from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
 from separatrix.discovery.wording import with_error
 from separatrix.discovery.workflow import investigate

@@ -11,11 +11,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.discovery.catalogue import within_barriers
-from separatrix.discovery.ceiling import sample_times
-from separatrix.discovery.refit import Fitted
-from separatrix.discovery.smoother import impact_table, reversals, stick_intervals
-from separatrix.discovery.verdict import Findings
+from separatrix.discovery.decision.verdict import Findings
+from separatrix.discovery.fitting.catalogue import within_barriers
+from separatrix.discovery.fitting.ceiling import sample_times
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.wording import with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 

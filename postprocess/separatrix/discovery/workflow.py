@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.base import copy_noise, find_phases, fit_base, measure_noise
-from separatrix.discovery.data import fit_stages, gather, scales_of
-from separatrix.discovery.decide import decide
-from separatrix.discovery.machine import on_other_records, with_values
+from separatrix.discovery.decision.decide import decide
+from separatrix.discovery.decision.partial import decide_in_part, nearest
+from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.verdict import Findings, verdict_of
+from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
+from separatrix.discovery.fitting.data import fit_stages, gather, scales_of
+from separatrix.discovery.fitting.machine import on_other_records, with_values
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import Record, read_record, unique_names
 from separatrix.discovery.options import Options
-from separatrix.discovery.partial import decide_in_part, nearest
-from separatrix.discovery.preflight import prepare
-from separatrix.discovery.records import Record, read_record, unique_names
-from separatrix.discovery.refit import Fitted
-from separatrix.discovery.rounds import Bench
-from separatrix.discovery.verdict import Findings, verdict_of
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
 

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from separatrix import SeparatrixError, decode_flags, open_result, table
-from separatrix.discovery.records import read_record
+from separatrix.discovery.measured.records import read_record
 from separatrix.open import reading
 
 LONGEST_SECONDS = 10

@@ -3,7 +3,7 @@
 """The story of a verdict in words and tables; every number is one of verdict.json."""
 
 from separatrix.discovery.options import Options
-from separatrix.discovery.pages import Section, Table
+from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.wording import digits_of, interval, number, probability, with_unit, words
 
 GATES = {

@@ -4,12 +4,7 @@
 
 from dataclasses import dataclass, field
 
-from separatrix.discovery.base import copy_noise, renew_noise
-from separatrix.discovery.catalogue import BY_NAME, candidate
-from separatrix.discovery.ceiling import Ceiling, ceiling
-from separatrix.discovery.fit import minimise
-from separatrix.discovery.heldout import Prediction
-from separatrix.discovery.judge import (
+from separatrix.discovery.decision.judge import (
     Judged,
     adequate,
     admissible,
@@ -18,12 +13,17 @@ from separatrix.discovery.judge import (
     judged,
     stable,
 )
-from separatrix.discovery.machine import with_values
-from separatrix.discovery.misfit import missed
+from separatrix.discovery.decision.misfit import missed
+from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.fitting.base import copy_noise, renew_noise
+from separatrix.discovery.fitting.catalogue import BY_NAME, candidate
+from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
+from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.machine import with_values
+from separatrix.discovery.fitting.refit import Fitted, refit, shared_values
+from separatrix.discovery.fitting.screen import screen, signature
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, refit, shared_values
-from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
-from separatrix.discovery.screen import screen, signature
 
 _PAIRS = 6
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2

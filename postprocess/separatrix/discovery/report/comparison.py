@@ -17,9 +17,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
-from separatrix.discovery.figures import AFTER, BEFORE, MEASURED
-from separatrix.discovery.machine import drive_amplitudes
-from separatrix.discovery.pages import Picture, Section
+from separatrix.discovery.fitting.machine import drive_amplitudes
+from separatrix.discovery.report.figures import AFTER, BEFORE, MEASURED
+from separatrix.discovery.report.pages import Picture, Section
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 from separatrix.open import open_result

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.catalogue import Scales
-from separatrix.discovery.fit import Fit, minimise
-from separatrix.discovery.machine import Free
-from separatrix.discovery.preflight import Prepared
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.rescue import rescued, suspicious
-from separatrix.discovery.segments import Segments, cut
-from separatrix.discovery.smoother import Smoothed, smooth
+from separatrix.discovery.fitting.catalogue import Scales
+from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.rescue import rescued, suspicious
+from separatrix.discovery.measured.preflight import Prepared
+from separatrix.discovery.measured.segments import Segments, cut
+from separatrix.discovery.measured.smoother import Smoothed, smooth
 
 # lengths of the stages over that of the longest segments
 STAGES = (0.2, 0.5, 1.0)

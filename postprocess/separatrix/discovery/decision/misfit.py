@@ -5,12 +5,12 @@
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.data import Data
-from separatrix.discovery.fit import Fit
-from separatrix.discovery.noise import noise_of
+from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.noise import noise_of
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.measured.preflight import Prepared, white_noise
 from separatrix.discovery.options import Options
-from separatrix.discovery.preflight import Prepared, white_noise
-from separatrix.discovery.problem import Problem
 
 # reduced chi^2 below which the noise must be smaller than stated
 _TOO_LITTLE = 0.5

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.ceiling import Ceiling
-from separatrix.discovery.heldout import Prediction, gained
+from separatrix.discovery.fitting.ceiling import Ceiling
+from separatrix.discovery.fitting.heldout import Prediction, gained
+from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, gain_over
 
 _BLOCKS = 2
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.catalogue import Candidate
-from separatrix.discovery.fit import Fit, blocks_of, eliminate, solve_scaled
-from separatrix.discovery.problem import Problem
+from separatrix.discovery.fitting.catalogue import Candidate
+from separatrix.discovery.fitting.fit import Fit, blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.problem import Problem
 
 # bootstrap of the null
 _SEED = 22

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.catalogue import Candidate
-from separatrix.discovery.data import Data, fit_stages, polished
-from separatrix.discovery.fit import Fit, minimise
-from separatrix.discovery.machine import Free
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.screen import Screened
+from separatrix.discovery.fitting.catalogue import Candidate
+from separatrix.discovery.fitting.data import Data, fit_stages, polished
+from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.screen import Screened
 
 # a linearised estimate that reaches this share of what it promised needs no other start
 _DELIVERED = 0.8

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.problem import Evaluation, Problem
+from separatrix.discovery.fitting.problem import Evaluation, Problem
 
 _HUBER = 1.5
 _TOLERANCE = 0.02

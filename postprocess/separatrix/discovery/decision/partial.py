@@ -15,12 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.ceiling import ceiling
-from separatrix.discovery.decide import Decision, decide, fit_pair, over_base, pass_gates
-from separatrix.discovery.judge import Judged, adequate, admissible, held_out_bounds, judged
+from separatrix.discovery.decision.decide import Decision, decide, fit_pair, over_base, pass_gates
+from separatrix.discovery.decision.judge import Judged, adequate, admissible, held_out_bounds, judged
+from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.fitting.ceiling import ceiling
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted
-from separatrix.discovery.rounds import Bench, Round, pair_gains, run_round
 
 _PAIRS = 12
 _LEADERS = 2

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.stats import chi2
 
-from separatrix.discovery.fit import Fit, blocks_of, eliminate
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.response import force_columns, kick_columns, sample_times
-from separatrix.discovery.screen import project
+from separatrix.discovery.fitting.fit import Fit, blocks_of, eliminate
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.response import force_columns, kick_columns, sample_times
+from separatrix.discovery.fitting.screen import project
 
 _PIECES = 5
 _USABLE = 1e-6

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.judge import family_wise
+from separatrix.discovery.decision.judge import family_wise
+from separatrix.discovery.decision.rounds import Round
+from separatrix.discovery.fitting.screen import Signature, screen
 from separatrix.discovery.options import Options
-from separatrix.discovery.rounds import Round
-from separatrix.discovery.screen import Signature, screen
 
 
 def decoys(found: Round, options: Options) -> dict:

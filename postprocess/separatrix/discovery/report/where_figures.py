@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from separatrix import style
-from separatrix.discovery.figures import BEFORE, LINE, MEASURED
+from separatrix.discovery.report.figures import BEFORE, LINE, MEASURED
 
 _DIVERGING = "PuOr"
 

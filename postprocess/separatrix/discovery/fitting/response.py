@@ -8,8 +8,8 @@ integral of T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any nu
 
 import numpy as np
 
-from separatrix.discovery.fit import Fit
-from separatrix.discovery.problem import Problem
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.problem import Problem
 
 _LOST = 1e-9
 

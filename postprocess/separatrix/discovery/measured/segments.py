@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.records import Record
-from separatrix.discovery.smoother import Smoothed
+from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.smoother import Smoothed
 
 _FEWEST = 6
 _IMPACT_MARGIN = 2

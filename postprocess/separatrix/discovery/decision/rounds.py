@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from separatrix.discovery.catalogue import CATALOGUE, Candidate, Scales, candidate
-from separatrix.discovery.data import Data
-from separatrix.discovery.fit import blocks_of, eliminate, solve_scaled
-from separatrix.discovery.heldout import Prediction, predict
-from separatrix.discovery.judge import Judged, judged
-from separatrix.discovery.machine import with_values
+from separatrix.discovery.decision.judge import Judged, judged
+from separatrix.discovery.fitting.catalogue import CATALOGUE, Candidate, Scales, candidate
+from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.fit import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.heldout import Prediction, predict
+from separatrix.discovery.fitting.machine import with_values
+from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
+from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
-from separatrix.discovery.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
-from separatrix.discovery.screen import Screened, Signature, project, screen, signature
 
 _CERTAIN_REFITS = 5
 _RELATED = 0.7

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from separatrix.discovery.decide import Decision
-from separatrix.discovery.decoys import decoys
-from separatrix.discovery.judge import Judged
-from separatrix.discovery.limits import detectable, equivalents, separating_experiment
-from separatrix.discovery.misfit import doubted_noise, too_quiet
-from separatrix.discovery.refit import Fitted
-from separatrix.discovery.rounds import Bench, Round
-from separatrix.discovery.where import Map, sentences, where_maps
+from separatrix.discovery.decision.decide import Decision
+from separatrix.discovery.decision.decoys import decoys
+from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.limits import detectable, equivalents, separating_experiment
+from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
+from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.decision.where import Map, sentences, where_maps
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.version import __version__
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from separatrix.discovery.records import Record, resolution_of
+from separatrix.discovery.measured.records import Record, resolution_of
 from separatrix.errors import SeparatrixError
 
 # variance of fourth differences of white noise of variance 1

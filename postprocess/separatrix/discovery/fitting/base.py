@@ -4,12 +4,12 @@
 
 import numpy as np
 
-from separatrix.discovery.data import Data, fit_stages
-from separatrix.discovery.fit import Fit, again
-from separatrix.discovery.machine import Free, base_parameters, drive_nuisances
-from separatrix.discovery.noise import noise_of
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.refit import Fitted
+from separatrix.discovery.fitting.data import Data, fit_stages
+from separatrix.discovery.fitting.fit import Fit, again
+from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances
+from separatrix.discovery.fitting.noise import noise_of
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.refit import Fitted
 
 _PHASES = 12
 _RENEWED = 0.03

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.data import Data, fit_stages
-from separatrix.discovery.fit import Fit, again, minimise
-from separatrix.discovery.machine import Free, drive_amplitudes, on_other_records
-from separatrix.discovery.problem import Problem
+from separatrix.discovery.fitting.data import Data, fit_stages
+from separatrix.discovery.fitting.fit import Fit, again, minimise
+from separatrix.discovery.fitting.machine import Free, drive_amplitudes, on_other_records
+from separatrix.discovery.fitting.problem import Problem
 from separatrix.errors import SeparatrixError
 
 # reduced chi^2 above which errors of the machine are larger than the noise

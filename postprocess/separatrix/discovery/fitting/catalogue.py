@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from separatrix.discovery.machine import Free, bounds_of
+from separatrix.discovery.fitting.machine import Free, bounds_of
 from separatrix.errors import SeparatrixError
 
 

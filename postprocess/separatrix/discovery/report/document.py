@@ -9,11 +9,11 @@ import h5py
 from matplotlib.figure import Figure
 
 from separatrix import style
-from separatrix.discovery import figures, where_figures
-from separatrix.discovery.comparison import compare
 from separatrix.discovery.options import Options
-from separatrix.discovery.pages import Picture, Section, write_html, write_pdf
-from separatrix.discovery.story import names, sections
+from separatrix.discovery.report import figures, where_figures
+from separatrix.discovery.report.comparison import compare
+from separatrix.discovery.report.pages import Picture, Section, write_html, write_pdf
+from separatrix.discovery.report.story import names, sections
 from separatrix.open import reading
 
 

@@ -9,9 +9,9 @@ neighbours are compared with what noise of correlation r^|k| would leave.
 
 import numpy as np
 
-from separatrix.discovery.fit import Fit
-from separatrix.discovery.problem import Problem
-from separatrix.discovery.response import force_columns
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.response import force_columns
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
 _PIECES = 4

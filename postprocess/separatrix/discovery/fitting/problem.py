@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.machine import Free, drive_amplitudes
-from separatrix.discovery.preflight import Prepared, even_interval
-from separatrix.discovery.segments import Segments, padded
+from separatrix.discovery.fitting.machine import Free, drive_amplitudes
+from separatrix.discovery.measured.preflight import Prepared, even_interval
+from separatrix.discovery.measured.segments import Segments, padded
 from separatrix.errors import SeparatrixError
 
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.catalogue import BY_NAME, Candidate
-from separatrix.discovery.refit import Fitted
-from separatrix.discovery.rounds import Bench, Round
-from separatrix.discovery.screen import screen, signature
+from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.fitting.catalogue import BY_NAME, Candidate
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.screen import screen, signature
 
 _LADDER = 4.0 ** np.arange(-3, 4)
 _RATIOS = np.linspace(0.6, 1.5, 19)

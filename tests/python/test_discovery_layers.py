@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The folders of the discovery workflow know only those below them."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+# lowest first; what lies beside the folders puts them together
+LAYERS = ["measured", "fitting", "decision", "report"]
+# choices and words: known to all, knowing nobody
+SHARED = {"options", "wording"}
+
+
+def imported(file: Path) -> set[str]:
+    """First names below separatrix.discovery that a module imports; "" for the package itself."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module]
+        found |= {
+            name.removeprefix("separatrix.discovery").lstrip(".").split(".")[0]
+            for name in names
+            if name.startswith("separatrix.discovery")
+        }
+    return found
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_a_layer_knows_only_those_below(source_dir: Path, layer: str) -> None:
+    folder = source_dir / "postprocess" / "separatrix" / "discovery" / layer
+    files = sorted(folder.glob("*.py"))
+    assert len(files) > 3
+    below = {*LAYERS[: LAYERS.index(layer) + 1], *SHARED}
+    wrong = {file.name: imported(file) - below for file in files if imported(file) - below}
+    assert wrong == {}
+
+
+def test_the_shared_know_nobody(source_dir: Path) -> None:
+    folder = source_dir / "postprocess" / "separatrix" / "discovery"
+    assert all(imported(folder / f"{name}.py") == set() for name in SHARED)
+    assert {path.name for path in folder.iterdir() if path.is_dir()} - {"__pycache__"} == set(LAYERS)
