@@ -74,7 +74,8 @@ def run_round(
 ) -> Round:
     """Screen all candidates on top of `base` and refit those that matter, or `everything` that is seen.
 
-    The fits of an `earlier` round on the same machine are carried on; the noise may be another now.
+    The fits of an `earlier` round on the same machine, made with another noise, are carried on; with
+    `everything` the noise is the same, and they stand.
     """
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
@@ -97,15 +98,17 @@ def run_round(
     if not base.names:
         bench.absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
     screened = screen(base.fit, signatures)
-    chosen = choose(base, screened, options, everything)
-    found: list[Judged] = []
-    rival = None
-    known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
+    known = {one.name: one for one in earlier.judged} if earlier else {}
+    found = list(known.values()) if everything else []
+    ends = [one for one in found if one.fitted.fit.converged]
+    rival = max(ends, key=lambda one: one.training).fitted if ends else None
+    chosen = [
+        name for name in choose(base, screened, options, everything) if not (everything and name in known)
+    ]
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        fitted = refit(
-            bench.training, base, candidates[name], screened, rival, options.quick, known.get(name)
-        )
+        before = known[name].fitted if name in known else None
+        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick, before)
         # what is far behind a machine that leaves only noise and foretells need not foretell
         told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
         found.append(judged(base, foretold, fitted, told))

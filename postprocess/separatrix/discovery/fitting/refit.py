@@ -67,12 +67,14 @@ def refit(
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
     Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
-    is not tried further. A fit `known` from another noise is only carried on.
+    is not tried further. A fit `known` from another noise is only carried on where it is good or out of the
+    race.
     """
     best = None
     if known is not None:
         best = carried_on(data, candidate, known)
-        if _delivers(best, base, candidate, screened):
+        out = _far_off(best.fit, base) or (rival is not None and beaten(best, rival))
+        if out or _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
     settled = rival is not None and rival.fit.converged and rival.fit.like_noise(2)
