@@ -22,6 +22,11 @@ from separatrix.discovery.options import Options
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
 
+_TWO_BODIES = (
+    'body.law: found two bodies, allowed for a base machine "point_mass", which the driven body is in the '
+    "coordinate of the driving one under a measured force (docs/discovery-guide.md, Base machines)"
+)
+
 
 def discover(
     base: object,
@@ -84,9 +89,11 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
 
 
 def _model(base: object):
-    if isinstance(base, str | Path):
-        return Model.read(base)
-    return base
+    named = isinstance(base, str | Path)
+    model = Model.read(base) if named else base
+    if "body.driven_mass" in model.parameters:
+        raise SeparatrixError(f"{base}: {_TWO_BODIES}" if named else _TWO_BODIES)
+    return model
 
 
 def _record(one: Path | Record, at_rest: bool = False) -> Record:
