@@ -56,7 +56,8 @@ int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, 
  *   chosen, values [chosen_count]
  *     parameters with values of their own
  *   directions [direction_count][chosen_count]
- *     directions along which the samples are differentiated: the change of each chosen parameter per unit
+ *     directions along which the samples are differentiated: the change of each chosen parameter per unit.
+ *     One that has no room for a step either way within the bounds is an error.
  *   start [segment_count][3]
  *     x [m], v [m/s] and crank angle [rad] at the time 0 of each segment
  *   first [segment_count + 1]
@@ -68,7 +69,7 @@ int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, 
  *     case, 0: those of the case. They are one turn of the crank: a segment that starts t seconds after
  *     the first has the crank angle 2 pi t/((force_count - 1) force_interval).
  *   derivatives
- *     0: none; jacobian and velocity_jacobian may then be NULL
+ *     0: none; direction_count must be 0, and jacobian and velocity_jacobian may be NULL
  *   tolerance
  *     relative tolerance of the adaptive flight, 1e-15 to 1e-3; exact flights need none
  *

@@ -62,8 +62,9 @@ class Impacts:
 class Segments:
     """Samples of all segments, one after the other.
 
-    `x` is what the sensor shows, `v` the velocity. Columns of the Jacobians: the active parameters, then x, v
-    and crank angle of the start; None without derivatives. Per segment: the number of impacts, whether it is
+    `x` is what the sensor shows, `v` the velocity. Columns of the Jacobians: the directions (each active
+    parameter by itself, unless others were asked for), then x, v and crank angle of the start; None without
+    derivatives. Per segment: the number of impacts, whether it is
     steady (its neighbours meet the same barriers in the same order and none is grazed; otherwise the
     derivatives mean little) and the reason why it could not be flown, 0 if it was.
     """
@@ -153,6 +154,8 @@ class Model:
         start = _array(start, (len(start), 3), "start")
         if directions is None:
             directions = np.eye(len(active))
+        if not derivatives:
+            directions = np.zeros((0, len(active)))
         directions = _array(directions, (len(directions), len(active)), "directions")
         count = len(start)
         first = np.ascontiguousarray(first, np.int32)

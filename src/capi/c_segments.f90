@@ -89,10 +89,8 @@ contains
     type(family_t) :: family
     call check_values(self, chosen, values, error)
     if (allocated(error)) return
-    if (.not. all(ieee_is_finite(directions))) then
-      call fail(error, exit_usage, 'directions: not finite')
-      return
-    end if
+    call check_directions(directions, derivatives, error)
+    if (allocated(error)) return
     if (.not. (tolerance >= 1e-15_wp .and. tolerance <= 1e-3_wp)) then
       call fail(error, exit_usage, 'tolerance: found '//to_text(tolerance)//', allowed from 1e-15 to 1e-3')
       return
@@ -104,6 +102,27 @@ contains
     if (.not. allocated(error)) call check_length(family, times, error)
     if (.not. allocated(error)) call propagate(family, start, first, times, derivatives, samples, report)
   end subroutine fly
+
+  !> Directions are finite, and asked for only with derivatives. Code 64.
+  subroutine check_directions(directions, derivatives, error)
+    real(wp), intent(in) :: directions(:, :)
+    logical, intent(in) :: derivatives
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i, k
+    if (.not. derivatives .and. size(directions, 2) > 0) then
+      call fail(error, exit_usage, 'direction_count: found '//to_text(size(directions, 2))//', allowed 0 without derivatives')
+      return
+    end if
+    do k = 1, size(directions, 2)
+      do i = 1, size(directions, 1)
+        if (.not. ieee_is_finite(directions(i, k))) then
+          call fail(error, exit_usage, 'directions['//to_text(k - 1)//']['//to_text(i - 1)//']: found '// &
+                    to_text(directions(i, k))//', allowed finite numbers')
+          return
+        end if
+      end do
+    end do
+  end subroutine check_directions
 
   !> Offsets ascend from 0, and times within each segment from 0 on. Code 64.
   subroutine check_samples(segment_count, first, times, error)

@@ -2,8 +2,8 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Many short stretches of a motion, each from a start of its own, sampled at given times, with the derivatives of the samples
-!> along directions in the space of the machine's parameters and by the start. This is what a record is compared with, stretch by stretch, so
-!> that a small error of the model does not grow into another motion.
+!> along directions in the space of the machine's parameters and by the start. This is what a record is compared with, stretch
+!> by stretch, so that a small error of the model does not grow into another motion.
 module segments
   use contact_law, only: barrier_positions
   use effect_law, only: observed

@@ -198,8 +198,14 @@ contains
     type(variant_t), intent(inout) :: variant
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: moved(size(plan%values))
+    integer :: i
     associate (direction => plan%directions(:, which))
-      variant%step = sense*minval(natural_step(plan%chosen, plan%values)/abs(direction), mask=abs(direction) > 0)
+      variant%step = huge(share)
+      do i = 1, size(direction)
+        if (.not. abs(direction(i)) > 0) cycle
+        variant%step = min(variant%step, natural_step(plan%chosen(i), plan%values(i))/abs(direction(i)))
+      end do
+      variant%step = sense*variant%step
       moved = plan%values + variant%step*direction
     end associate
     call check_bounds(plan%chosen, moved, error)
@@ -209,7 +215,7 @@ contains
     if (allocated(error)) variant%step = 0
   contains
     !> Size of a step of one parameter.
-    pure elemental real(wp) function natural_step(one, value)
+    pure real(wp) function natural_step(one, value)
       type(parameter_t), intent(in) :: one
       real(wp), intent(in) :: value
       natural_step = share

@@ -26,10 +26,10 @@ static int fly(const separatrix_model *model, int index, double stiffness, const
   double v[total], v_jacobian[total][4], impact[16][4];
   int impacts[segments], steady[segments], reason[segments], impact_segment[16], impact_count;
   const double direction = 1;
-  return separatrix_segments(model, 1, &index, &stiffness, 1, &direction, segments, start[0], first, times, 0, 0, NULL,
-                             jacobian != NULL, 1e-9, x, v, jacobian, jacobian ? v_jacobian[0] : NULL, impacts,
-                             steady, reason, 16, &impact_count, impact_segment, impact[0], message,
-                             sizeof message);
+  return separatrix_segments(model, 1, &index, &stiffness, jacobian != NULL, &direction, segments, start[0],
+                             first, times, 0, 0, NULL, jacobian != NULL, 1e-9, x, v, jacobian,
+                             jacobian ? v_jacobian[0] : NULL, impacts, steady, reason, 16, &impact_count,
+                             impact_segment, impact[0], message, sizeof message);
 }
 
 int main(int argc, char **argv) {

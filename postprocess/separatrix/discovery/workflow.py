@@ -106,6 +106,8 @@ def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record],
         return records, hold_out, "as asked for"
     if len(records) > 1:
         return records[:-1], records[-1:], f"the last record, {records[-1].name}"
+    if not records:
+        raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
     at = int(0.7 * whole.t.size)
     return (

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from separatrix.discovery.decision.judge import (
@@ -9,14 +10,16 @@ from separatrix.discovery.decision.judge import (
     adequate,
     admissible,
     detection,
+    equivalent,
     held_out_bounds,
     judged,
+    margin,
     stable,
 )
 from separatrix.discovery.decision.misfit import missed
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.fitting.base import copy_noise, renew_noise
-from separatrix.discovery.fitting.catalogue import BY_NAME, candidate
+from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.heldout import Prediction
@@ -54,18 +57,8 @@ class Decision:
 def decide(bench: Bench, base: Fitted) -> Decision:
     """Add effects until what is left is noise or nothing in the catalogue helps."""
     foretold = bench.foretell(base)
-    bench.options.progress("looking for a gap", 0.15)
-    gap = ceiling(base.problem, base.fit, bench.scales.mass)
-    first = run_round(bench, base, foretold, 0.2, 0.6)
-    for _ in range(_RENEWALS):
-        lower = renewed(bench, first)
-        if lower is None:
-            break
-        base = lower
-        gap = ceiling(base.problem, base.fit, bench.scales.mass)
-        first = run_round(bench, base, bench.foretell(base, first.foretold), 0.6, 0.75, first)
-    foretold = first.foretold
-    decision = Decision("none", [], [], [], [first], gap, foretold)
+    first = _renewing(bench, run_round(bench, base, foretold, 0.2, 0.6), 0.6)
+    decision = _begun(bench, first)
     if not first.judged:
         return _without_name(bench, decision)
     best, rivals = _lead(bench, first)
@@ -73,14 +66,36 @@ def decide(bench: Bench, base: Fitted) -> Decision:
         return _without_name(bench, decision)
     if not (best.gates["adequate"] or bench.options.quick):
         # the linear screen may have passed over the effect that closes the gap
-        first = run_round(bench, base, foretold, 0.75, 0.8, first, everything=True)
-        decision.rounds, decision.foretold = [first], first.foretold
-        best, rivals = _lead(bench, first)
-        if not _detected(best):
+        whole = run_round(bench, first.base, first.foretold, 0.75, 0.8, first, everything=True)
+        whole = _renewing(bench, whole, 0.8, everything=True)
+        better, others = _lead(bench, whole)
+        decision = _begun(bench, whole)
+        if _detected(better):
+            best, rivals = better, others
+        elif whole.base is not first.base:
+            # the base itself explains what the effect did
             return _without_name(bench, decision)
     if best.gates["adequate"]:
         return _conclude(bench, decision, best, rivals)
-    return _with_more(bench, decision, base, best, rivals)
+    return _with_more(bench, decision, best)
+
+
+def _begun(bench: Bench, first: Round) -> Decision:
+    """No name yet."""
+    base = first.base
+    gap = ceiling(base.problem, base.fit, bench.scales.mass)
+    return Decision("none", [], [], [], [first], gap, first.foretold)
+
+
+def _renewing(bench: Bench, found: Round, at: float, everything: bool = False) -> Round:
+    """The round again, for as long as it shows that its base can be fitted better."""
+    for _ in range(_RENEWALS):
+        lower = renewed(bench, found)
+        if lower is None:
+            break
+        told = bench.foretell(lower, found.foretold)
+        found = run_round(bench, lower, told, at, at + 0.1, found, everything)
+    return found
 
 
 def _lead(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
@@ -127,7 +142,23 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
     able = [one for one in found.judged if admissible(one, found.base, bench.options)[0]]
-    return foremost(able or found.judged, bench.options)
+    return choice(bench, found.base, found.foretold, able or found.judged, foremost)
+
+
+def choice(
+    bench: Bench, base: Fitted, foretold: Prediction | None, pool: list[Judged], choose: Callable
+) -> tuple[Judged, list[Judged]]:
+    """What `choose` takes from a pool, and its rivals.
+
+    Who was not asked to foretell is asked now, and the choice is made again.
+    """
+    pool = list(pool)
+    while True:
+        best, rivals = choose(pool, bench.options)
+        if best.prediction is not None or foretold is None:
+            return best, rivals
+        place = next(i for i, one in enumerate(pool) if one is best)
+        pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
 
 
 def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
@@ -137,13 +168,8 @@ def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]
     """
     order = sorted(pool, key=lambda one: -one.evidence)
     best = next((one for one in order if one.fitted.fit.converged), order[0])
-    scale = max(1.0, best.fitted.fit.reduced_chi2)
-    margin = options.separation * scale
     return best, [
-        one
-        for one in order
-        if one is not best
-        and best.evidence - one.evidence < margin * (options.equivalent if _equivalent(best, one) else 1)
+        one for one in order if one is not best and best.evidence - one.evidence < margin(best, one, options)
     ]
 
 
@@ -177,15 +203,8 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
     decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
     decision.outcome = "ambiguous" if failed else "named"
-    decision.equivalent = bool(rivals) and all(_equivalent(best, one) for one in rivals)
+    decision.equivalent = bool(rivals) and all(equivalent(best, one) for one in rivals)
     return decision
-
-
-def _equivalent(one: Judged, other: Judged) -> bool:
-    """Whether what two fits do not share is two names of the same motion."""
-    mine, theirs = set(one.fitted.names), set(other.fitted.names)
-    left, right = mine - theirs, theirs - mine
-    return len(left) == len(right) == 1 and right.pop() in BY_NAME[left.pop()].equivalent
 
 
 def _without_name(bench: Bench, decision: Decision) -> Decision:
@@ -207,12 +226,11 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     return decision
 
 
-def _with_more(
-    bench: Bench, decision: Decision, base: Fitted, best: Judged, rivals: list[Judged]
-) -> Decision:
+def _with_more(bench: Bench, decision: Decision, best: Judged) -> Decision:
     """One effect is not enough: try a second on top of the best, and the pairs that the screen finds."""
     if bench.options.most_effects < 2:
         return _give_up(decision)
+    base = decision.rounds[0].base
     second = run_round(bench, best.fitted, best.prediction, 0.8, 0.9)
     decision.rounds.append(second)
     pairs = [over_base(bench, base, decision.foretold, one) for one in second.judged]
@@ -226,7 +244,7 @@ def _with_more(
     pairs = [one for one in pairs if admissible(one, base, bench.options)[0]]
     if not pairs:
         return _give_up(decision)
-    pair, close = foremost(pairs, bench.options)
+    pair, close = choice(bench, base, decision.foretold, pairs, foremost)
     pass_gates(bench, pair, base, close, second.screened.tests)
     # both must be needed: each over the other alone
     needed = bench.options.needed * bench.options.separation

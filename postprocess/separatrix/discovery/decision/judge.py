@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
+from separatrix.discovery.fitting.catalogue import BY_NAME
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.heldout import Prediction, gained
 from separatrix.discovery.fitting.refit import Fitted, gain_over
@@ -86,12 +87,15 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 def stable(one: Judged, base: Fitted, options: Options) -> float:
     """Share of block bootstraps of the segments in which the effect pays for its parameters.
 
-    Held-out segments are drawn too where the training records themselves tell the effect from nothing.
+    Held-out segments are drawn too where the training records themselves tell the effect from nothing. All
+    gains are over the misfit.
     """
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
     added = added[~fit.at_bound[added]]
+    misfit = max(1.0, fit.reduced_chi2)
     gain, parts = gain_over(one.fitted, base)
+    gain, parts = gain / misfit, parts / misfit
     if not added.size:
         return 0.0
     random = np.random.default_rng([options.seed, 12])
@@ -101,18 +105,32 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     return float(np.mean(sums > one.parameters))
 
 
+def differs_from_nothing(fitted: Fitted, i: int) -> bool:
+    """Whether the 95 % interval of a parameter is without zero, or the number behind a logarithm is known."""
+    error = float(np.sqrt(fitted.covariance[i, i]))
+    size = 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
+    return size > 1.96 * error > 0
+
+
+def margin(best: Judged, other: Judged, options: Options) -> float:
+    """Evidence by which a candidate must beat another one: more where the two are names of one motion."""
+    scale = options.separation * max(1.0, best.fitted.fit.reduced_chi2)
+    return scale * (options.equivalent if equivalent(best, other) else 1.0)
+
+
+def equivalent(one: Judged, other: Judged) -> bool:
+    """Whether what two fits do not share is two names of the same motion."""
+    mine, theirs = set(one.fitted.names), set(other.fitted.names)
+    left, right = mine - theirs, theirs - mine
+    return len(left) == len(right) == 1 and right.pop() in BY_NAME[left.pop()].equivalent
+
+
 def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     """Signs and bounds: the effect is inside of its own, is not nothing, and leaves the drive sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
-    errors = np.sqrt(np.diag(one.fitted.covariance))
     base_good = int(base.fit.good.sum())
-    clear = []
-    for i in one.fitted.added:
-        if fit.at_bound[i]:
-            continue
-        # the logarithm of a number says by its error whether the number is known at all
-        size = 1.0 if free[i].positive else abs(fit.values[i])
-        clear.append(size > 1.96 * errors[i] > 0)
+    inside = [i for i in one.fitted.added if not fit.at_bound[i]]
+    clear = [differs_from_nothing(one.fitted, i) for i in inside]
     if fit.good.sum() < options.followed * max(1, base_good):
         return False, "the machine with it cannot follow some segments that the base can"
     if not clear:

@@ -15,8 +15,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision, decide, fit_pair, over_base, pass_gates
-from separatrix.discovery.decision.judge import Judged, adequate, admissible, held_out_bounds, judged
+from separatrix.discovery.decision.decide import Decision, choice, decide, fit_pair, over_base, pass_gates
+from separatrix.discovery.decision.judge import (
+    Judged,
+    adequate,
+    admissible,
+    differs_from_nothing,
+    held_out_bounds,
+    judged,
+    margin,
+)
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.refit import Fitted
@@ -137,8 +145,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
 def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
     """Whether every parameter of both effects is inside its bounds and differs from nothing."""
     fit = pair.fitted.fit
-    errors = np.sqrt(np.diag(pair.fitted.covariance))
-    clear = [not fit.at_bound[i] and abs(fit.values[i]) > 1.96 * errors[i] for i in pair.fitted.added]
+    clear = [not fit.at_bound[i] and differs_from_nothing(pair.fitted, i) for i in pair.fitted.added]
     return all(clear) and admissible(pair, found.base, options)[0]
 
 
@@ -146,7 +153,7 @@ def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
     """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
     if not pool:
         return None
-    best, rivals = preferred(pool, bench.options)
+    best, rivals = choice(bench, found.base, found.foretold, pool, preferred)
     # the strict decision may have asked for it
     best.gates.pop("adequate", None)
     pass_gates(bench, best, found.base, rivals, found.screened.tests)
@@ -161,14 +168,15 @@ def preferred(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged
     fewest = min(one.parameters for one in close)
     simple = [one for one in close if one.parameters == fewest]
     best = max(simple, key=lambda one: one.evidence)
-    scale = options.separation * best.fitted.fit.reduced_chi2
-    return best, [one for one in simple if one is not best and best.evidence - one.evidence < scale]
+    return best, [
+        one for one in simple if one is not best and best.evidence - one.evidence < margin(best, one, options)
+    ]
 
 
 def _clearly(one: Judged, other: Judged, options: Options) -> bool:
     """Whether `one` foretells a held-out record better than `other` by more than chance."""
     if one.prediction is None:
-        return one.evidence - other.evidence > options.separation * one.fitted.fit.reduced_chi2
+        return one.evidence - other.evidence > margin(one, other, options)
     if other.prediction is None:
         # so far behind that it was not asked to foretell
         return True

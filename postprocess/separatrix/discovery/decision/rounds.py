@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One round of the search: every candidate screened, refitted, and foretelling the held-out records."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,8 +38,6 @@ class Bench:
     held_out: Data | None
     scales: Scales
     options: Options
-    # why some candidates make no sense for this machine, as the first round found
-    absent: dict[str, str] = field(default_factory=dict)
 
     def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
         """Score the held-out records; the starts that an `other` prediction found there are tried too."""
@@ -61,6 +59,8 @@ class Round:
     signatures: list[Signature]
     screened: Screened
     judged: list[Judged]
+    # why some effects make no sense for this machine
+    absent: dict[str, str]
 
 
 def run_round(
@@ -74,8 +74,8 @@ def run_round(
 ) -> Round:
     """Screen all candidates on top of `base` and refit those that matter, or `everything` that is seen.
 
-    The fits of an `earlier` round on the same machine, made with another noise, are carried on; with
-    `everything` the noise is the same, and they stand.
+    The fits of an `earlier` round on the same machine stand where its base was this very fit; they are
+    carried on where the base was fitted again.
     """
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
@@ -95,16 +95,13 @@ def run_round(
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
-    if not base.names:
-        bench.absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
     screened = screen(base.fit, signatures)
     known = {one.name: one for one in earlier.judged} if earlier else {}
-    found = list(known.values()) if everything else []
+    stand = earlier is not None and earlier.base is base
+    found = list(known.values()) if stand else []
     ends = [one for one in found if one.fitted.fit.converged]
     rival = max(ends, key=lambda one: one.training).fitted if ends else None
-    chosen = [
-        name for name in choose(base, screened, options, everything) if not (everything and name in known)
-    ]
+    chosen = [name for name in choose(base, screened, options, everything) if not (stand and name in known)]
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
         before = known[name].fitted if name in known else None
@@ -118,7 +115,8 @@ def run_round(
     _carry_on(bench, base, foretold, candidates, found)
     _cross(bench, base, foretold, candidates, found)
     foretold, found = _fair(bench, base, foretold, found)
-    return Round(base, foretold, candidates, signatures, screened, found)
+    absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
+    return Round(base, foretold, candidates, signatures, screened, found, absent)
 
 
 def _out_of_race(fitted: Fitted, found: list[Judged], rival: Fitted | None) -> bool:

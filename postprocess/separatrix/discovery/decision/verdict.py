@@ -60,7 +60,7 @@ def verdict_of(findings: Findings) -> dict:
             one.name: {"gain": one.gain, "rank": one.rank, "p": one.p}
             for one in decision.base_ceiling.families
         },
-        "not_tested": bench.absent,
+        "not_tested": first.absent,
         "warnings": _warnings(findings),
         "records": _records(findings),
         "held_out_chosen": findings.held_out_chosen,

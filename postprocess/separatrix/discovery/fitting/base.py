@@ -54,10 +54,10 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
     if any(one.record.v is not None for one in data.prepared):
-        factors, _ = noise_of(problem, fit, 1, mass)
+        speeds, _ = noise_of(problem, fit, 1, mass)
         for number, prepared in enumerate(data.prepared):
             if prepared.record.v is not None and not prepared.velocity_sigma_stated:
-                prepared.velocity_sigma *= factors.get(number, 1.0)
+                prepared.velocity_sigma *= speeds.get(number, 1.0)
     scatter = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
     for prepared in data.prepared:

@@ -125,6 +125,8 @@ def fit_stages(
             fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
             values = fit.values
         known = (stage, fit)
+    if hopeless is not None and fit.far_off(hopeless):
+        return problem, fit
     return problem, polished(data, problem, fit, stages[-1], most, fixed)
 
 

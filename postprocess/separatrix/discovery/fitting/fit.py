@@ -21,8 +21,10 @@ _KINK = 4.0
 _TINY = 1e-12
 _STRONGEST = 1e8
 _FINE = 0.03
+# damping of the first step
+_MILD = 1e-4
 # steps in a row that gain next to nothing before a fit is left as it is
-_STALLS = 3
+_STALLS = 4
 
 
 @dataclass
@@ -61,7 +63,7 @@ class Fit:
     movable: np.ndarray
     # in a minimum that is known not to be the lowest
     caught: bool = False
-    # whether steps of every length were tried and gained next to nothing
+    # whether steps of every length were tried from there and gained next to nothing
     exhausted: bool = False
 
     @property
@@ -94,6 +96,11 @@ class Fit:
     def reduced_chi2(self) -> float:
         """Sum of squares per degree of freedom."""
         return self.total / max(1, self.freedom)
+
+    def far_off(self, hopeless: float) -> bool:
+        """Whether most segments are followed so badly that no wrong minimum of a few can be the reason."""
+        reduced = np.where(self.evaluation.failed, np.inf, self.chi2 / np.maximum(1, self.counts))
+        return bool(np.median(reduced) > hopeless)
 
     def like_noise(self, deviations: float) -> bool:
         """Whether chi^2 is what noise alone would leave, within so many standard deviations or 3 %."""
@@ -177,10 +184,10 @@ def minimise(
     upper = np.array([one.upper for one in problem.free])
     movable = np.ones(values.size, bool) if fixed is None else ~fixed
     values = np.clip(values, lower, upper)
-    damping = 1e-4
+    damping = _MILD
     current = problem.evaluate(values, starts)
     iterations = stalled = 0
-    exhausted = False
+    begun_anew = exhausted = False
     while iterations < most:
         iterations += 1
         weights, scale = _weights(current, robust)
@@ -191,7 +198,7 @@ def minimise(
             break
         good = ~current.failed & current.steady
         before = _costs(current, scale, robust)
-        accepted = False
+        accepted, mild = False, damping <= _MILD
         while damping < _STRONGEST:
             start_step, step, promised = gauss_newton_step(blocks, open_, damping)
             tried = np.clip(values + step, lower, upper)
@@ -204,15 +211,22 @@ def minimise(
                 break
             damping = max(10 * damping, 1e-6)
         if not accepted:
-            exhausted = True
-            break
+            exhausted = mild or begun_anew
+            if exhausted:
+                break
+            damping, begun_anew = _MILD, True
+            continue
         values, starts = tried, starts + start_step
         damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
         current = problem.evaluate(values, starts)
         stalled = stalled + 1 if gain < tolerance else 0
-        if stalled > _STALLS:
-            exhausted = True
-            break
+        if stalled >= _STALLS:
+            exhausted = begun_anew
+            if exhausted:
+                break
+            damping, stalled, begun_anew = _MILD, 0, True
+        elif not stalled:
+            begun_anew = False
         if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():
             mean = before[both].sum() / max(1, current.used[both].sum())
             if mean > hopeless:

@@ -17,8 +17,9 @@ class Evaluation:
     """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…,
     p).
 
-    `used` is 0 where a segment was given up by the simulator or has no sample; `steady` is false where the
-    sequence of impacts would change under a small step, so that the derivatives mean nothing.
+    `used` is 0 where a segment has no sample; `failed` is true where the simulator gave one up (its rows are
+    0); `steady` is false where the sequence of impacts would change under a small step, so that the
+    derivatives mean nothing.
     """
 
     residual: np.ndarray

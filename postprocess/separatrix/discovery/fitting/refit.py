@@ -73,7 +73,7 @@ def refit(
     best = None
     if known is not None:
         best = carried_on(data, candidate, known)
-        out = _far_off(best.fit, base) or (rival is not None and beaten(best, rival))
+        out = best.fit.far_off(_hopeless(base)) or (rival is not None and beaten(best, rival))
         if out or _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
@@ -85,7 +85,7 @@ def refit(
         rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None and settled and beaten(rough, rival):
             return rough
-        if not _far_off(fit, base):
+        if not fit.far_off(_hopeless(base)):
             fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         if best is None or _better(found, best):
@@ -101,10 +101,9 @@ def refit(
     return _above_base(data, best, base, candidate)
 
 
-def _far_off(fit: Fit, base: Fitted) -> bool:
-    """Whether most segments are followed so badly that no wrong minimum of a few can be the reason."""
-    usual = float(np.median(fit.chi2 / np.maximum(1, fit.counts)))
-    return usual > _HOPELESS * max(1.0, base.fit.reduced_chi2)
+def _hopeless(base: Fitted) -> float:
+    """Reduced chi^2 from which on a candidate is given up."""
+    return _HOPELESS * max(1.0, base.fit.reduced_chi2)
 
 
 def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
@@ -168,8 +167,9 @@ def _try(
         stages = list(range(data.last + 1))
         nominal = np.array([one.value for one in candidate.free])
         values = np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
+    most, hopeless = min(most, 12), _hopeless(base)
     return fit_stages(
-        data, candidate.model, candidate.free, values, stages=stages, most=min(most, 12), hopeless=_HOPELESS
+        data, candidate.model, candidate.free, values, stages=stages, most=most, hopeless=hopeless
     )
 
 

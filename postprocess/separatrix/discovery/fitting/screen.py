@@ -22,7 +22,7 @@ _SEED = 22
 _DRAWS = 4000
 _TAIL = 0.05
 # size of a signature, in units of its noise, that is rounding
-_NOTHING = 1e-100
+_ROUNDING = 1e-100
 # share of a signature below which nothing is left of it
 _NOTHING = 1e-7
 
@@ -155,7 +155,7 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
     """
     size = np.sqrt(np.maximum(np.diag(left), 0))
     # what the base can do itself leaves nothing but rounding, which has no direction
-    scale = np.where(size > _NOTHING, size, np.inf)
+    scale = np.where(size > _ROUNDING, size, np.inf)
     values, vectors = np.linalg.eigh(np.clip(left / np.outer(scale, scale), -1, 1))
     half = vectors * np.sqrt(np.maximum(values, 0))
     draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, size.size)) @ half.T * size
