@@ -23,8 +23,10 @@ _STRONGEST = 1e8
 _FINE = 0.03
 # damping of the first step
 _MILD = 1e-4
-# steps in a row that gain next to nothing before a fit is left as it is
-_STALLS = 4
+# gain that is next to nothing, also as a share of chi^2, and how many such steps in a row end a fit
+_LITTLE = 0.1
+_LITTLE_SHARE = 3e-5
+_STALLS = 2
 
 
 @dataclass
@@ -219,12 +221,13 @@ def minimise(
         values, starts = tried, starts + start_step
         damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
         current = problem.evaluate(values, starts)
-        stalled = stalled + 1 if gain < tolerance else 0
+        little = max(_LITTLE, _LITTLE_SHARE * float(before[both].sum()))
+        stalled = stalled + 1 if gain < little else 0
         if stalled >= _STALLS:
             exhausted = begun_anew
             if exhausted:
                 break
-            damping, stalled, begun_anew = _MILD, 0, True
+            damping, stalled, begun_anew = _MILD, _STALLS - 1, True
         elif not stalled:
             begun_anew = False
         if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():
