@@ -128,7 +128,7 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
         held = best.prediction
         renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
         copy_noise(bench.training, bench.held_out)
-    fits = [minimise(base.problem, base.fit.values, base.fit.starts)]
+    fits = [minimise(base.problem, base.fit.values, base.fit.starts, patient=True)]
     for one in lowest_misfit:
         values = shared_values(base, one.fitted)
         fits.append(minimise(base.problem, values, one.fitted.fit.starts))

@@ -151,7 +151,9 @@ def _carry_on(
         near = found[0].evidence - one.evidence < _NEAR * bench.options.separation
         done = one.fitted.fit.converged
         if near and not (done and (one.prediction is not None or bench.held_out is None)):
-            fitted = one.fitted if done else carried_on(bench.training, candidates[one.name], one.fitted)
+            fitted = one.fitted
+            if not done:
+                fitted = carried_on(bench.training, candidates[one.name], fitted, patient=True)
             found[place] = judged(base, foretold, fitted, bench.foretell(fitted, one.prediction))
     found.sort(key=lambda one: -one.evidence)
 

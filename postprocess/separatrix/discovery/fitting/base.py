@@ -5,7 +5,7 @@
 import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
-from separatrix.discovery.fitting.fit import Fit, again
+from separatrix.discovery.fitting.fit import Fit, again, minimise
 from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.problem import Problem
@@ -39,7 +39,10 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
             problem, fit = fit_stages(data, model, free, begin, stages=stages, most=40)
             if fit.good.sum() >= best.fit.good.sum() and fit.total < best.fit.total:
                 best = Fitted((), model, problem, fit, ())
-    return best
+    if best.fit.converged:
+        return best
+    fit = minimise(best.problem, best.fit.values, best.fit.starts, patient=True)
+    return best if fit.good.sum() < best.fit.good.sum() else Fitted((), model, best.problem, fit, ())
 
 
 def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:

@@ -23,10 +23,12 @@ _STRONGEST = 1e8
 _FINE = 0.03
 # damping of the first step
 _MILD = 1e-4
-# gain that is next to nothing, also as a share of chi^2, and how many such steps in a row end a fit
+# gain that is next to nothing, also as a share of chi^2, and how many such steps in a row end a fit; a
+# patient one goes on for less
 _LITTLE = 0.1
 _LITTLE_SHARE = 3e-5
 _STALLS = 2
+_PATIENT_STALLS = 4
 
 
 @dataclass
@@ -180,8 +182,12 @@ def minimise(
     tolerance: float = _TOLERANCE,
     fixed: np.ndarray | None = None,
     hopeless: float | None = None,
+    patient: bool = False,
 ) -> Fit:
-    """Minimise squares (or Huber's loss, `robust`); stop early above `hopeless` times the wanted chi^2."""
+    """Minimise squares (or Huber's loss, `robust`); stop early above `hopeless` times the wanted chi^2.
+
+    A `patient` fit goes on where steps gain next to nothing, for machines that a verdict depends on.
+    """
     lower = np.array([one.lower for one in problem.free])
     upper = np.array([one.upper for one in problem.free])
     movable = np.ones(values.size, bool) if fixed is None else ~fixed
@@ -190,6 +196,7 @@ def minimise(
     current = problem.evaluate(values, starts)
     iterations = stalled = 0
     begun_anew = exhausted = False
+    most_stalls = _PATIENT_STALLS if patient else _STALLS
     while iterations < most:
         iterations += 1
         weights, scale = _weights(current, robust)
@@ -221,13 +228,13 @@ def minimise(
         values, starts = tried, starts + start_step
         damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
         current = problem.evaluate(values, starts)
-        little = max(_LITTLE, _LITTLE_SHARE * float(before[both].sum()))
+        little = tolerance if patient else max(_LITTLE, _LITTLE_SHARE * float(before[both].sum()))
         stalled = stalled + 1 if gain < little else 0
-        if stalled >= _STALLS:
+        if stalled >= most_stalls:
             exhausted = begun_anew
             if exhausted:
                 break
-            damping, stalled, begun_anew = _MILD, _STALLS - 1, True
+            damping, stalled, begun_anew = _MILD, most_stalls - 1, True
         elif not stalled:
             begun_anew = False
         if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():

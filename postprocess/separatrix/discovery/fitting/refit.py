@@ -131,10 +131,10 @@ def beaten(one: Fitted, rival: Fitted) -> bool:
     return bool(parts[_SPARED:].sum() < -2 * _BEATEN)
 
 
-def carried_on(data: Data, candidate: Candidate, known: Fitted) -> Fitted:
+def carried_on(data: Data, candidate: Candidate, known: Fitted, patient: bool = False) -> Fitted:
     """An earlier fit, carried on with the noise of now."""
     problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-    fit = minimise(problem, known.fit.values, known.fit.starts)
+    fit = minimise(problem, known.fit.values, known.fit.starts, patient=patient)
     return Fitted(candidate.names, candidate.model, problem, fit, candidate.added, known.tries)
 
 
