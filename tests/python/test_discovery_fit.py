@@ -255,16 +255,18 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     monkeypatch.setattr(rounds, "judged", judge_one)
     monkeypatch.setattr(rounds, "gain_over", lambda one, other: (one.gain - other.gain, None))
     monkeypatch.setattr(rounds, "_out_of_race", lambda *_: False)
-    for step in ("_carry_on", "_cross"):
+    for step in ("_carry_on", "_cross", "_fair"):
         monkeypatch.setattr(rounds, step, lambda *_: None)
-    monkeypatch.setattr(rounds, "_fair", lambda bench, base, foretold, found: (foretold, found))
     fits = SimpleNamespace(values=[], reduced_chi2=1.0)
     base = SimpleNamespace(
         names=(), model=SimpleNamespace(parameters={}), problem=SimpleNamespace(free=[]), fit=fits
     )
-    before = SimpleNamespace(names=("viscous",), fit=SimpleNamespace(converged=True), gain=3.0)
-    earlier = SimpleNamespace(base=base, judged=[judge_one(base, None, before, None)])
     bench = rounds.Bench(None, None, None, Options(candidates=("dahl", "viscous")))
+    monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous"])
+    earlier = rounds.run_round(bench, base, None, 0, 1)
+    assert fitted_now == [("viscous", False)]
+    fitted_now.clear()
+    monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous", "dahl"])
     again = SimpleNamespace(**vars(base)) if renewed else base
     found = rounds.run_round(bench, again, None, 0, 1, earlier, everything=True)
     assert {one.name for one in found.judged} == {"dahl", "viscous"}

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One round of the search: every candidate screened, refitted, and foretelling the held-out records."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,9 +58,17 @@ class Round:
     candidates: dict[str, Candidate]
     signatures: list[Signature]
     screened: Screened
-    judged: list[Judged]
     # why some effects make no sense for this machine
     absent: dict[str, str]
+    judged: list[Judged] = field(default_factory=list)
+
+    def judge(self, fitted: Fitted, prediction: Prediction | None) -> Judged:
+        """Evidence over the base of this round."""
+        return judged(self.base, self.foretold, fitted, prediction)
+
+    def rank(self) -> None:
+        """Put those of most evidence first."""
+        self.judged.sort(key=lambda one: -one.evidence)
 
 
 def run_round(
@@ -74,9 +82,46 @@ def run_round(
 ) -> Round:
     """Screen all candidates on top of `base` and refit those that matter, or `everything` that is seen.
 
-    The fits of an `earlier` round on the same machine stand where its base was this very fit; they are
-    carried on where the base was fitted again.
+    An `earlier` round and its fits stand where its base was this very fit; the fits are carried on where the
+    base was fitted again.
     """
+    options = bench.options
+    stands = earlier is not None and earlier.base is base
+    if stands:
+        found = replace(earlier, foretold=foretold, judged=list(earlier.judged))
+    else:
+        found = _screened(bench, base, foretold, first)
+    known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
+    ends = [one for one in found.judged if one.fitted.fit.converged]
+    rival = max(ends, key=lambda one: one.training).fitted if ends else None
+    chosen = choose(base, found.screened, options, everything)
+    if stands:
+        chosen = [name for name in chosen if name not in known]
+    for number, name in enumerate(chosen):
+        options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
+        fitted = refit(
+            bench.training,
+            base,
+            found.candidates[name],
+            found.screened,
+            rival,
+            options.quick,
+            known.get(name),
+        )
+        # what is far behind a machine that leaves only noise and foretells need not foretell
+        told = None if _out_of_race(fitted, found.judged, rival) else bench.foretell(fitted, foretold)
+        found.judged.append(found.judge(fitted, told))
+        if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
+            rival = fitted
+    found.rank()
+    _carry_on(bench, found)
+    _cross(bench, found)
+    _fair(bench, found)
+    return found
+
+
+def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float) -> Round:
+    """All candidates on top of a machine and what they would do, none of them fitted yet."""
     options = bench.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
@@ -91,32 +136,12 @@ def run_round(
             absent[effect.name] = made
         else:
             candidates[effect.name] = made
-    options.progress(f"screening {len(candidates)} effects", first)
+    options.progress(f"screening {len(candidates)} effects", at)
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
-    screened = screen(base.fit, signatures)
-    known = {one.name: one for one in earlier.judged} if earlier else {}
-    stand = earlier is not None and earlier.base is base
-    found = list(known.values()) if stand else []
-    ends = [one for one in found if one.fitted.fit.converged]
-    rival = max(ends, key=lambda one: one.training).fitted if ends else None
-    chosen = [name for name in choose(base, screened, options, everything) if not (stand and name in known)]
-    for number, name in enumerate(chosen):
-        options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
-        before = known[name].fitted if name in known else None
-        fitted = refit(bench.training, base, candidates[name], screened, rival, options.quick, before)
-        # what is far behind a machine that leaves only noise and foretells need not foretell
-        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
-        found.append(judged(base, foretold, fitted, told))
-        if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
-            rival = fitted
-    found.sort(key=lambda one: -one.evidence)
-    _carry_on(bench, base, foretold, candidates, found)
-    _cross(bench, base, foretold, candidates, found)
-    foretold, found = _fair(bench, base, foretold, found)
     absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
-    return Round(base, foretold, candidates, signatures, screened, found, absent)
+    return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
 
 
 def _out_of_race(fitted: Fitted, found: list[Judged], rival: Fitted | None) -> bool:
@@ -126,58 +151,47 @@ def _out_of_race(fitted: Fitted, found: list[Judged], rival: Fitted | None) -> b
     )
 
 
-def _fair(
-    bench: Bench, base: Fitted, foretold: Prediction | None, found: list[Judged]
-) -> tuple[Prediction | None, list[Judged]]:
-    """The base foretelling also from where the best candidate began, and all held against that."""
-    if foretold is None or not found or found[0].held_out < _WORTH:
-        return foretold, found
-    fairer = bench.foretell(base, found[0].prediction)
-    if fairer.score[fairer.good].sum() <= foretold.score[foretold.good].sum():
-        return foretold, found
-    again = [judged(base, fairer, one.fitted, one.prediction) for one in found]
-    return fairer, sorted(again, key=lambda one: -one.evidence)
+def _fair(bench: Bench, found: Round) -> None:
+    """Let the base foretell also from where the best candidate began, and hold all against that."""
+    if found.foretold is None or not found.judged or found.judged[0].held_out < _WORTH:
+        return
+    fairer = bench.foretell(found.base, found.judged[0].prediction)
+    if fairer.score[fairer.good].sum() <= found.foretold.score[found.foretold.good].sum():
+        return
+    found.foretold = fairer
+    found.judged = [found.judge(one.fitted, one.prediction) for one in found.judged]
+    found.rank()
 
 
-def _carry_on(
-    bench: Bench,
-    base: Fitted,
-    foretold: Prediction | None,
-    candidates: dict[str, Candidate],
-    found: list[Judged],
-) -> None:
+def _carry_on(bench: Bench, found: Round) -> None:
     """Fit those near the best to their end and let them foretell, however little they were thought worth."""
-    for place, one in enumerate(found):
-        near = found[0].evidence - one.evidence < _NEAR * bench.options.separation
+    order = found.judged
+    for place, one in enumerate(order):
+        near = order[0].evidence - one.evidence < _NEAR * bench.options.separation
         done = one.fitted.fit.converged
         if near and not (done and (one.prediction is not None or bench.held_out is None)):
             fitted = one.fitted
             if not done:
-                fitted = carried_on(bench.training, candidates[one.name], fitted, patient=True)
-            found[place] = judged(base, foretold, fitted, bench.foretell(fitted, one.prediction))
-    found.sort(key=lambda one: -one.evidence)
+                fitted = carried_on(bench.training, found.candidates[one.name], fitted, patient=True)
+            order[place] = found.judge(fitted, bench.foretell(fitted, one.prediction))
+    found.rank()
 
 
-def _cross(
-    bench: Bench,
-    base: Fitted,
-    foretold: Prediction | None,
-    candidates: dict[str, Candidate],
-    found: list[Judged],
-) -> None:
+def _cross(bench: Bench, found: Round) -> None:
     """Try the leaders again from where the best one led: minima that only one of them left."""
-    if len(found) < 2 or bench.options.quick or found[0].training < _WORTH_CROSSING:
+    order = found.judged
+    if len(order) < 2 or bench.options.quick or order[0].training < _WORTH_CROSSING:
         return
-    best = found[0].fitted
-    for place in range(1, min(_CROSSED, len(found))):
-        one = found[place]
-        behind = found[0].evidence - one.evidence
-        if behind < bench.options.separation or one.evidence < _SHARE * found[0].evidence:
+    best = order[0].fitted
+    for place in range(1, min(_CROSSED, len(order))):
+        one = order[place]
+        behind = order[0].evidence - one.evidence
+        if behind < bench.options.separation or one.evidence < _SHARE * order[0].evidence:
             continue
-        better = crossed(bench.training, one.fitted, best, candidates[one.name])
+        better = crossed(bench.training, one.fitted, best, found.candidates[one.name])
         if better is not one.fitted:
-            found[place] = judged(base, foretold, better, bench.foretell(better, found[0].prediction))
-    found.sort(key=lambda one: -one.evidence)
+            order[place] = found.judge(better, bench.foretell(better, order[0].prediction))
+    found.rank()
 
 
 def choose(base: Fitted, screened: Screened, options: Options, everything: bool = False) -> list[str]:

@@ -146,9 +146,9 @@ class Problem:
         out: Evaluation,
     ) -> None:
         prepared = self.prepared[number]
-        active, given, chain = self._active(number, values, derivatives)
+        active, given, moves, directions = self._active(number, values, derivatives)
         start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
-        result = self._simulate(part, active, given, start, chain)
+        result = self._simulate(part, active, given, start, directions)
         rows, inside = part["rows"], part["inside"]
         length = inside.shape[1]
         failed = np.asarray(result.reason) != 0
@@ -165,8 +165,8 @@ class Problem:
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
-            jacobians = self._derivatives(number, part, chain, result)
-            n = np.count_nonzero(chain.any(axis=0))
+            jacobians = self._derivatives(number, part, moves, result)
+            n = len(directions)
             out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
         for channel, (measured, computed, sigma) in enumerate(
@@ -183,14 +183,16 @@ class Problem:
                 out.by_parameter[rows, columns] = np.nan_to_num(_padded(by_parameter / sigma, inside))
 
     def _simulate(
-        self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, chain: np.ndarray | None
+        self,
+        part: dict,
+        active: list[str],
+        given: np.ndarray,
+        start: np.ndarray,
+        directions: np.ndarray | None,
     ):
         more = {} if part["force"] is None else {"force": part["force"]}
-        if chain is not None:
-            more["directions"] = chain.T[chain.any(axis=0)]
-        return self.model.segments(
-            active, given, start, part["offsets"], part["times"], derivatives=chain is not None, **more
-        )
+        more |= {"derivatives": directions is not None, "directions": directions}
+        return self.model.segments(active, given, start, part["offsets"], part["times"], **more)
 
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
@@ -227,12 +229,12 @@ class Problem:
         return phase + prepared.frequency * (1 + clock) * (t - prepared.origin)
 
     def _active(self, number: int, values: np.ndarray, derivatives: bool) -> tuple:
-        """Paths, their values and d(values)/d(free parameters)."""
+        """Paths, their values, which free parameters move them, and in which directions (one row each)."""
         chosen = self.machine_values(number, values)
         active = list(chosen)
         given = np.array([chosen[path] for path in active])
         if not derivatives:
-            return active, given, None
+            return active, given, None, None
         chain = np.zeros((len(active), len(self.free)))
         for j, one in enumerate(self.free):
             if one.path == "nuisance:drive_scale":
@@ -244,7 +246,8 @@ class Problem:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):
                 chain[row, j] = self._ratio_slope(one, values[j], number, chosen) * one.slope(values[j])
-        return active, given, chain
+        moves = chain.any(axis=0)
+        return active, given, moves, chain.T[moves]
 
     def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
         """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
@@ -261,9 +264,8 @@ class Problem:
         slope = (ends[0] - ends[1]) / (2 * step)
         return -ratio * slope / (0.5 * (ends[0] + ends[1]))
 
-    def _derivatives(self, number: int, part: dict, chain: np.ndarray, result) -> list:
+    def _derivatives(self, number: int, part: dict, moves: np.ndarray, result) -> list:
         """Derivatives of x and v by the start, and by the free parameters through machine and crank."""
-        moves = chain.any(axis=0)
         n = np.count_nonzero(moves)
         prepared = self.prepared[number]
         crank = np.zeros((part["starts"].size, len(self.free)))
