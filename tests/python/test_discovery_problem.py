@@ -7,7 +7,12 @@ import pytest
 from program import CASE
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.fit import minimise
-from separatrix.discovery.fitting.machine import base_parameters, drive_nuisances
+from separatrix.discovery.fitting.machine import (
+    base_parameters,
+    drive_nuisances,
+    on_other_records,
+    sensor_zeros,
+)
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -15,12 +20,14 @@ from separatrix.discovery.measured.segments import padded
 from separatrix.library import Model
 
 RATE, LENGTH = 200, 60
+# zero of the sensor, and by how much the second record has another one
+BIAS, SHIFT = 0.02, 0.004
 
 
 @pytest.fixture
 def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
     """Two records with v at different drives, all free; values off those of the case, and starts."""
-    model = Model.from_text(CASE)
+    model = Model.from_text(f"{CASE}\n[effect.sensor_bias]\nbias = {BIAS}\n")
     t = np.arange(1200) / RATE
     prepared = []
     for number, (ratio, scale) in enumerate(((0.9, 1.2), (1.2, 0.95))):
@@ -34,18 +41,21 @@ def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
         motion = model.segments(list(values), np.array(list(values.values())), start, [0, t.size], t)
         head = {"drive_ratio": ratio, "drive_scale": scale, "phase": 0.4 + number}
         head |= {"sensor_noise_sigma_m": 1e-3, "sensor_noise_sigma_m_s": 1e-2}
-        prepared.append(
-            prepare(make_record(f"r{number}", {"t": t, "x": motion.x, "v": motion.v}, head), model)
-        )
+        x = motion.x + SHIFT * number
+        prepared.append(prepare(make_record(f"r{number}", {"t": t, "x": x, "v": motion.v}, head), model))
         prepared[-1].memory = 0.3 * number
     first = np.tile(np.arange(0, t.size, LENGTH), 2)
     record = np.repeat([0, 1], first.size // 2)
     free = base_parameters(model, measured_force=False) + drive_nuisances(model, [False, False])
+    free += sensor_zeros(free, 2)
     problem = Problem(model, prepared, padded(record, first, first + LENGTH), free)
     off = {"nuisance:drive_scale": 1.03, "nuisance:clock": 0.015, "nuisance:phase": 0.02}
     values = np.array([off.get(one.path, 1.01 * one.value) for one in free])
     starts = np.array(
-        [(prepared[r].record.x[k], prepared[r].record.v[k]) for r, k in zip(record, first, strict=True)]
+        [
+            (prepared[r].record.x[k] - BIAS - SHIFT * r, prepared[r].record.v[k])
+            for r, k in zip(record, first, strict=True)
+        ]
     )
     return problem, values, starts
 
@@ -58,7 +68,8 @@ def test_derivatives_are_central_differences(flown):
     assert (found.hits[good] > 0).sum() >= 5
     assert found.residual.shape[1] == 2 * LENGTH
     names = [one.path for one in problem.free]
-    assert {"nuisance:drive_scale", "nuisance:phase", "nuisance:clock", "restoring.stiffness"} <= set(names)
+    own = {"nuisance:phase", "nuisance:clock", "nuisance:sensor_zero"}
+    assert own | {"nuisance:drive_scale", "restoring.stiffness"} <= set(names)
 
     def slope(by_values: np.ndarray, by_starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Central difference of minus the residuals, and where no impact passes a sample meanwhile."""
@@ -85,6 +96,22 @@ def test_derivatives_are_central_differences(flown):
         wanted /= 1e-7
         assert smooth.mean() > 0.999
         assert np.abs(found.by_start[good, :, k] - wanted)[smooth].max() < 2e-4 * np.abs(wanted).max()
+
+
+def test_each_record_has_its_own_zero(flown):
+    problem, values, starts = flown
+    paths = [one.path for one in problem.free]
+    right = np.where([path.startswith("nuisance:") for path in paths], 0.0, values / 1.01)
+    right[paths.index("nuisance:drive_scale")] = 1.0
+    fit = minimise(problem, right, starts)
+    assert fit.values[paths.index("nuisance:sensor_zero")] == pytest.approx(SHIFT, rel=1e-3)
+    biases = [problem.machine_values(number, fit.values)["effect.sensor_bias.bias"] for number in (0, 1)]
+    assert biases[1] - biases[0] == pytest.approx(SHIFT, rel=1e-3)
+    # held-out records bring zeros of their own, and only where those that were fitted had some
+    held_out = [one.path for one in on_other_records(problem.free, problem.prepared)]
+    assert held_out.count("nuisance:sensor_zero") == 2
+    alone = [one for one in problem.free if one.path != "nuisance:sensor_zero"]
+    assert "nuisance:sensor_zero" not in [one.path for one in on_other_records(alone, problem.prepared)]
 
 
 def test_kicks_at_impacts_are_among_what_is_tried(flown):

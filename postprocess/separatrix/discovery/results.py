@@ -14,6 +14,7 @@ import numpy as np
 from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.catalogue import within_barriers
 from separatrix.discovery.fitting.ceiling import sample_times
+from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.wording import with_error
@@ -188,6 +189,8 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             group["residual"] = fit.evaluation.residual[rows, :length][inside]
             group["good"] = fit.good[rows]
             group.attrs["crank_angle"] = float(problem.crank_angle(number, fit.values, prepared.record.t[0]))
+            machine = problem.machine_values(number, fit.values)
+            group.attrs["sensor_bias"] = machine.get(SENSOR_BIAS, 0.0)
             impacts = fit.evaluation.impacts[number]
             group["impacts"] = np.zeros((0, 5)) if impacts is None else impacts
             group["impacts"].attrs["columns"] = "segment time speed_before speed_after side"

@@ -13,6 +13,9 @@ from separatrix.discovery.decision.limits import detectable, equivalents, separa
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.where import Map, sentences, where_maps
+from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.version import __version__
 
@@ -99,11 +102,8 @@ def _warnings(findings: Findings) -> list[str]:
         for one in (data.prepared if data else ())
         for note in one.notes
     ]
-    best = findings.decision.accepted[0] if findings.decision.accepted else None
-    fits = [(bench.training, best.fitted if best else findings.base)]
-    if bench.held_out is not None:
-        fits.append((bench.held_out, best.prediction if best else findings.decision.foretold))
-    for data, fitted in fits:
+    fits = _final(findings)
+    for _, data, fitted in fits:
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
     fit = findings.base.fit
     if not fit.converged:
@@ -117,16 +117,27 @@ def _warnings(findings: Findings) -> list[str]:
     if contact and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
         why = (
-            ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][1].fit) else ""
+            ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][2].fit) else ""
         )
         notes.append(f"no impacts are seen in the records{why}; the fitted machine has {hits}")
     return notes
 
 
+def _final(findings: Findings) -> list[tuple[str, Data, Fitted | Prediction]]:
+    """Use of records, the records, and the machine of the verdict on them."""
+    bench, decision = findings.bench, findings.decision
+    best = decision.accepted[0] if decision.accepted else None
+    fits = [("training", bench.training, best.fitted if best else findings.base)]
+    if bench.held_out is not None:
+        fits.append(("held out", bench.held_out, best.prediction if best else decision.foretold))
+    return fits
+
+
 def _records(findings: Findings) -> list[dict]:
     found = []
-    for use, data in (("training", findings.bench.training), ("held out", findings.bench.held_out)):
-        for one in data.prepared if data else ():
+    for use, data, fitted in _final(findings):
+        for place, one in enumerate(data.prepared):
+            machine = fitted.problem.machine_values(place, fitted.fit.values)
             found.append(
                 {
                     "name": one.record.name,
@@ -138,6 +149,7 @@ def _records(findings: Findings) -> list[dict]:
                     "drive_frequency": one.frequency,
                     "drive_scale": one.drive_scale,
                     "phase_known": one.phase_known,
+                    "sensor_bias": machine.get(SENSOR_BIAS),
                 }
             )
     return found

@@ -6,7 +6,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
-from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances
+from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances, sensor_zeros
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
@@ -22,6 +22,7 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can say something about; sets noise and memory of the records."""
     force = any(one.record.force is not None for one in data.prepared)
     free = base_parameters(model, force) + drive_nuisances(model, [one.phase_known for one in data.prepared])
+    free += sensor_zeros(free, len(data.prepared))
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
     problem, fit = fit_stages(data, model, free, values, stages=[0, 1])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is free in a fit: parameters of the machine, drive scale, zero of the crank, clock of each record."""
+"""What is free in a fit: parameters of the machine, drive scale; phase, clock and zero of each record."""
 
 from dataclasses import dataclass, replace
 
@@ -16,6 +16,8 @@ _FIXED = (
     "drive.interval",
 )
 _FIXED_ENDS = ("exponent", "harmonic", "tension")
+SENSOR_BIAS = "effect.sensor_bias.bias"
+_SENSOR_ZERO = "nuisance:sensor_zero"
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
@@ -116,12 +118,26 @@ def record_nuisances(phase_known: list[bool]) -> list[Free]:
     return free + [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(len(phase_known))]
 
 
+def sensor_zeros(free: list[Free], count: int) -> list[Free]:
+    """The zero of the sensor in each record but the first, beside the bias that the base machine has.
+
+    Records of other days have other zeros. With one record there is nothing to tell apart.
+    """
+    bias = next((one for one in free if one.path == SENSOR_BIAS), None)
+    if bias is None:
+        return []
+    return [Free(_SENSOR_ZERO, 0.0, size=bias.size, record=i) for i in range(1, count)]
+
+
 def on_other_records(free: list[Free], prepared: list) -> list[Free]:
     """What is free on other records: what `free` has for all of them, and what each record has of its own."""
-    shared = [one for one in free if one.record is None]
-    if not prepared[0].frequency:
-        return shared
-    return shared + record_nuisances([one.phase_known for one in prepared])
+    own = [one for one in free if one.record is None]
+    if prepared[0].frequency:
+        own += record_nuisances([one.phase_known for one in prepared])
+    zero = next((one for one in free if one.path == _SENSOR_ZERO), None)
+    if zero is not None:
+        own += [replace(zero, value=0.0, record=i) for i in range(len(prepared))]
+    return own
 
 
 def with_values(free: list[Free], values: np.ndarray) -> list[Free]:

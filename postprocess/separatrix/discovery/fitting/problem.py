@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.fitting.machine import Free, drive_amplitudes
+from separatrix.discovery.fitting.machine import SENSOR_BIAS, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared, even_interval
 from separatrix.discovery.measured.segments import Segments, padded
 from separatrix.errors import SeparatrixError
@@ -211,6 +211,9 @@ class Problem:
             ratio = self.model.parameters["drive.ratio"].value
             chosen["drive.ratio"] = ratio
             chosen["drive.ratio"] = ratio * frequency / self.model.drive_frequency(chosen)
+        zero = self._nuisance("nuisance:sensor_zero", number, values, None)
+        if zero is not None:
+            chosen[SENSOR_BIAS] = zero + chosen.get(SENSOR_BIAS, self.model.parameters[SENSOR_BIAS].value)
         return chosen
 
     def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float | None) -> float | None:
@@ -240,6 +243,8 @@ class Problem:
             if one.path == "nuisance:drive_scale":
                 for path, value in self.amplitudes.items():
                     chain[active.index(path), j] = self.prepared[number].drive_scale * value
+            elif one.path == "nuisance:sensor_zero" and one.record == number:
+                chain[active.index(SENSOR_BIAS), j] = 1.0
             elif not one.is_nuisance:
                 chain[active.index(one.path), j] = one.slope(values[j])
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
