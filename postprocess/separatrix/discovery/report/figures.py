@@ -70,7 +70,7 @@ def ranking(verdict: dict) -> Figure | None:
         return None
     gained = {one["effect"]: one for one in verdict["candidates"]}
     order = sorted(d_prime, key=lambda name: (gained.get(name, {}).get("evidence", -np.inf), d_prime[name]))
-    figure = style.new_figure(style.DOUBLE_COLUMN, 18.0 + 4.0 * len(order))
+    figure = style.new_figure(style.DOUBLE_COLUMN, max(45.0, 18.0 + 4.0 * len(order)))
     figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     rows = np.arange(len(order))
