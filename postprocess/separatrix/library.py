@@ -20,6 +20,9 @@ from separatrix.errors import SeparatrixError
 
 __all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
 
+# of an installation that was not copied elsewhere
+SOURCE_TREE = Path(__file__).resolve().parents[2]
+
 _NONE = 1e308  # bounds beyond this mean that there is none
 _TEXT = 4096
 
@@ -242,7 +245,7 @@ def library_path() -> Path:
         return Path(asked)
     program = shutil.which("separatrix")
     folders = [Path(program).resolve().parent.parent / "lib"] if program else []
-    folders.append(Path(__file__).resolve().parents[2] / "build" / "lib")
+    folders.append(SOURCE_TREE / "build" / "lib")
     for folder in folders:
         path = folder / "libseparatrix.so"
         if path.is_file():

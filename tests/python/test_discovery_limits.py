@@ -82,7 +82,9 @@ def test_an_effect_that_the_base_imitates_has_no_smallest_size(seen, error, size
     )  # fmt: skip
     found = detectable(
         SimpleNamespace(options=Options(visible=5.0)),
-        SimpleNamespace(candidates={"coulomb": made}, screened=screened),
-    )["coulomb"]
+        SimpleNamespace(candidates={"coulomb": made}, screened=screened, absent={"dahl": "no dry friction"}),
+    )
+    assert found["dahl"] == {"size": None, "path": None, "unit": None, "reason": "no dry friction"}
+    found = found["coulomb"]
     assert found["size"] == (None if size is None else pytest.approx(size))
     assert ("imitate" in found["reason"]) == (size is None)

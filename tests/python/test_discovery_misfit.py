@@ -6,12 +6,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from separatrix.discovery.decision import misfit
 from separatrix.discovery.decision.decide import Decision, _without_name
 from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet
+from separatrix.discovery.fitting.noise import white_share
+from separatrix.discovery.measured.preflight import white_noise
 from separatrix.discovery.options import Options
 
 SAMPLES, SEGMENTS = 50, 20
+BODY = SimpleNamespace(model=SimpleNamespace(parameters={"restoring.stiffness"}))
 
 
 def data(sigma: float, scatter: float) -> SimpleNamespace:
@@ -60,16 +64,34 @@ def test_nothing_is_missing_only_if_all_records_are_explained(training, held_out
 def test_stated_noise_is_doubted_where_the_samples_show_another(monkeypatch):
     """Scatter that only the fit shows is what the machine lacks."""
     monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 30.0, 1: 30.0}, 0.0))
-    assert doubted_noise(data(1e-3, 1e-3), None, fit(900, 900), 1) == []
-    said = doubted_noise(data(1e-4, 1e-3), None, fit(900, 900), 1)
+    assert doubted_noise(data(1e-3, 1e-3), BODY, fit(900, 900), 1) == []
+    said = doubted_noise(data(1e-4, 1e-3), BODY, fit(900, 900), 1)
     assert [text.split(":")[0] for text in said] == ["first", "second"]
     assert "stated as 0.0001 m" in said[0]
 
 
 def test_noise_that_is_stated_too_large_is_doubted(monkeypatch):
     monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 0.01, 1: 0.01}, 0.0))
-    said = doubted_noise(data(0.1, 1e-3), None, fit(1e-4, 1e-4), 1)
+    said = doubted_noise(data(0.1, 1e-3), BODY, fit(1e-4, 1e-4), 1)
     assert all("scatter by only 0.001 m" in text for text in said)
     assert len(said) == 2
     assert too_quiet(data(0.1, 1e-3), fit(1e-4, 1))
     assert not too_quiet(data(0.1, 0.1), fit(1, 1))
+
+
+def test_unstated_noise_far_above_the_scatter_of_the_samples_is_told(monkeypatch):
+    monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 1.0, 1: 1.0}, 0.0))
+    taken = data(1e-2, 1e-3)
+    for one in taken.prepared:
+        one.sigma_stated, one.memory = False, 0.0
+    # the memory of the noise explains that neighbours scatter little
+    taken.prepared[1].sigma, taken.prepared[1].memory = 3e-3, 0.9
+    (said,) = doubted_noise(taken, BODY, fit(1, 1), 1)
+    assert said.startswith("first: noise of 0.01 m is taken, neighbouring samples scatter by 0.00103 m")
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
+def test_fourth_differences_show_the_share_of_noise_that_its_memory_leaves(memory):
+    random = np.random.default_rng(8).standard_normal(200_000)
+    noise = lfilter([np.sqrt(1 - memory**2)], [1, -memory], random)
+    assert white_noise(noise) ** 2 == pytest.approx(white_share(memory), rel=0.05)

@@ -120,6 +120,7 @@ def verdict(outcome: str) -> dict:
             "offset_force": {
                 "size": None, "path": "effect.offset_force.force", "unit": "N", "reason": "imitated",
             },
+            "static_excess": {"size": None, "path": None, "unit": None, "reason": "nothing sticks"},
         },
         "confusability": {"names": NAMES, "matrix": [[1.0, 0.31, 0.2], [0.31, 1.0, 0.98], [0.2, 0.98, 1.0]]},
         "separating_experiment": "measure the barrier" if outcome == "ambiguous" else "",
@@ -144,6 +145,8 @@ def verdict(outcome: str) -> dict:
         ],
         "held_out_chosen": "as asked for",
         "seed": 1,
+        "asked_for": None,
+        "units": {"position": "m", "velocity": "m/s", "force": "N"},
         "version": "0.1.0",
         "runtime_s": 7.662,
     }  # fmt: skip
@@ -158,13 +161,14 @@ def write_details(path: Path, stages: tuple[str, ...]) -> None:
     hits = np.arange(0.0, 6.0, 0.5)
     speed = 1 + 0.5 * np.sin(hits)
     with h5py.File(path, "w") as file:
+        file.attrs["position_unit"], file.attrs["velocity_unit"] = "m", "m/s"
         for name, unit, count in (
-            ("time", "s", 12),
+            ("time in f0", "s", 12),
             ("position", "m", 10),
             ("position and velocity", "m, m/s", 25),
         ):
             group = file.create_group(f"where/{name}")
-            group.attrs["unit"] = unit
+            group.attrs["unit"], group.attrs["force_unit"] = unit, "N"
             group["edges"] = np.linspace(0, 1, count + 1 if count < 25 else 6)
             if count == 25:
                 group["velocity_edges"] = np.linspace(-3, 3, 6)
@@ -237,7 +241,7 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
     for row, (gate, passed) in zip(page.tables.get("gate", []), told["gates"].items(), strict=True):
         assert (row[0], row[2]) == (gate, "passed" if passed else "failed")
     for row, one in zip(page.tables["effect"], told["detectable"].values(), strict=True):
-        assert row[1] == one["path"]
+        assert row[1] == (one["path"] or "-")
         assert same(row[2].split(" ")[0], one["size"])
         assert row[3] == one["reason"]
 
@@ -327,6 +331,20 @@ def test_maps_before_and_after(
     assert flown == pytest.approx(2 * [0.5 * Model.from_text(CASE).parameters["drive.cosine[1]"].value])
     page = Page(html.read_text())
     assert {"bifurcation", "impact-speeds"} <= {name for name, _ in page.pictures}
+
+
+def test_the_program_of_a_build_in_the_source_tree_is_found(
+    source_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert comparison.SOURCE_TREE == source_dir
+    monkeypatch.delenv("SEPARATRIX_PROGRAM", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(comparison, "SOURCE_TREE", tmp_path)
+    assert comparison.program_path() is None
+    program = tmp_path / "build" / "bin" / "separatrix"
+    program.parent.mkdir(parents=True)
+    program.touch()
+    assert comparison.program_path() == program
 
 
 def test_no_program_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

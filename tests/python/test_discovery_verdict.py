@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from program import CASE, succeed
 from separatrix.discovery.cli import main
-from separatrix.discovery.decision.verdict import _parameters
+from separatrix.discovery.decision.verdict import _candidate, _parameters
 from separatrix.discovery.fitting.machine import Free
-from separatrix.discovery.wording import with_error
+from separatrix.discovery.wording import unit_of, units_of, with_error
 
 pytestmark = pytest.mark.usefixtures("library")
 
@@ -85,6 +85,7 @@ def test_nothing_is_found_where_nothing_is_and_twice_the_same(separatrix, tmp_pa
     assert (verdict["outcome"], verdict["effects"]) == ("none", [])
     assert not (tmp_path / "out" / "extended.toml").exists()
     assert 0 < verdict["detectable"]["offset_force"]["size"] < 0.5
+    assert set(verdict["detectable"]) == set(few[1].split(","))
     (tmp_path / "again").mkdir()
     (tmp_path / "again" / "extended.toml").write_text("of an earlier run")
     again = asked(tmp_path, made, "again", *few)
@@ -129,5 +130,29 @@ def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so():
     held, known = _parameters(fitted).values()
     assert (held["standard_error"], held["interval_95"], held["note"]) == (None, None, "at its bound")
     assert known["interval_95"] == pytest.approx([89 - 0.98, 89 + 0.98])
-    assert with_error(held, 4) == "1, at its bound"
-    assert with_error(known, 4) == "89 +- 0.5"
+    assert with_error(held) == "1, at its bound"
+    assert with_error(known) == "89 +- 0.5"
+    precise = {"value": 1.1, "standard_error": 2.8e-7, "interval_95": [], "unit": "m"}
+    assert with_error(precise | {"value": 1.10000031}) == "1.10000031 +- 2.8e-07 m"
+
+
+def test_the_x_of_a_pendulum_is_an_angle():
+    pendulum, body = {"body.mass", "restoring.moment"}, {"body.mass", "restoring.stiffness"}
+    assert (units_of(pendulum).position, units_of(pendulum).force) == ("rad", "N m")
+    assert units_of(body).velocity == "m/s"
+    assert unit_of("friction.damping", "N s/m", pendulum) == "N m s/rad"
+    assert unit_of("effect.quadratic_drag.coefficient", "N s^2/m^2", pendulum) == "N m s^2/rad^2"
+    assert unit_of("restoring.moment", "N m", pendulum) == "N m"
+    assert unit_of("friction.damping", "N s/m", body) == "N s/m"
+
+
+def test_a_fit_worse_than_the_machine_that_it_contains_is_not_called_converged():
+    fit = SimpleNamespace(converged=True, reduced_chi2=9.0, values=np.array([0.8]))
+    free = [Free("effect.viscous.damping", 0.8)]
+    fitted = SimpleNamespace(
+        names=("viscous",), fit=fit, problem=SimpleNamespace(free=free), added=(0,), tries=1
+    )
+    judged = SimpleNamespace(name="viscous", fitted=fitted, held_out=0.0, evidence=0.0)
+    told = {gain: _candidate(SimpleNamespace(**vars(judged), training=gain)) for gain in (-0.5, -400.0)}
+    assert told[-0.5]["converged"]
+    assert not told[-400.0]["converged"]

@@ -104,6 +104,10 @@ class Progress:
         print(f"[{100 * done:3.0f} %] {stage} ({passed:.1f} s{left})", file=sys.stderr, flush=True)
 
 
+def _search(verdict: dict) -> str:
+    return "the catalogue" if verdict["asked_for"] is None else "the part of the catalogue that was asked for"
+
+
 def summary(verdict: dict) -> list[str]:
     """The verdict in a few lines."""
     names = " and ".join(verdict["effects"])
@@ -112,11 +116,11 @@ def summary(verdict: dict) -> list[str]:
         "named": [f"missing: {names}"],
         "ambiguous": [f"missing: {names}" + (f", or {others}" if others else ", not beyond doubt")],
         "none": ["no missing effect"],
-        "not-in-catalogue": ["something is missing that the catalogue does not name"],
+        "not-in-catalogue": [f"something is missing that {_search(verdict)} does not name"],
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):
-            lines.append(f"  {path} = {with_error(found, 4)}")
+            lines.append(f"  {path} = {with_error(found)}")
     for use, gap in verdict["gap"].items():
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"

@@ -20,7 +20,7 @@ from separatrix.discovery.fitting.ceiling import sample_times
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
-from separatrix.discovery.wording import with_error
+from separatrix.discovery.wording import units_of, with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
 FILES = ("details.h5", "extended.toml", "report.html", "report.pdf", "verdict.json")
@@ -131,7 +131,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
     for path in fitted.model.parameters:
         found = verdict["parameters"].get(path)
         if found:
-            lines.append(f"# {path} = {with_error(found, 6)}")
+            lines.append(f"# {path} = {with_error(found)}")
     return "\n".join([*lines, machine_text(fitted)])
 
 
@@ -171,9 +171,11 @@ def write_details(path: Path, findings: Findings) -> None:
     decision, bench = findings.decision, findings.bench
     final = decision.accepted[0] if decision.accepted else None
     with h5py.File(path, "w") as file:
+        units = units_of(findings.base.model.parameters)
+        file.attrs["position_unit"], file.attrs["velocity_unit"] = units.position, units.velocity
         for one in findings.maps:
             group = file.create_group(f"where/{one.name}")
-            group.attrs["unit"] = one.unit
+            group.attrs["unit"], group.attrs["force_unit"] = one.unit, one.force_unit
             group["edges"] = one.edges
             if one.other_edges is not None:
                 group["velocity_edges"] = one.other_edges

@@ -3,6 +3,36 @@
 """Names and numbers of a verdict as the report prints them."""
 
 import math
+import re
+from collections.abc import Container
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of x, of its speed and of what acts on it."""
+
+    position: str = "m"
+    velocity: str = "m/s"
+    force: str = "N"
+
+
+_ANGLES = Units("rad", "rad/s", "N m")
+_OF_ANGLES = {"m": "rad", "N": "N m", "kg": "kg m^2"}
+# in these units whatever x is
+_AS_THEY_ARE = ("restoring.moment", "body.gravity")
+
+
+def units_of(parameters: Container[str]) -> Units:
+    """Units of the machine with these parameters: the x of a pendulum is an angle."""
+    return _ANGLES if "restoring.moment" in parameters else Units()
+
+
+def unit_of(path: str, unit: str, parameters: Container[str]) -> str:
+    """Unit of a parameter whose `unit` is for x in metres, as x of this machine is."""
+    if units_of(parameters) is not _ANGLES or path in _AS_THEY_ARE:
+        return unit
+    return re.sub(r"[A-Za-z]+", lambda found: _OF_ANGLES.get(found[0], found[0]), unit)
 
 
 def words(name: str) -> str:
@@ -23,8 +53,9 @@ def digits_of(value: float, error: float | None) -> int:
     return 4 if not error or value == 0 else max(4, math.ceil(math.log10(abs(value) / error)) + 2)
 
 
-def with_error(one: dict, digits: int) -> str:
+def with_error(one: dict) -> str:
     """A parameter of the verdict with its standard error, or why it has none."""
+    digits = digits_of(one["value"], one["standard_error"])
     unit = "" if one["unit"] == "1" else f" {one['unit']}"
     if one["standard_error"] is None:
         return f"{one['value']:.{digits}g}{unit}, {one['note']}"

@@ -10,6 +10,7 @@ from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.catalogue import BY_NAME, Candidate
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import screen, signature
+from separatrix.discovery.wording import unit_of, units_of
 
 _LADDER = 4.0 ** np.arange(-3, 4)
 _RATIOS = np.linspace(0.6, 1.5, 19)
@@ -41,12 +42,15 @@ def detectable(bench: Bench, found: Round) -> dict[str, dict]:
 
     None, with a reason, where no size can be told.
     """
-    sizes = {}
+    sizes = {
+        name: {"size": None, "path": None, "unit": None, "reason": reason}
+        for name, reason in found.absent.items()
+    }
     for name, made in found.candidates.items():
         if name not in found.screened.names:
             continue
         path = made.free[made.added[0]].path
-        unit = made.model.parameters[path].unit
+        unit = unit_of(path, made.model.parameters[path].unit, made.model.parameters)
         reason = ""
         if not found.screened.seen(name):
             size, reason = None, "the base machine can imitate it"
@@ -59,7 +63,7 @@ def detectable(bench: Bench, found: Round) -> dict[str, dict]:
             size = _by_ladder(bench, found, made)
             reason = "" if size is not None else "no size that was tried stands out so much"
         else:
-            continue
+            size, reason = None, "its size is not proportional to what it does: see a run without --quick"
         sizes[name] = {"size": size, "path": path, "unit": unit, "reason": reason}
     return sizes
 
@@ -111,7 +115,7 @@ def separating_experiment(bench: Bench, one: Fitted, others: list[Fitted]) -> st
     best = int(np.nanargmax(apart))
     return (
         f"a record at drive ratio {_RATIOS[best]:.2f}, where {_label(one)} and {_label(other)} differ by "
-        f"{apart[best]:.3g} m after {_PERIODS} drive periods"
+        f"{apart[best]:.3g} {units_of(one.model.parameters).position} after {_PERIODS} drive periods"
     )
 
 

@@ -7,16 +7,19 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.noise import noise_of
+from separatrix.discovery.fitting.noise import noise_of, white_share
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.measured.preflight import Prepared, white_noise
 from separatrix.discovery.options import Options
+from separatrix.discovery.wording import units_of
 
 # reduced chi^2 below which the noise must be smaller than stated
 _TOO_LITTLE = 0.5
 _ENOUGH = 50
 # factor of the scatter over the stated noise that is worth a word
 _DISAGREEMENT = 1.3
+# factor of noise that was measured over what the samples scatter
+_LARGER = 2.0
 # share of the noise that is rounding from which on its size is no known one
 _ROUNDING = 0.2
 
@@ -54,31 +57,46 @@ def _limit(one: Prepared, options: Options) -> float:
 
 
 def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:
-    """Return in words what noise cannot be as stated, by the best machine that was found.
+    """Return in words what noise cannot be as stated or measured, by the best machine that was found.
 
     More scatter counts only if the fourth differences of the samples show it too: a machine that lacks
     something leaves more than noise.
     """
     notes = []
+    unit = units_of(problem.model.parameters).position
     factors, _ = noise_of(problem, fit, 0, mass)
     found = record_chi2(data, fit)
     for number, one in enumerate(data.prepared):
-        if not one.sigma_stated or number not in found:
+        if number not in found:
+            continue
+        if not one.sigma_stated:
+            notes += _more_than_white(one, unit)
             continue
         scatter = min(one.sigma * factors.get(number, 1.0), white_noise(one.record.x))
         if scatter > _DISAGREEMENT * one.sigma:
-            notes.append(f"{_stated(one)} scatter by {scatter:.3g} m")
+            notes.append(f"{_stated(one, unit)} scatter by {scatter:.3g} {unit}")
         size, freedom = found[number]
         if size < _TOO_LITTLE and freedom > _ENOUGH:
             notes.append(
-                f"{_stated(one)} scatter by only {one.sigma * np.sqrt(size):.3g} m: "
+                f"{_stated(one, unit)} scatter by only {one.sigma * np.sqrt(size):.3g} {unit}: "
                 "what is smaller than the stated noise is overlooked"
             )
     return notes
 
 
-def _stated(one: Prepared) -> str:
-    return f"{one.record.name}: noise is stated as {one.sigma:.3g} m, the samples"
+def _more_than_white(one: Prepared, unit: str) -> list[str]:
+    """Noise that was measured as far larger than the samples scatter: coloured, or what the machine lacks."""
+    white = white_noise(one.record.x)
+    if one.sigma < _LARGER * white / np.sqrt(white_share(one.memory)) or one.resolution**2 > 3 * one.sigma**2:
+        return []
+    return [
+        f"{one.record.name}: noise of {one.sigma:.3g} {unit} is taken, neighbouring samples scatter by "
+        f"{white:.3g} {unit}: either the noise is coloured, or it hides a gap; sensor_noise_sigma_m states it"
+    ]
+
+
+def _stated(one: Prepared, unit: str) -> str:
+    return f"{one.record.name}: noise is stated as {one.sigma:.3g} {unit}, the samples"
 
 
 def too_quiet(data: Data, fit: Fit) -> bool:

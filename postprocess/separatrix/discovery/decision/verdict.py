@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The verdict as a dictionary: what is written to verdict.json."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
@@ -12,11 +12,13 @@ from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.limits import detectable, equivalents, separating_experiment
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.decision.strange import other_drive, other_machine
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
-from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.refit import WORSE, Fitted
+from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
 
 
@@ -53,6 +55,8 @@ def verdict_of(findings: Findings) -> dict:
         "gates": best.gates if best else {},
         "p_value": best.p if best else None,
         "reasons": decision.reasons,
+        "asked_for": None if bench.options.candidates is None else list(bench.options.candidates),
+        "units": asdict(units_of(findings.base.model.parameters)),
         "detectable": detectable(bench, first),
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
         "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
@@ -85,7 +89,8 @@ def _candidate(one: Judged) -> dict:
         "held_out": one.held_out,
         "evidence": one.evidence,
         "reduced_chi2": fit.reduced_chi2,
-        "converged": fit.converged,
+        # what is worse than the base, which it contains, has not found its minimum
+        "converged": fit.converged and one.training > -WORSE,
         "starts": one.fitted.tries,
         "values": {
             one.fitted.problem.free[i].path: one.fitted.problem.free[i].physical(fit.values[i])
@@ -105,6 +110,9 @@ def _warnings(findings: Findings) -> list[str]:
     fits = _final(findings)
     for _, data, fitted in fits:
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
+    notes += other_machine(bench.training, findings.base, bench.options)
+    if findings.decision.outcome == "not-in-catalogue":
+        notes += other_drive(bench.training, findings.base)
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")
@@ -171,7 +179,7 @@ def _parameters(fitted: Fitted) -> dict:
             "standard_error": one.slope(value) * float(error) if known else None,
             "interval_95": ends if known else None,
             "note": "" if known else "at its bound" if held else "these records say nothing about it",
-            "unit": parameter.unit if parameter else "1",
+            "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
         }
     return found
 

@@ -18,6 +18,7 @@ from separatrix.discovery.fitting.fit import blocks_of, eliminate
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns
 from separatrix.discovery.options import Options
+from separatrix.discovery.wording import Units, units_of
 
 _LEVEL = 0.01
 _BLOCK = 2
@@ -25,10 +26,11 @@ _BLOCK = 2
 
 @dataclass
 class Map:
-    """One map: edges of its bins, and in each the missing force [N], its error and its flag."""
+    """One map: edges of its bins, and in each the missing force, its error and its flag."""
 
     name: str
     unit: str
+    force_unit: str
     edges: np.ndarray
     other_edges: np.ndarray | None
     force: np.ndarray
@@ -43,18 +45,19 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     evaluation = fit.evaluation
     x, v = evaluation.x, evaluation.v
     inside = problem.segments.inside & fit.good[:, None]
+    units = units_of(fitted.model.parameters)
     maps = [
-        _bins("time", "s", _seconds(problem), inside, 12),
-        _bins("position", "m", x, inside, 10),
-        _bins("velocity", "m/s", v, inside, 10),
-        _bins("low speed", "m/s", np.where(np.abs(v) < 0.2 * state["speed"], v, np.nan), inside, 6),
+        *_times(problem, inside),
+        _bins("position", units.position, x, inside, 10),
+        _bins("velocity", units.velocity, v, inside, 10),
+        _bins("low speed", units.velocity, np.where(np.abs(v) < 0.2 * state["speed"], v, np.nan), inside, 6),
     ]
     if state["phase"] is not None:
         maps.append(_bins("drive phase", "rad", np.mod(state["phase"], 2 * np.pi), inside, 12))
     since = after_impacts(problem, fit)
     if np.isfinite(since).any():
         maps.append(_bins("time since the last impact", "s", since, inside, 6))
-    maps.append(_plane(x, v, inside, 5))
+    maps.append(_plane(x, v, inside, 5, units))
     maps = [one for one in maps if one is not None]
     tables = [member for _, _, _, _, member in maps]
     columns = force_columns(problem, fit, np.concatenate(tables, axis=2), mass)
@@ -64,16 +67,20 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     for name, unit, edges, other, member in maps:
         part = slice(first, first + member.shape[2])
         first = part.stop
-        found.append(Map(name, unit, edges, other, force[part], error[part], flags[part]))
+        found.append(Map(name, unit, units.force, edges, other, force[part], error[part], flags[part]))
     return found
 
 
-def _seconds(problem) -> np.ndarray:
-    seconds = np.zeros(problem.segments.inside.shape)
+def _times(problem, inside: np.ndarray) -> list[tuple | None]:
+    """Bins of time: of each record by itself, since they are of different days."""
+    found = []
+    count = max(4, 12 // len(problem.prepared))
     for number, prepared in enumerate(problem.prepared):
-        rows = np.flatnonzero(problem.segments.record == number)
-        seconds[rows] = prepared.record.t[problem.segments.index[rows]] - prepared.record.t[0]
-    return seconds
+        rows = problem.segments.record == number
+        seconds = prepared.record.t[problem.segments.index] - prepared.record.t[0]
+        name = "time" if len(problem.prepared) == 1 else f"time in {prepared.record.name}"
+        found.append(_bins(name, "s", seconds, inside & rows[:, None], count))
+    return found
 
 
 def _bins(name: str, unit: str, values: np.ndarray, inside: np.ndarray, count: int) -> tuple | None:
@@ -91,12 +98,12 @@ def _bins(name: str, unit: str, values: np.ndarray, inside: np.ndarray, count: i
     return name, unit, edges, None, member
 
 
-def _plane(x: np.ndarray, v: np.ndarray, inside: np.ndarray, count: int) -> tuple | None:
+def _plane(x: np.ndarray, v: np.ndarray, inside: np.ndarray, count: int, units: Units) -> tuple | None:
     one, other = _bins("", "", x, inside, count), _bins("", "", v, inside, count)
     if one is None or other is None:
         return None
     member = (one[4][:, :, :, None] * other[4][:, :, None, :]).reshape(*x.shape, -1)
-    return "position and velocity", "m, m/s", one[2], other[2], member
+    return "position and velocity", f"{units.position}, {units.velocity}", one[2], other[2], member
 
 
 def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
@@ -159,8 +166,9 @@ def sentences(maps: list[Map]) -> list[dict]:
                     "region": region,
                     "force": float(one.force[place]),
                     "error": float(one.error[place]),
-                    "text": f"a force of {one.force[place]:.3g} +- {one.error[place]:.2g} N is missing "
-                    + region["text"],
+                    "unit": one.force_unit,
+                    "text": f"a force of {one.force[place]:.3g} +- {one.error[place]:.2g} "
+                    f"{one.force_unit} is missing {region['text']}",
                 }
             )
     return found
@@ -178,9 +186,10 @@ def _region(one: Map, place: int) -> dict:
     columns = one.other_edges.size - 1
     i, j = divmod(place, columns)
     x, v = one.edges[i : i + 2], one.other_edges[j : j + 2]
+    of_x, of_v = one.unit.split(", ")
     return {
         "from": [float(x[0]), float(v[0])],
         "to": [float(x[1]), float(v[1])],
         "unit": one.unit,
-        "text": f"at position {x[0]:.3g} to {x[1]:.3g} m and velocity {v[0]:.3g} to {v[1]:.3g} m/s",
+        "text": f"at position {x[0]:.3g} to {x[1]:.3g} {of_x} and velocity {v[0]:.3g} to {v[1]:.3g} {of_v}",
     }

@@ -55,6 +55,11 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dic
     return factors, memory
 
 
+def white_share(memory: float) -> float:
+    """Power of the fourth differences of noise of correlation r^|k| over that of white noise of its size."""
+    return float(np.polyval([2, -16, 56, -112, 70], memory)) / 70
+
+
 def _cleaned(
     problem: Problem, fit: Fit, channel: int, mass: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ _SPARED = 3
 # share of segments that one fit may follow more than another without being better
 _FEW = 0.1
 # log-likelihood by which a machine that contains the base may be worse than it
-_WORSE = 1.0
+WORSE = 1.0
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -111,7 +111,7 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
 
     What stays worse has not found its minimum, whatever its last step promised.
     """
-    if not candidate.linear.any() or gain_over(best, base)[0] > -_WORSE:
+    if not candidate.linear.any() or gain_over(best, base)[0] > -WORSE:
         return best
     values = _base_values(base, candidate)
     added = np.array(candidate.added)
@@ -120,7 +120,7 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
     fit = minimise(problem, values, base.fit.starts)
     found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
     best = found if _better(found, best) else best
-    if gain_over(best, base)[0] > -_WORSE:
+    if gain_over(best, base)[0] > -WORSE:
         return best
     return replace(best, fit=replace(best.fit, caught=True))
 

@@ -20,8 +20,9 @@ from separatrix import style
 from separatrix.discovery.fitting.machine import drive_amplitudes
 from separatrix.discovery.report.figures import AFTER, BEFORE, MEASURED
 from separatrix.discovery.report.pages import Picture, Section
+from separatrix.discovery.wording import Units
 from separatrix.errors import SeparatrixError
-from separatrix.library import Model
+from separatrix.library import SOURCE_TREE, Model
 from separatrix.open import open_result
 
 _HOLDS = 81
@@ -45,9 +46,7 @@ class Start:
 def program_path() -> Path | None:
     """The program: SEPARATRIX_PROGRAM, else on the path, else in build/bin of this source tree, else None."""
     asked = os.environ.get("SEPARATRIX_PROGRAM")
-    found = (
-        asked or shutil.which("separatrix") or Path(__file__).resolve().parents[3] / "build/bin/separatrix"
-    )
+    found = asked or shutil.which("separatrix") or SOURCE_TREE / "build" / "bin" / "separatrix"
     return Path(found) if Path(found).is_file() else None
 
 
@@ -89,6 +88,7 @@ def _fill(
     folder: Path,
     progress: Callable[[str, float], None],
 ) -> None:
+    units = Units(**verdict["units"])
     # drive frequency at ratio 1, which the fitted stiffness changes
     unit = {stage: Model.read(case).drive_frequency({"drive.ratio": 1.0}) for stage, case in cases.items()}
     drives = [one["drive_frequency"] for one in verdict["records"]]
@@ -103,7 +103,7 @@ def _fill(
         "The same sweep of the drive frequency on the base case as it was given and on the extended case.",
         Picture(
             "bifurcation",
-            bifurcation(sweeps, unit, marks, held),
+            bifurcation(sweeps, unit, marks, held, units),
             "Positions once per drive period (top) and mean impact speeds (bottom) after the transient, "
             "over the drive "
             "frequency, run up (circles) and run down (dots): a) the base case as it was given, b) the "
@@ -123,7 +123,7 @@ def _fill(
         section.body.append(
             Picture(
                 "impact-speeds",
-                histogram(speeds, start),
+                histogram(speeds, start, units),
                 f"Impact speeds in record {start.record} ({start.speeds.size} impacts) and in motions of "
                 "the same length "
                 f"from the same start of the base case as it was given ({speeds['before'].size}) and of "
@@ -167,7 +167,11 @@ def sweep(program: Path, case: Path, ratios: list[float], output: Path) -> dict[
 
 
 def bifurcation(
-    sweeps: dict[str, dict[str, np.ndarray]], unit: dict[str, float], marks: dict[str, float], held: list[str]
+    sweeps: dict[str, dict[str, np.ndarray]],
+    unit: dict[str, float],
+    marks: dict[str, float],
+    held: list[str],
+    units: Units,
 ) -> Figure:
     """Stroboscopic positions and impact speeds over the drive frequency, base and extended side by side."""
     figure = style.new_figure(style.DOUBLE_COLUMN, 95.0)
@@ -205,8 +209,8 @@ def bifurcation(
         handles.append(
             Line2D([], [], linestyle="", marker="o", color=colour, markersize=3, label=_label(stage))
         )
-    axes[0, 0].set_ylabel("position $x$ (m)\nonce per drive period")
-    axes[1, 0].set_ylabel("mean impact\nspeed (m/s)")
+    axes[0, 0].set_ylabel(f"position $x$ ({units.position})\nonce per drive period")
+    axes[1, 0].set_ylabel(f"mean impact\nspeed ({units.velocity})")
     axes[1, 0].set_ylim(bottom=min(0.0, axes[1, 0].get_ylim()[0]))
     figure.legend(handles=handles, loc="outside upper center", ncols=2)
     return figure
@@ -263,7 +267,7 @@ def impact_speeds(
     return np.abs(np.array([float(row["v_before"]) for row in rows]))
 
 
-def histogram(speeds: dict[str, np.ndarray], start: Start) -> Figure:
+def histogram(speeds: dict[str, np.ndarray], start: Start, units: Units) -> Figure:
     """Impact speeds of the record and of both machines."""
     figure = style.new_figure(style.SINGLE_COLUMN, 62.0)
     figure.set_layout_engine("constrained")
@@ -282,7 +286,7 @@ def histogram(speeds: dict[str, np.ndarray], start: Start) -> Figure:
                 label=_label(stage),
             )
         )  # fmt: skip
-    ax.set_xlabel("impact speed (m/s)")
+    ax.set_xlabel(f"impact speed ({units.velocity})")
     ax.set_ylabel("impacts")
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure

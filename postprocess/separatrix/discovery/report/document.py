@@ -76,9 +76,8 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         by_key["where"],
         "where-plane",
         where_figures.where_plane(details),
-        "The force that the base machine lacks (N) by position and velocity; a star marks what differs "
-        "from zero by more "
-        "than chance, given the number of bins.",
+        f"The force that the base machine lacks ({verdict['units']['force']}) by position and velocity; "
+        "a star marks what differs from zero by more than chance, given the number of bins.",
     )
     _show(
         by_key["missing"],

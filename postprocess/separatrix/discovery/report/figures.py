@@ -70,7 +70,7 @@ def ranking(verdict: dict) -> Figure | None:
         return None
     gained = {one["effect"]: one for one in verdict["candidates"]}
     order = sorted(d_prime, key=lambda name: (gained.get(name, {}).get("evidence", -np.inf), d_prime[name]))
-    figure = style.new_figure(style.DOUBLE_COLUMN, 18.0 + 4.0 * len(order))
+    figure = style.new_figure(style.DOUBLE_COLUMN, max(45.0, 18.0 + 4.0 * len(order)))
     figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     rows = np.arange(len(order))
@@ -253,8 +253,9 @@ def impact_map(details: h5py.File) -> Figure | None:
             )  # fmt: skip
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
-    ax.set_xlabel("speed before the impact (m/s)")
-    ax.set_ylabel("speed after the impact (m/s)")
+    unit = details.attrs["velocity_unit"]
+    ax.set_xlabel(f"speed before the impact ({unit})")
+    ax.set_ylabel(f"speed after the impact ({unit})")
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure
 
@@ -314,7 +315,7 @@ def held_out(details: h5py.File) -> Figure | None:
         _symlog(bottom, "y", 5, largest)
     bottom.set_ylabel("residual / noise")
     bottom.set_xlabel("time (s)")
-    top.set_ylabel("position $x$ (m)")
+    top.set_ylabel(f"position $x$ ({details.attrs['position_unit']})")
     for letter, ax in zip("ab", (top, bottom), strict=True):
         ax.set_title(f"{letter})", loc="left")
     figure.legend(handles=handles, loc="outside upper center", ncols=3)

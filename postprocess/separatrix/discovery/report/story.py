@@ -54,7 +54,9 @@ def _summary(verdict: dict) -> Section:
         "ambiguous": f"Something is missing that looks like {names(verdict)}, "
         + (f"but {others} would do about as well." if others else "but not every gate is passed."),
         "none": "No effect is missing that these records could show.",
-        "not-in-catalogue": "Something is missing, and no effect of the catalogue explains it.",
+        "not-in-catalogue": "Something is missing, and no effect "
+        + ("of the catalogue" if verdict["asked_for"] is None else "that was asked for")
+        + " explains it.",
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {said}"]
     for path, one in verdict["parameters"].items():
@@ -90,6 +92,12 @@ def _pair(name: str) -> str:
     return " with ".join(words(part) for part in name.split("+"))
 
 
+def _drive(record: dict) -> list[str]:
+    if record["drive_frequency"] is None:
+        return ["none", "none"]
+    return [number(record["drive_frequency"], 5), "known" if record["phase_known"] else "fitted"]
+
+
 def _compared(verdict: dict) -> Section:
     rows = [
         [
@@ -98,13 +106,22 @@ def _compared(verdict: dict) -> Section:
             str(one["samples"]),
             number(one["sigma"], 3),
             number(one["resolution"], 3),
-            "none" if one["drive_frequency"] is None else number(one["drive_frequency"], 5),
-            "known" if one["phase_known"] else "fitted",
+            *_drive(one),
         ]
         for one in verdict["records"]
     ]
+    unit = verdict["units"]["position"]
     table = Table(
-        ["record", "use", "samples", "noise (m)", "resolution (m)", "drive (rad/s)", "crank angle"], rows
+        [
+            "record",
+            "use",
+            "samples",
+            f"noise ({unit})",
+            f"resolution ({unit})",
+            "drive (rad/s)",
+            "crank angle",
+        ],
+        rows,
     )
     return Section(
         "compared",
@@ -244,8 +261,10 @@ def _foretold(verdict: dict) -> str:
     if "held_out" not in verdict["gap"]:
         return "No record was held out."
     one = verdict["gap"]["held_out"]
+    driven = any(record["drive_frequency"] is not None for record in verdict["records"])
+    fitted = "the starts of its segments" + (" and the angle of its crank" if driven else "")
     return (
-        f"Only the starts of its segments and the angle of its crank are fitted to a held-out record. "
+        f"Only {fitted} are fitted to a held-out record. "
         "Reduced chi^2: "
         f"{number(one['before'])} for the base machine, {number(one['after'])} for "
         + (
@@ -277,7 +296,7 @@ def _parameters(verdict: dict) -> Section:
 
 def _detectable(verdict: dict) -> Section:
     rows = [
-        [words(name), one["path"], with_unit(one["size"], one["unit"], 3), one["reason"]]
+        [words(name), one["path"] or "-", with_unit(one["size"], one["unit"], 3), one["reason"]]
         for name, one in verdict["detectable"].items()
     ]
     said = (

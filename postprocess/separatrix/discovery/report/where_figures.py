@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps of the force that the base machine lacks, from details.h5; None where there is nothing to show."""
 
+from string import ascii_lowercase
+
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,14 +22,13 @@ def where_lines(details: h5py.File) -> Figure | None:
     """The missing force over time, drive phase, position, velocity, low speed and time since an impact."""
     names = [name for name in details["where"] if "velocity_edges" not in details["where"][name]]
     order = (
-        "time",
         "drive phase",
         "position",
         "velocity",
         "low speed",
         "time since the last impact",
     )
-    names.sort(key=lambda name: order.index(name) if name in order else len(order))
+    names.sort(key=lambda name: order.index(name) if name in order else -1)
     if not names:
         return None
     rows = -(-len(names) // 3)
@@ -36,13 +37,13 @@ def where_lines(details: h5py.File) -> Figure | None:
     axes = figure.subplots(rows, 3, squeeze=False).ravel()
     for ax in axes[len(names) :]:
         ax.set_visible(False)
-    for letter, ax, name in zip("abcdefghi", axes, names, strict=False):
+    for letter, ax, name in zip(ascii_lowercase, axes, names, strict=False):
         _draw_bins(ax, details["where"][name])
         unit = details["where"][name].attrs["unit"]
         ax.set_xlabel(f"{name} ({unit})")
         ax.set_title(f"{letter})", loc="left")
-    for ax in axes[::3]:
-        ax.set_ylabel("missing force (N)")
+    for ax, name in zip(axes[::3], names[::3], strict=False):
+        ax.set_ylabel(f"missing force ({details['where'][name].attrs['force_unit']})")
     handles = [
         Line2D([], [], linestyle="", marker="o", color=BEFORE, markersize=3.5, label="flagged"),
         Line2D(
@@ -92,9 +93,12 @@ def where_plane(details: h5py.File) -> Figure | None:
                 f"{force[i, j]:.2g}" + ("*" if flagged[i, j] else ""),
                 ha="center", va="center", fontsize=5.0, color="white" if tone > 0.35 else "black",
             )  # fmt: skip
-    ax.set_xlabel("position $x$ (m)")
-    ax.set_ylabel("velocity $v$ (m/s)")
+    of_x, of_v = group.attrs["unit"].split(", ")
+    ax.set_xlabel(f"position $x$ ({of_x})")
+    ax.set_ylabel(f"velocity $v$ ({of_v})")
     power = 10.0 ** np.floor(np.log10(largest))
-    bar = figure.colorbar(image, ax=ax, label="missing force (N)", ticks=[-power, 0.0, power])
+    bar = figure.colorbar(
+        image, ax=ax, label=f"missing force ({group.attrs['force_unit']})", ticks=[-power, 0.0, power]
+    )
     bar.ax.yaxis.set_minor_locator(NullLocator())
     return figure

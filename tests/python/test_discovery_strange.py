@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records of another machine, in other units or of another drive are told from missing physics."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from separatrix.discovery.decision.strange import other_drive, other_machine, strongest_line
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.options import Options
+
+CASE = {"body.mass": (95.0, "kg"), "restoring.stiffness": (88.8, "N/m"), "contact.upper": (1.1, "m")}
+
+
+def data(frequency: float, stated: float) -> SimpleNamespace:
+    """One record of 5 s that moves at one frequency, beside a drive that is said to have another."""
+    t = np.arange(2500) / 500
+    record = SimpleNamespace(name="first", x=0.3 * np.cos(frequency * t) + 0.02 * t, interval=1 / 500)
+    prepared = [SimpleNamespace(record=record, frequency=stated)]
+    return SimpleNamespace(prepared=prepared, stages=[SimpleNamespace(record=np.zeros(20, int))], last=0)
+
+
+def base(chi2: float = 1.0, **found: float) -> SimpleNamespace:
+    """A base machine that was fitted to these values, by the last word of their paths."""
+    paths = {path.split(".")[1]: path for path in CASE} | {"drive_scale": "nuisance:drive_scale"}
+    fit = SimpleNamespace(
+        values=np.array(list(found.values())),
+        chi2=np.full(20, chi2 * 123),
+        counts=np.full(20, 125),
+        good=np.ones(20, bool),
+    )
+    parameters = {path: SimpleNamespace(value=value, unit=unit) for path, (value, unit) in CASE.items()}
+    free = [Free(paths[name], value) for name, value in found.items()]
+    return SimpleNamespace(
+        model=SimpleNamespace(parameters=parameters), problem=SimpleNamespace(free=free), fit=fit
+    )
+
+
+def test_a_machine_near_that_of_the_case_is_not_strange():
+    near = base(mass=80.0, stiffness=120.0, upper=1.2, drive_scale=1.3)
+    assert other_machine(data(9.0, 9.0), near, Options()) == []
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        ({"mass": 0.095}, "body.mass 0.095 kg (case: 95)"),
+        ({"stiffness": 8.3}, "restoring.stiffness 8.3 N/m (case: 88.8)"),
+        ({"upper": -0.305}, "contact.upper -0.305 m (case: 1.1)"),
+        ({"drive_scale": 5.0}, "scale of the drive 5"),
+    ],
+)
+def test_what_is_far_from_the_case_is_said(found, said):
+    (note,) = other_machine(data(9.0, 9.0), base(**found), Options())
+    assert said in note
+
+
+def test_the_strongest_line_is_where_the_motion_is():
+    line, apart = strongest_line(data(8.96, 8.96).prepared[0])
+    assert line == pytest.approx(8.96, rel=0.01)
+    assert apart == pytest.approx(2 * np.pi / 5, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "chi2", "notes"), [(8.96, 1e4, 1), (8.96, 1.2, 0), (11.3, 1e4, 0), (5.65, 1e4, 0)]
+)
+def test_a_motion_beside_the_drive_is_told_where_the_machine_misses_it(frequency, chi2, notes):
+    """Harmonics and subharmonics belong to the drive."""
+    said = other_drive(data(frequency, 11.3), base(chi2))
+    assert len(said) == notes
+    assert all("is drive_ratio right?" in note for note in said)
