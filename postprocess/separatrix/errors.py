@@ -7,6 +7,7 @@ BAD_DATA = 65
 NO_INPUT = 66
 CANNOT_CREATE = 73
 INTERRUPTED = 130
+TERMINATED = 143
 
 
 class SeparatrixError(Exception):

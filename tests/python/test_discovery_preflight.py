@@ -38,11 +38,60 @@ def driven(t: np.ndarray, **header) -> Record:
 def test_a_measured_crank_angle_counts_from_the_rows_that_it_is_fitted_to():
     model = Model.from_text(CASE)
     record = driven(np.arange(800) / 100, phase=START)
-    training, held_out, _ = _split([record], [])
+    training, held_out, _ = _split([record], [], model)
     for part in (*training, *held_out):
         prepared = prepare(part, model)
         angle = prepared.phase + prepared.frequency * (part.t - prepared.origin)
         assert np.cos(angle - START - RATE * part.t) == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize(("periods", "share"), [(12.3, 30), (5.7, 36), (4.2, 49)])
+def test_the_end_that_is_held_out_has_two_drive_periods(periods, share):
+    model = Model.from_text(CASE)
+    t = np.arange(0, periods * 2 * np.pi / RATE, 0.005)
+    training, held_out, said = _split([driven(t, phase=START)], [], model)
+    assert said == f"the last {share} % of the only record"
+    assert training[0].t.size + held_out[0].t.size == t.size
+    for part in (*training, *held_out):
+        prepare(part, model)
+
+
+def test_a_record_too_short_to_hold_out_its_end_says_so():
+    model = Model.from_text(CASE)
+    t = np.arange(0, 3 * 2 * np.pi / RATE, 0.005)
+    training, held_out, _ = _split([driven(t, phase=START)], [], model)
+    with pytest.raises(SeparatrixError, match=r"driven, the last 50 %, which are held out: 1\.5\d? drive"):
+        prepare(held_out[0], model)
+    with pytest.raises(SeparatrixError, match=r"driven, all but the last 50 %, which are held out: 1\."):
+        prepare(training[0], model)
+
+
+def test_a_gap_is_told_once_where_the_end_of_a_record_is_held_out():
+    t = np.arange(800) / 100
+    t[200:] += 0.5
+    training, held_out, _ = _split([driven(t)], [], Model.from_text(CASE))
+    assert sum("gap of" in text for text in training[0].warnings) == 1
+    assert held_out[0].warnings == []
+
+
+def test_a_record_at_rest_that_moves_is_refused_as_such():
+    model = Model.from_text(CASE)
+    record, moving = driven(np.arange(800) / 100), driven(np.arange(800) / 100)
+    moving.file = "rest.csv"
+    with pytest.raises(SeparatrixError, match=r"rest.csv: .* in driven by .* not a record at rest"):
+        prepare(record, model, moving)
+
+
+@pytest.mark.parametrize("noise", [1e-4, 0.0])
+def test_a_stated_noise_of_nothing_is_measured(noise):
+    """A computed record without noise has a little of it all the same."""
+    record = driven(np.arange(8000) / 1000, phase=START)
+    x = record.x + noise * np.random.default_rng(0).standard_normal(record.t.size)
+    record = make_record("zero", {"t": record.t, "x": x, "phi": record.phi}, {"sensor_noise_sigma_m": 0})
+    prepared = prepare(record, Model.from_text(CASE))
+    assert prepared.sigma == pytest.approx(max(noise, 1e-6 * np.std(x)), rel=0.1)
+    assert not prepared.sigma_stated
+    assert "sensor_noise_sigma_m is 0: measured instead" in prepared.notes
 
 
 @pytest.mark.parametrize("gap", [0.3, 2.0, 61.7])

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records that are wrong are refused with the row and the reason, and leave nothing behind."""
 
+import os
+import signal
 from pathlib import Path
 
 import h5py
@@ -11,7 +13,7 @@ from program import CASE, listing
 from separatrix.discovery import cli
 from separatrix.discovery.cli import main
 from separatrix.discovery.measured.records import make_record, read_record, unique_names
-from separatrix.discovery.results import FILES
+from separatrix.discovery.results import FILES, replacing
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -173,7 +175,7 @@ def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys
         raise OSError(28, "No space left on device")
 
     verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
-    verdict |= {"reasons": [], "separating_experiment": "", "warnings": []}
+    verdict |= {"reasons": [], "separating_experiment": "", "warnings": [], "asked_for": None}
     monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
     monkeypatch.setattr(cli, "write_results", write)
     monkeypatch.setattr(cli, "write_report", fail)
@@ -186,6 +188,18 @@ def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys
     assert main(arguments) == 0
     left = {path.name: path.read_text() for path in out.iterdir()}
     assert left == {"verdict.json": "new"} | ({"notes.txt": "of an earlier run"} if earlier else {})
+
+
+def test_what_a_killed_run_left_goes_and_what_a_running_one_writes_stays(tmp_path):
+    with replacing(tmp_path) as running:
+        (running / "verdict.json").write_text("one")
+        killed = tmp_path / ".writing-killed"
+        killed.mkdir()
+        (killed / "details.h5").write_text("half")
+        with replacing(tmp_path) as second:
+            assert {running, second} == set(tmp_path.iterdir())
+            (second / "verdict.json").write_text("two")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"verdict.json": "one"}
 
 
 def test_usage(capsys):
@@ -215,8 +229,78 @@ def test_a_byte_order_mark_is_no_text(tmp_path):
     ],
 )
 def test_header_lines_that_look_wrong_are_told(tmp_path, line, words):
-    warnings = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD, line])).warnings
+    warnings = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD[:-1], line])).warnings
     assert [words in text for text in warnings] == ([True] if words else [])
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "words"),
+    [
+        (["# drive_ratio: 1.3"], [], "record.csv:6: 'drive_ratio' is given again, first in line 4"),
+        ([], ["# units: s, mm"], "record.csv:407: 'units' stands below"),
+        ([], ["# operator: none", "# done"], ""),
+    ],
+)
+def test_a_header_key_stands_once_and_above_the_rows(tmp_path, above, below, words):
+    path = write(tmp_path / "record.csv", *rows(), [*HEAD, *above])
+    path.write_text(path.read_text() + "\n".join(below) + "\n")
+    if words:
+        with pytest.raises(SeparatrixError, match=words):
+            read_record(path)
+    else:
+        assert read_record(path).warnings == []
+
+
+def test_rows_are_named_by_their_line_after_comments_and_empty_lines(tmp_path):
+    t, x = rows()
+    x[200] = np.nan
+    path = write(tmp_path / "record.csv", t, x)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:50], "", "# a pause", *lines[50:]]))
+    with pytest.raises(SeparatrixError, match="record.csv:209: 'x' is nan"):
+        read_record(path)
+
+
+@pytest.mark.parametrize(("separator", "point"), [(";", "."), (";", ","), ("\t", "."), ("\t", ",")])
+def test_other_separators_are_read(tmp_path, separator, point):
+    path = write(tmp_path / "record.csv", *rows())
+    wanted = read_record(path)
+    head, names, body = path.read_text().partition("t,x")
+    body = body.replace(",", separator).replace(".", point)
+    path.write_text(head + names.replace(",", separator) + body)
+    found = read_record(path)
+    assert np.array_equal(found.t, wanted.t)
+    assert np.array_equal(found.x, wanted.x)
+
+
+def test_bytes_that_are_no_text_are_taken_in_comments_only(tmp_path):
+    path = write(tmp_path / "record.csv", *rows(), ["# place: München", *HEAD])
+    wanted = read_record(path)
+    text = path.read_text()
+    path.write_bytes(text.encode("latin-1"))
+    assert np.array_equal(read_record(path).x, wanted.x)
+    path.write_bytes(text.replace("t,x", "t,x,ü").encode("latin-1"))
+    with pytest.raises(SeparatrixError, match="record.csv:7: neither HDF5 nor text in UTF-8"):
+        read_record(path)
+    path.write_bytes(text.encode("utf-16"))
+    with pytest.raises(SeparatrixError, match="UTF-16"):
+        read_record(path)
+
+
+def test_columns_that_are_not_used_are_told(tmp_path):
+    t, x = rows()
+    columns = {"t": t, "x": x, "a": 0 * t + 7, "driver_x": x}
+    said = "columns that are not used: a, driver_x"
+    assert said in make_record("record", columns).warnings
+    with h5py.File(tmp_path / "record.h5", "w") as file:
+        for name, column in columns.items():
+            file[name] = column
+    assert said in read_record(tmp_path / "record.h5").warnings
+
+
+def test_a_folder_is_no_record(tmp_path):
+    with pytest.raises(SeparatrixError, match="a folder, expected a record"):
+        read_record(tmp_path)
 
 
 @pytest.mark.parametrize("size", [0.4, -50.0])
@@ -256,10 +340,11 @@ def test_the_same_record_is_not_taken_twice(tmp_path, library, capsys):
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     before = listing(tmp_path)
-    for out in ("file", "file/sub"):
+    for out, words in (("file", "file: a file, expected a folder"), ("file/sub", "Not a directory")):
         # were it looked for, the case would be missing: 66
         assert main(["no.toml", "no.csv", "--out", str(tmp_path / out)]) == 73
-        assert str(tmp_path / "file") in capsys.readouterr().err
+        assert f"{tmp_path}/{out}" in (said := capsys.readouterr().err)
+        assert words in said
     assert main(["no.toml", "no.csv", "--out", str(tmp_path / "new" / "sub")]) == 66
     assert listing(tmp_path) == before
 
@@ -272,6 +357,20 @@ def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
     assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err.splitlines() == ["separatrix-discover: interrupted, nothing was written"]
     assert not (tmp_path / "out").exists()
+
+
+def test_a_termination_ends_with_one_line_and_leaves_nothing(tmp_path, monkeypatch, capsys):
+    """Also while results are written; the handler of the caller is put back."""
+    before = signal.getsignal(signal.SIGTERM)
+    for step in ("investigate", "write_report"):
+        monkeypatch.setattr(cli, "investigate", lambda *_: ({}, None))
+        monkeypatch.setattr(cli, "write_results", lambda folder, *_: (folder / "a").write_text("half"))
+        monkeypatch.setattr(cli, step, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+        assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 143
+        said = capsys.readouterr().err.splitlines()
+        assert said == ["separatrix-discover: terminated, nothing was written"]
+        assert not (tmp_path / "out").exists()
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 def test_the_report_has_its_share_of_the_time(capsys):

@@ -3,9 +3,12 @@
 """The command `separatrix-discover`."""
 
 import argparse
+import signal
 import sys
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -17,22 +20,47 @@ from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
 from separatrix.discovery.wording import with_error
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import INTERRUPTED, SeparatrixError
+from separatrix.errors import INTERRUPTED, TERMINATED, SeparatrixError
 from separatrix.version import __version__
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     try:
-        chosen = _parser().parse_args(arguments)
-        _run(chosen)
+        with _ending_when_told():
+            chosen = _parser().parse_args(arguments)
+            _run(chosen)
     except SeparatrixError as error:
         print(f"separatrix-discover: {error}", file=sys.stderr)
         return error.code
+    except _TerminatedError:
+        print("separatrix-discover: terminated, nothing was written", file=sys.stderr)
+        return TERMINATED
     except KeyboardInterrupt:
         print("separatrix-discover: interrupted, nothing was written", file=sys.stderr)
         return INTERRUPTED
     return 0
+
+
+class _TerminatedError(KeyboardInterrupt):
+    """SIGTERM, which ends a run as an interrupt does."""
+
+
+@contextmanager
+def _ending_when_told() -> Iterator[None]:
+    """Turn SIGTERM into an exception, so that nothing is left behind; handlers belong to the main thread."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise _TerminatedError
+
+    earlier = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)
 
 
 def _run(chosen: argparse.Namespace) -> None:
@@ -109,7 +137,7 @@ def _parser() -> Parser:
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
         epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write, "
-        "130 interrupted.",
+        "130 interrupted, 143 terminated.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

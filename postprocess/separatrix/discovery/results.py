@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is written: the verdict, the case with the effect added, the numbers behind the figures."""
 
+import fcntl
 import json
+import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -22,6 +25,7 @@ from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
 FILES = ("details.h5", "extended.toml", "report.html", "report.pdf", "verdict.json")
 """All that a run may leave in its folder."""
+_DRAFT = ".writing-"
 
 
 @contextmanager
@@ -33,7 +37,8 @@ def replacing(folder: Path) -> Iterator[Path]:
     made = [one for one in (folder, *folder.parents) if not one.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as name:
+        _remove_abandoned(folder)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=_DRAFT) as name, _locked(Path(name)):
             draft = Path(name)
             yield draft
             for file in FILES:
@@ -47,8 +52,34 @@ def replacing(folder: Path) -> Iterator[Path]:
             for one in made:
                 one.rmdir()
         if isinstance(error, OSError):
-            raise SeparatrixError(f"{folder}: {error.strerror or error}", CANNOT_CREATE) from None
+            reason = "a file, expected a folder" if folder.is_file() else error.strerror or error
+            raise SeparatrixError(f"{folder}: {reason}", CANNOT_CREATE) from None
         raise
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a lock that ends with this process, however it ends."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        # not every file system has locks
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove the drafts of runs that were killed: nobody holds their lock."""
+    for draft in folder.glob(f"{_DRAFT}*"):
+        with suppress(OSError):
+            handle = os.open(draft, os.O_RDONLY)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(draft)
+            finally:
+                os.close(handle)
 
 
 def require_writable(folder: Path) -> None:

@@ -22,6 +22,8 @@ from separatrix.discovery.options import Options
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
 
+# share of an only record that is held out, and drive periods that it has at least
+_END, _END_PERIODS = 0.3, 2.05
 _TWO_BODIES = (
     'body.law: found two bodies, allowed for a base machine "point_mass", which the driven body is in the '
     "coordinate of the driving one under a measured force (docs/discovery-guide.md, Base machines)"
@@ -50,7 +52,8 @@ def investigate(
     began = time.monotonic()
     options = options or Options()
     model = _model(base)
-    training, held_out, chosen = _split([_record(one) for one in records], [_record(one) for one in hold_out])
+    read = [[_record(one) for one in group] for group in (records, hold_out)]
+    training, held_out, chosen = _split(*read, model)
     _all_different([*training, *held_out])
     unique_names([*training, *held_out])
     still = None if rest is None else _record(rest, at_rest=True)
@@ -100,7 +103,7 @@ def _record(one: Path | Record, at_rest: bool = False) -> Record:
     return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
-def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record], list[Record], str]:
+def _split(records: list[Record], hold_out: list[Record], model) -> tuple[list[Record], list[Record], str]:
     """Training and held-out records; by default the last record, or the end of the only one."""
     if hold_out:
         return records, hold_out, "as asked for"
@@ -109,12 +112,19 @@ def _split(records: list[Record], hold_out: list[Record]) -> tuple[list[Record],
     if not records:
         raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
-    at = int(0.7 * whole.t.size)
-    return (
-        [_cut(whole, 0, at, "")],
-        [_cut(whole, at, whole.t.size, "_end")],
-        "the last 30 % of the only record",
-    )
+    at = int((1 - _END) * whole.t.size)
+    period = prepare(whole, model).period_samples
+    if period is not None:
+        # the end needs some periods too
+        latest = whole.t[-1] - _END_PERIODS * period * whole.interval
+        at = min(at, max(whole.t.size // 2, int(np.searchsorted(whole.t, latest, "right")) - 1))
+    share = f"{100 * (1 - at / whole.t.size):.0f} %"
+    first, end = _cut(whole, 0, at, ""), _cut(whole, at, whole.t.size, "_end")
+    first.part = f", all but the last {share}, which are held out"
+    end.part = f", the last {share}, which are held out"
+    # they name file and row
+    end.warnings = []
+    return [first], [end], f"the last {share} of the only record"
 
 
 def _all_different(records: list[Record]) -> None:
@@ -134,7 +144,7 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
     ]
     channels = {
         name: None if getattr(record, name) is None else getattr(record, name)[part]
-        for name in ("v", "a", "force", "phi")
+        for name in ("v", "force", "phi")
     }
     header = dict(record.header)
     if first and "phase" in header:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from separatrix.discovery.measured.records import Record, resolution_of
+from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.signals import resolution_of, white_noise
 from separatrix.errors import SeparatrixError
 
-# variance of fourth differences of white noise of variance 1
-_FOURTH = 70.0
+# noise that is taken where there is none, over the scatter of x or v
+_QUIET = 1e-6
 _FEWEST_PER_PERIOD = 12
 _FEWEST_PERIODS = 2.0
 # largest difference of the intervals of two pieces, over the interval, with a measured force
@@ -59,6 +60,11 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     sigma = _noise(record, rest, resolution, notes)
     if np.std(record.x) < 5 * sigma:
+        if rest is not None:
+            raise SeparatrixError(
+                f"{rest.file}: x scatters by {sigma:.3g} m, in {record.file} by {np.std(record.x):.3g} m: "
+                "not a record at rest"
+            )
         raise SeparatrixError(
             f"{record.file}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
             "nothing but noise"
@@ -72,17 +78,11 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
         origin=record.header.get("phase_origin_s", float(record.t[0])),
     )
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
-    prepared.sigma_stated = rest is not None or "sensor_noise_sigma_m" in record.header
-    prepared.velocity_sigma_stated = "sensor_noise_sigma_m_s" in record.header
+    prepared.sigma_stated = rest is not None or bool(record.header.get("sensor_noise_sigma_m"))
+    prepared.velocity_sigma_stated = bool(record.header.get("sensor_noise_sigma_m_s"))
     _find_drive(prepared, model)
     _check_size(prepared, model)
     return prepared
-
-
-def white_noise(x: np.ndarray) -> float:
-    """Standard deviation of the white noise of a smooth, well sampled signal, from its fourth differences."""
-    fourth = np.diff(x, 4)
-    return float(1.4826 * np.median(np.abs(fourth - np.median(fourth))) / np.sqrt(_FOURTH))
 
 
 def _noise(record: Record, rest: Record | None, resolution: float, notes: list[str]) -> float:
@@ -91,14 +91,16 @@ def _noise(record: Record, rest: Record | None, resolution: float, notes: list[s
     if rest is not None:
         drift = np.polyval(np.polyfit(rest.t, rest.x, 1), rest.t)
         sigma = float(np.std(rest.x - drift))
-    elif stated is not None:
+    elif stated:
         sigma = float(np.hypot(stated, floor))
     else:
         sigma = white_noise(record.x)
         notes.append(f"noise {sigma:.3g} m, from fourth differences of x")
     sigma = max(sigma, floor)
-    if sigma <= 0:
-        sigma = 1e-6 * float(np.std(record.x))
+    # a record that says that it has no noise was computed
+    least = _QUIET * float(np.std(record.x))
+    if sigma <= (least if stated == 0 else 0):
+        sigma = least
         notes.append(f"no noise found: {sigma:.3g} m is taken")
     return sigma
 
@@ -109,7 +111,7 @@ def _velocity_noise(record: Record) -> float:
     stated = record.header.get("sensor_noise_sigma_m_s")
     if stated:
         return stated
-    return max(white_noise(record.v), resolution_of(record.v) / np.sqrt(12), 1e-6 * float(np.std(record.v)))
+    return max(white_noise(record.v), resolution_of(record.v) / np.sqrt(12), _QUIET * float(np.std(record.v)))
 
 
 def _find_drive(prepared: Prepared, model) -> None:
@@ -146,7 +148,8 @@ def _find_drive(prepared: Prepared, model) -> None:
     periods = record.duration / record.interval / samples
     if periods < _FEWEST_PERIODS:
         raise SeparatrixError(
-            f"{record.file}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} are needed"
+            f"{record.file}{record.part}: {periods:.2f} drive periods, "
+            f"at least {_FEWEST_PERIODS:g} are needed"
         )
 
 

@@ -65,7 +65,9 @@ def _calm(smooth: Smoothed) -> np.ndarray:
 
 
 def _cut_piece(first: int, last: int, length: int, calm: np.ndarray) -> list[tuple[int, int]]:
-    starts = [first + int(np.argmax(calm[first : first + max(2, length // 4)] > _SLOW))]
+    # a piece between gaps may be much shorter
+    within = min(max(2, length // 4), (last - first) // 2)
+    starts = [first + int(np.argmax(calm[first : first + within] > _SLOW))]
     reach = max(1, length // 3)
     while last - starts[-1] > 1.5 * length:
         aim = starts[-1] + length

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Time stamps of a record: gaps, and stamps that scatter about the times of sampling."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from separatrix.errors import SeparatrixError
+
+_GAP = 1.5
+# shortest stretch that is fitted
+_FEWEST_IN_PIECE = 12
+# usual deviation of the steps of time from their median from which stamps are called uneven
+_UNEVEN = 0.01
+# rows on either side of an uneven step that tell a lost sample from a late stamp
+_AROUND = 7
+_LATE, _LOST = 1.25, 2.0
+
+
+def pieces_of(
+    t: np.ndarray, x: np.ndarray, fewest: int, where: Callable[[int], str], warnings: list[str]
+) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Times of the samples, and the stretches without gaps as (first, last + 1).
+
+    Stamps that scatter while the motion does not follow them are those of the computer and not of the sensor:
+    the samples were taken at even times. `fewest` samples must lie in stretches that can be fitted.
+    """
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    whole = steps[steps < _GAP * usual]
+    uneven = float(np.quantile(np.abs(whole / usual - 1), 0.9)) > _UNEVEN
+    gaps = _lost(t, steps, float(whole.mean())) if uneven else np.flatnonzero(steps > _GAP * usual) + 1
+    pieces = list(pairwise([0, *gaps.tolist(), t.size]))
+    for row in gaps[:3]:
+        warnings.append(f"{where(row)}: gap of {t[row] - t[row - 1]:.4g} s; nothing is fitted across it")
+    if gaps.size > 3:
+        warnings.append(f"{gaps.size - 3} more gaps")
+    long = sum(last - first for first, last in pieces if last - first >= _FEWEST_IN_PIECE)
+    if long < fewest:
+        raise SeparatrixError(
+            f"{where(int(gaps[0]) if gaps.size else 0)}: gaps leave {long} samples in stretches of at least "
+            f"{_FEWEST_IN_PIECE}, {fewest} are needed"
+        )
+    if uneven:
+        t = _evened(t, x, pieces, where, warnings)
+    return t, pieces
+
+
+def _lost(t: np.ndarray, steps: np.ndarray, usual: float) -> np.ndarray:
+    """Rows after a gap where stamps scatter: all later ones are late, not one alone."""
+    late = t - usual * np.arange(t.size)
+    rows = np.flatnonzero(steps > _LATE * usual) + 1
+    jumps = np.array(
+        [late[row : row + _AROUND].mean() - late[max(0, row - _AROUND) : row].mean() for row in rows]
+    )
+    found = []
+    for row, jump in zip(rows, jumps, strict=True):
+        largest = jump == jumps[np.abs(rows - row) < _AROUND].max()
+        if steps[row - 1] > _LOST * usual or (jump > 0.5 * usual and largest):
+            found.append(row)
+    return np.array(found, int)
+
+
+def _evened(t: np.ndarray, x: np.ndarray, pieces, where, warnings: list[str]) -> np.ndarray:
+    """Even times within the pieces, where x says that the samples were taken at these."""
+    index = np.arange(t.size)
+    above = below = 0.0
+    for first, last in pieces:
+        centred = index[first:last] - index[first:last].mean()
+        above += float(centred @ t[first:last])
+        below += float(centred @ centred)
+    interval = above / below
+    even = interval * index
+    for first, last in pieces:
+        even[first:last] += np.mean(t[first:last] - even[first:last])
+    late = t - even
+    follows, error = _followed(x, late, interval, pieces)
+    row = int(np.argmax(np.abs(late)))
+    said = f"{where(row)}: t is {abs(late[row]):.3g} s off even steps, {np.std(late):.3g} s is usual"
+    if follows + 2 * error < 0.5:
+        warnings.append(f"{said}; x does not follow: even times are taken")
+        return even
+    if follows - 2 * error > 0.5:
+        warnings.append(f"{said}, and x follows: noise and impacts are found less well")
+    return t
+
+
+def _followed(x: np.ndarray, late: np.ndarray, interval: float, pieces) -> tuple[float, float]:
+    """How far x is ahead where a stamp is late, over speed times delay: 1 for true times, 0 for stamps that
+    scatter; and its standard error.
+    """
+    delays, places = [], []
+    for first, last in pieces:
+        if last - first >= _FEWEST_IN_PIECE:
+            speed = np.gradient(x[first:last])[2:-2] / interval
+            delays.append(speed * np.diff(late[first:last], 4))
+            places.append(np.diff(x[first:last], 4))
+    delay, place = np.concatenate(delays), np.concatenate(places)
+    # impacts
+    most = 5 * 1.4826 * float(np.median(np.abs(place)))
+    place = np.clip(place, -most, most)
+    size = float(delay @ delay)
+    if size == 0:
+        return 0.5, np.inf
+    slope = float(delay @ place) / size
+    # fourth differences of neighbours are correlated
+    return slope, 2 * float(np.std(place - slope * delay)) / np.sqrt(size)

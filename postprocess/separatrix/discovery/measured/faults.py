@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faults of a sensor that no motion makes: stray samples, values that are held, clipping."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from separatrix.discovery.measured.signals import resolution_of, runs, white_noise
+from separatrix.errors import SeparatrixError
+
+Where = Callable[[int], str]
+
+# distance of a stray sample from where its neighbours lead: over the noise, the grid, and over the changes of
+# the steps around it, of which an impact makes a third at most
+_STRAY = (20.0, 5.0, 3.0)
+# rows on either side that show how fast steps change
+_AROUND = 5
+_MOST_STRAY = 3
+# least noise, over the scatter of x
+_QUIET = 1e-6
+# a held value ends with a jump: over the noise, the grid, and the usual steps before and after
+_HELD = (20.0, 3.0, 2.0)
+_SHORTEST_HELD = 3
+# usual jump of a sensor that is slower than the record, over the distance of its values
+_SLOW = 3.0
+_CLIPPED_RUN = 5
+_CLIPPED_SHARE = 0.02
+# step to and from a clipped value on a grid, over the grid: a turning point is reached level by level
+_ABRUPT = 1.5
+
+
+def left_out(t: np.ndarray, x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
+    """Rows of samples that say nothing on the motion, told in `warnings`; too many are refused."""
+    _check_rate(x, where)
+    held = _held(x, where, warnings)
+    rows = np.setdiff1d(np.arange(x.size), held)
+    return np.union1d(held, rows[_stray(t[rows], x[rows], lambda row: where(rows[row]), warnings)])
+
+
+def _check_rate(x: np.ndarray, where: Where) -> None:
+    """Refuse a record that repeats each value of a slower sensor; a coarse grid is no such thing."""
+    steps = np.diff(x)
+    changes = np.flatnonzero(steps)
+    if changes.size < 2:
+        return
+    apart = float(np.median(np.diff(changes)))
+    spacing = max(resolution_of(x), float(np.median(np.diff(np.unique(x)))))
+    if apart >= 2 and np.median(np.abs(steps[changes])) > _SLOW * spacing:
+        raise SeparatrixError(
+            f"{where(int(changes[0]) + 1)}: x changes in one of {apart:g} rows only, in jumps: "
+            "keep one row for each value of the sensor"
+        )
+
+
+def _stray(t: np.ndarray, x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
+    """Single samples that lie where no motion leads: away from a smooth line through two on either side."""
+    off = np.zeros(x.size)
+    off[2:-2] = x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6
+    steps = np.diff(x)
+    bend = np.full(x.size, np.inf)
+    bend[2:-2] = np.abs(steps[3:] - steps[:-3])
+    second = np.pad(np.abs(np.diff(x, 2)), _AROUND + 1)
+    for shift in range(2, _AROUND + 1):
+        for side in (-shift, shift):
+            bend = np.maximum(bend, second[_AROUND + side : _AROUND + side + x.size])
+    # across a gap the samples are no neighbours
+    wide = np.flatnonzero(np.diff(t) > 1.5 * np.median(np.diff(t)))
+    for shift in range(-1, 3):
+        bend[np.clip(wide + shift, 0, x.size - 1)] = np.inf
+    least = max(_STRAY[0] * max(white_noise(x), _QUIET * float(np.std(x))), _STRAY[1] * resolution_of(x))
+    size = np.abs(off)
+    rows = np.flatnonzero((size > least) & (size > _STRAY[2] * bend))
+    said = [
+        f"{where(row)}: x is {x[row]:.6g} m between {x[row - 1]:.6g} and {x[row + 1]:.6g} m" for row in rows
+    ]
+    if rows.size > _MOST_STRAY:
+        raise SeparatrixError(f"{said[0]}; {rows.size} such samples: clean the record")
+    warnings += [f"{text}: left out" for text in said]
+    return rows
+
+
+def _held(x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
+    """Samples that repeat one before them, until the motion goes on elsewhere."""
+    least = max(_HELD[0] * white_noise(x), _HELD[1] * resolution_of(x))
+    found = []
+    for first, last in runs(np.diff(x) == 0):
+        last += 1
+        if last - first < _SHORTEST_HELD or first < 1 or last > x.size - 2:
+            continue
+        around = max(abs(x[first] - x[first - 1]), abs(x[last + 1] - x[last]))
+        if abs(x[last] - x[first]) > max(least, _HELD[2] * around):
+            found.append((first, last))
+    for first, last in found[:3]:
+        warnings.append(
+            f"{where(first)}: x stays at {x[first]:.6g} m for {last - first} samples, then jumps to "
+            f"{x[last]:.6g} m: left out"
+        )
+    if len(found) > 3:
+        warnings.append(f"{len(found) - 3} more stretches of held values: left out")
+    return np.concatenate([np.arange(first + 1, last) for first, last in found] or [np.zeros(0, int)])
+
+
+def check_clipping(x: np.ndarray, where: Where, warnings: list[str]) -> None:
+    """Runs of exactly the extreme value; a coarse resolution makes such runs by itself at turning points."""
+    grid = resolution_of(x)
+    for name, extreme in (("largest", x.max()), ("smallest", x.min())):
+        long = [
+            (first, last)
+            for first, last in runs(x == extreme)
+            if last - first >= _CLIPPED_RUN and _is_abrupt(x, first, last, _ABRUPT * grid)
+        ]
+        if not long:
+            continue
+        share = sum(last - first for first, last in long) / x.size
+        message = (
+            f"{where(long[0][0])}: x stays at its {name} value {extreme:.6g} m for {len(long)} stretches"
+        )
+        if len(long) >= 2 and share > _CLIPPED_SHARE:
+            raise SeparatrixError(f"{message}, {100 * share:.0f} % of the samples: clipped")
+        warnings.append(f"{message}: clipped?")
+
+
+def _is_abrupt(x: np.ndarray, first: int, last: int, least: float) -> bool:
+    """Whether a run begins and ends with a step of more than `least`, as far as it does within the record."""
+    before = first == 0 or abs(x[first] - x[first - 1]) > least
+    after = last == x.size or abs(x[last] - x[last - 1]) > least
+    return before and after

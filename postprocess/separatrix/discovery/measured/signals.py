@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Noise and resolution of a sampled signal, from its values alone."""
+
+import numpy as np
+
+# variance of fourth differences of white noise of variance 1
+_FOURTH = 70.0
+# deviation of a multiple of the step of a grid from a whole number
+_OFF_GRID = 0.05
+# a grid much finer than the noise is that of the digits in the file
+_FINE = 0.3
+
+
+def white_noise(x: np.ndarray) -> float:
+    """Standard deviation of the white noise of a smooth, well sampled signal, from its fourth differences."""
+    fourth = np.diff(x, 4)
+    return float(1.4826 * np.median(np.abs(fourth - np.median(fourth))) / np.sqrt(_FOURTH))
+
+
+def resolution_of(x: np.ndarray) -> float:
+    """The step of the grid that the values lie on [m], 0 if there is none."""
+    levels = np.unique(x)
+    if levels.size < 2:
+        return 0.0
+    steps = np.diff(levels)
+    step = float(steps.min())
+    if step <= 1e-12 * np.abs(x).max():
+        return 0.0
+    # of all single steps, because each may be rounded in the file
+    step = float(np.mean(steps[steps < 1.5 * step]))
+    multiple = steps / step
+    off = np.abs(multiple - np.round(multiple))
+    if levels.size <= 0.5 * x.size:
+        return step if np.all(off < _OFF_GRID * np.maximum(1, multiple)) else 0.0
+    return step if np.all(off < _OFF_GRID) and step > _FINE * white_noise(x) else 0.0
+
+
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Stretches of flags that are set, as (first, last + 1)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

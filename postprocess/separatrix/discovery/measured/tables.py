@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tables of numbers with a header of keys, from CSV or HDF5."""
+
+import codecs
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.trial import try_first
+
+CHANNELS = ("x", "v", "force", "phi")
+"""Columns that are used, next to `t`."""
+NUMBERS = {
+    "sampling_rate_hz",
+    "sensor_noise_sigma_m",
+    "sensor_noise_sigma_m_s",
+    "sensor_resolution_m",
+    "sensor_delay_s",
+    "drive_ratio",
+    "drive_frequency_rad_s",
+    "drive_scale",
+    "x0_m",
+    "v0_m_s",
+    "phase",
+}
+"""Header keys with one number."""
+KEYS = NUMBERS | {"units"}
+"""All header keys that mean something."""
+
+
+@dataclass
+class Table:
+    """Texts of the header, columns by name, and the line of each row where the file has lines."""
+
+    header: dict[str, str]
+    columns: dict[str, np.ndarray]
+    lines: np.ndarray | None = None
+    unused: list[str] = field(default_factory=list)
+
+
+def read_table(path: Path) -> Table:
+    """Read one file; what cannot be read is refused with the line and the reason."""
+    if path.is_dir():
+        raise SeparatrixError(f"{path}: a folder, expected a record (CSV or HDF5)", NO_INPUT)
+    if not path.is_file():
+        raise SeparatrixError(f"{path}: no such file", NO_INPUT)
+    with path.open("rb") as file:
+        is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
+    return _read_hdf5(path) if is_hdf5 else _read_csv(path)
+
+
+def _read_csv(path: Path) -> Table:
+    header: dict[str, str] = {}
+    stands: dict[str, int] = {}
+    names: list[str] | None = None
+    separator = ","
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    for number, line in enumerate(_lines(path), start=1):
+        text = line.strip(" \r\n")
+        if not text.strip():
+            continue
+        if text.startswith("#"):
+            key, colon, value = (word.strip() for word in text[1:].partition(":"))
+            if not colon:
+                continue
+            if key in KEYS:
+                _check_place(path, number, key, stands, names is not None)
+            if names is None:
+                header[key], stands[key] = value, number
+            continue
+        _check_encoding(path, number, text)
+        if names is None:
+            separator = next((mark for mark in ";\t" if mark in text), ",")
+            names = _names(path, number, text, separator)
+        else:
+            lines.append(number)
+            rows.append(_numbers(path, number, text, separator, len(names)))
+    if names is None or not rows:
+        raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
+    table = np.array(rows)
+    return Table(header, {name: table[:, i].copy() for i, name in enumerate(names)}, np.array(lines))
+
+
+def _lines(path: Path) -> list[str]:
+    """Lines of a text; bytes that are no UTF-8 are kept, because comments may hold anything."""
+    content = path.read_bytes()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise SeparatrixError(f"{path}: text in UTF-16, expected UTF-8")
+    text = content.removeprefix(codecs.BOM_UTF8).decode("utf-8", errors="surrogateescape")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _check_encoding(path: Path, number: int, text: str) -> None:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise SeparatrixError(f"{path}:{number}: neither HDF5 nor text in UTF-8") from None
+
+
+def _check_place(path: Path, number: int, key: str, stands: dict[str, int], below: bool) -> None:
+    """A key says what holds for all rows: it stands above them, and once."""
+    if below:
+        raise SeparatrixError(f"{path}:{number}: '{key}' stands below the row of names, expected above it")
+    if key in stands:
+        raise SeparatrixError(f"{path}:{number}: '{key}' is given again, first in line {stands[key]}")
+
+
+def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
+    names = [name.strip() for name in text.split(separator)]
+    if "t" not in names or "x" not in names:
+        raise SeparatrixError(f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]'")
+    if len(set(names)) != len(names):
+        raise SeparatrixError(f"{path}:{number}: a column is named twice in '{text}'")
+    return names
+
+
+def _numbers(path: Path, number: int, text: str, separator: str, count: int) -> list[float]:
+    words = text.split(separator)
+    if len(words) != count:
+        raise SeparatrixError(f"{path}:{number}: {len(words)} values for {count} columns")
+    if separator != ",":
+        # a comma can only be that of decimals
+        words = [word.replace(",", ".") for word in words]
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        raise SeparatrixError(f"{path}:{number}: '{text}' is not a row of numbers") from None
+
+
+def _read_hdf5(path: Path) -> Table:
+    try_first(path, lambda: _texts(h5py.File(path)))
+    try:
+        with h5py.File(path) as file:
+            header, units = _texts(file)
+            columns = {
+                name: np.asarray(file[name][()], float)
+                for name in ("t", *CHANNELS)
+                if isinstance(file.get(name), h5py.Dataset)
+            }
+            unused = sorted(set(file) - columns.keys())
+    except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise SeparatrixError(f"{path}: not a record that can be read: {error}") from None
+    missing = [name for name in ("t", "x") if name not in columns]
+    if missing:
+        raise SeparatrixError(f"{path}: dataset '{missing[0]}' is missing")
+    if len({column.shape for column in columns.values()}) != 1 or columns["t"].ndim != 1:
+        raise SeparatrixError(f"{path}: the datasets are not equally long lists")
+    if len(units) == 2:
+        header.setdefault("units", ", ".join(units))
+    return Table(header, columns, unused=unused)
+
+
+def _texts(file: h5py.File) -> tuple[dict[str, str], list[str]]:
+    header = {key: _text(value) for key, value in file.attrs.items()}
+    found = [file[name].attrs for name in ("t", "x") if name in file]
+    return header, [_text(attributes["units"]) for attributes in found if "units" in attributes]
+
+
+def _text(value: object) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
