@@ -378,3 +378,15 @@ def test_the_report_has_its_share_of_the_time(capsys):
     progress.began -= 67.0
     progress("writing the report", 0.9)
     assert "about 33 s left" in capsys.readouterr().err
+
+
+def test_an_angle_is_told_in_rad():
+    t = np.arange(400) / 100
+    x = 20 * np.cos(3 * t)
+    x[150] += 10
+    (said,) = [
+        note
+        for note in make_record("r", {"t": t, "x": x}, {"units": "s, deg"}).warnings
+        if "left out" in note
+    ]
+    assert f"x is {np.radians(x[150]):.6g} rad between" in said

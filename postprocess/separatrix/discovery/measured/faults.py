@@ -30,12 +30,13 @@ _CLIPPED_SHARE = 0.02
 _ABRUPT = 1.5
 
 
-def left_out(t: np.ndarray, x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
+def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
     """Rows of samples that say nothing on the motion, told in `warnings`; too many are refused."""
     _check_rate(x, where)
-    held = _held(x, where, warnings)
+    held = _held(x, unit, where, warnings)
     rows = np.setdiff1d(np.arange(x.size), held)
-    return np.union1d(held, rows[_stray(t[rows], x[rows], lambda row: where(rows[row]), warnings)])
+    stray = _stray(t[rows], x[rows], unit, lambda row: where(rows[row]), warnings)
+    return np.union1d(held, rows[stray])
 
 
 def _check_rate(x: np.ndarray, where: Where) -> None:
@@ -53,7 +54,7 @@ def _check_rate(x: np.ndarray, where: Where) -> None:
         )
 
 
-def _stray(t: np.ndarray, x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
+def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
     """Single samples that lie where no motion leads: away from a smooth line through two on either side."""
     off = np.zeros(x.size)
     off[2:-2] = x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6
@@ -72,7 +73,8 @@ def _stray(t: np.ndarray, x: np.ndarray, where: Where, warnings: list[str]) -> n
     size = np.abs(off)
     rows = np.flatnonzero((size > least) & (size > _STRAY[2] * bend))
     said = [
-        f"{where(row)}: x is {x[row]:.6g} m between {x[row - 1]:.6g} and {x[row + 1]:.6g} m" for row in rows
+        f"{where(row)}: x is {x[row]:.6g} {unit} between {x[row - 1]:.6g} and {x[row + 1]:.6g} {unit}"
+        for row in rows
     ]
     if rows.size > _MOST_STRAY:
         raise SeparatrixError(f"{said[0]}; {rows.size} such samples: clean the record")
@@ -80,7 +82,7 @@ def _stray(t: np.ndarray, x: np.ndarray, where: Where, warnings: list[str]) -> n
     return rows
 
 
-def _held(x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
+def _held(x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
     """Samples that repeat one before them, until the motion goes on elsewhere."""
     least = max(_HELD[0] * white_noise(x), _HELD[1] * resolution_of(x))
     found = []
@@ -93,15 +95,15 @@ def _held(x: np.ndarray, where: Where, warnings: list[str]) -> np.ndarray:
             found.append((first, last))
     for first, last in found[:3]:
         warnings.append(
-            f"{where(first)}: x stays at {x[first]:.6g} m for {last - first} samples, then jumps to "
-            f"{x[last]:.6g} m: left out"
+            f"{where(first)}: x stays at {x[first]:.6g} {unit} for {last - first} samples, then jumps to "
+            f"{x[last]:.6g} {unit}: left out"
         )
     if len(found) > 3:
         warnings.append(f"{len(found) - 3} more stretches of held values: left out")
     return np.concatenate([np.arange(first + 1, last) for first, last in found] or [np.zeros(0, int)])
 
 
-def check_clipping(x: np.ndarray, where: Where, warnings: list[str]) -> None:
+def check_clipping(x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> None:
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself at turning points."""
     grid = resolution_of(x)
     for name, extreme in (("largest", x.max()), ("smallest", x.min())):
@@ -114,7 +116,7 @@ def check_clipping(x: np.ndarray, where: Where, warnings: list[str]) -> None:
             continue
         share = sum(last - first for first, last in long) / x.size
         message = (
-            f"{where(long[0][0])}: x stays at its {name} value {extreme:.6g} m for {len(long)} stretches"
+            f"{where(long[0][0])}: x stays at its {name} value {extreme:.6g} {unit} for {len(long)} stretches"
         )
         if len(long) >= 2 and share > _CLIPPED_SHARE:
             raise SeparatrixError(f"{message}, {100 * share:.0f} % of the samples: clipped")

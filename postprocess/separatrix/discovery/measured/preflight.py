@@ -8,6 +8,7 @@ import numpy as np
 
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
 
 # noise that is taken where there is none, over the scatter of x or v
@@ -58,15 +59,16 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
         _check_velocity(record, notes)
     record = _with_its_force(record, model, notes)
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
-    sigma = _noise(record, rest, resolution, notes)
+    unit = units_of(model.parameters).position
+    sigma = _noise(record, rest, resolution, unit, notes)
     if np.std(record.x) < 5 * sigma:
         if rest is not None:
             raise SeparatrixError(
-                f"{rest.file}: x scatters by {sigma:.3g} m, in {record.file} by {np.std(record.x):.3g} m: "
-                "not a record at rest"
+                f"{rest.file}: x scatters by {sigma:.3g} {unit}, in {record.file} by {np.std(record.x):.3g} "
+                f"{unit}: not a record at rest"
             )
         raise SeparatrixError(
-            f"{record.file}: x scatters by {np.std(record.x):.3g} m at a noise of {sigma:.3g} m: "
+            f"{record.file}: x scatters by {np.std(record.x):.3g} {unit} at a noise of {sigma:.3g} {unit}: "
             "nothing but noise"
         )
     prepared = Prepared(
@@ -85,7 +87,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     return prepared
 
 
-def _noise(record: Record, rest: Record | None, resolution: float, notes: list[str]) -> float:
+def _noise(record: Record, rest: Record | None, resolution: float, unit: str, notes: list[str]) -> float:
     floor = resolution / np.sqrt(12)
     stated = record.header.get("sensor_noise_sigma_m")
     if rest is not None:
@@ -95,13 +97,13 @@ def _noise(record: Record, rest: Record | None, resolution: float, notes: list[s
         sigma = float(np.hypot(stated, floor))
     else:
         sigma = white_noise(record.x)
-        notes.append(f"noise {sigma:.3g} m, from fourth differences of x")
+        notes.append(f"noise {sigma:.3g} {unit}, from fourth differences of x")
     sigma = max(sigma, floor)
     # a record that says that it has no noise was computed
     least = _QUIET * float(np.std(record.x))
     if sigma <= (least if stated == 0 else 0):
         sigma = least
-        notes.append(f"no noise found: {sigma:.3g} m is taken")
+        notes.append(f"no noise found: {sigma:.3g} {unit} is taken")
     return sigma
 
 
@@ -223,10 +225,12 @@ def _check_size(prepared: Prepared, model) -> None:
     sizes = [size for size in sizes if 0 < size < 1e100]
     if prepared.frequency is None or not sizes:
         return
+    unit = units_of(model.parameters).position
     spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
     if not 1 / _MOST_RATIO < spread / expected < _MOST_RATIO:
         raise SeparatrixError(
-            f"{prepared.record.file}: x ranges over {spread:.3g} m, the machine over {expected:.3g} m: "
+            f"{prepared.record.file}: x ranges over {spread:.3g} {unit}, the machine over "
+            f"{expected:.3g} {unit}: "
             "wrong units, or a record of another machine"
         )
     for path, sign in (("contact.upper", 1), ("contact.lower", -1)):
@@ -237,8 +241,8 @@ def _check_size(prepared: Prepared, model) -> None:
         if np.median(beyond) > 0:
             row = int(np.argmax(beyond))
             raise SeparatrixError(
-                f"{prepared.record.file}: x lies beyond {path} = {barrier.value:g} m most of the time "
-                f"(row {row + 1}: {prepared.record.x[row]:g} m): a record of another machine"
+                f"{prepared.record.file}: x lies beyond {path} = {barrier.value:g} {unit} most of the time "
+                f"(row {row + 1}: {prepared.record.x[row]:g} {unit}): a record of another machine"
             )
 
 
@@ -264,7 +268,8 @@ def _check_velocity(record: Record, notes: list[str]) -> None:
     # noise of either one moves the ratio by no more than the correlation
     if not overlap[best] / _UNIT < ratio < _UNIT / overlap[best]:
         raise SeparatrixError(
-            f"{record.file}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s"
+            f"{record.file}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s, of an "
+            "angle in rad/s"
         )
     if shifts[best]:
         notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")

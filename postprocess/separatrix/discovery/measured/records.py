@@ -17,6 +17,7 @@ from separatrix.errors import SeparatrixError
 
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3}
+_ANGLES = ("rad", "deg", "mrad")
 _FEWEST_SAMPLES = 60
 # likeness of a header key to a known one that makes it a misspelling
 _NEAR = 0.7
@@ -78,7 +79,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     warnings: list[str] = []
     numbers = _header_numbers(path, header, warnings)
     _doubt_header(header, numbers, warnings)
-    _scale(path, header, columns, warnings)
+    unit = _scale(path, header, columns, warnings)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -96,7 +97,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     if not at_rest:
         if np.ptp(x) == 0:
             raise SeparatrixError(f"{path}: 'x' is constant")
-        kept = np.delete(kept, left_out(t, x, where, warnings))
+        kept = np.delete(kept, left_out(t, x, unit, where, warnings))
         columns = {name: column[kept] for name, column in columns.items()}
         x = columns["x"]
     t, pieces = pieces_of(columns["t"], x, _FEWEST_SAMPLES, where, warnings)
@@ -107,7 +108,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
             f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
     if not at_rest:
-        check_clipping(x, where, warnings)
+        check_clipping(x, unit, where, warnings)
     unused = [name for name in columns if name not in ("t", *CHANNELS)] + table.unused
     if unused:
         warnings.append(f"columns that are not used: {', '.join(unused)}")
@@ -145,11 +146,11 @@ def _doubt_header(header: dict[str, str], numbers: dict[str, float], warnings: l
         warnings.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
 
 
-def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> None:
-    """Turn time and position into s and m; the other channels and the header are in SI."""
+def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> str:
+    """Turn time and position into SI, as the other channels and the header are; return the unit of x."""
     if "units" not in header:
         warnings.append("no 'units': read as s, m")
-        return
+        return "m"
     words = [word.strip() for word in header["units"].split(",")]
     if len(words) < 2 or words[0] not in _TIME or words[1] not in _LENGTH:
         raise SeparatrixError(
@@ -158,6 +159,7 @@ def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], w
         )
     columns["t"] = columns["t"] * _TIME[words[0]]
     columns["x"] = columns["x"] * _LENGTH[words[1]]
+    return "rad" if words[1] in _ANGLES else "m"
 
 
 def unique_names(records: Iterable[Record]) -> None:
