@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("library")
 RATIOS = {"first": 0.8, "second": 1.25, "held_out": 0.95}
 
 
-def records(separatrix: Path, folder: Path, effect: str) -> list[Path]:
+def records(separatrix: Path, folder: Path, effect: str, noise: str = "1 mm") -> list[Path]:
     """Records of the machine with an effect, at three frequencies; the base case beside them."""
     (folder / "base.toml").write_text(CASE)
     (folder / "true.toml").write_text(CASE + effect)
@@ -30,7 +30,7 @@ def records(separatrix: Path, folder: Path, effect: str) -> list[Path]:
         settings = (
             f"drive.ratio={ratio}",
             "run.duration=9",
-            f'record={{rate=200, noise="1 mm", seed={seed}}}',
+            f'record={{rate=200, noise="{noise}", seed={seed}}}',
         )
         words = [word for setting in settings for word in ("--set", setting)]
         succeed(separatrix, "trajectory", "true.toml", "--force", "--record", path, *words, folder=folder)
@@ -93,6 +93,18 @@ def test_nothing_is_found_where_nothing_is_and_twice_the_same(separatrix, tmp_pa
     for one in (verdict, again):
         del one["runtime_s"]
     assert again == verdict
+
+
+def test_noise_that_nobody_states_is_that_of_the_sensor_and_hides_no_gap(separatrix, tmp_path):
+    made = records(separatrix, tmp_path, "[effect.viscous]\ndamping = 0.6\n", "20 um")[:1]
+    text = made[0].read_text()
+    made[0].write_text("\n".join(line for line in text.splitlines() if "sensor_noise" not in line))
+    arguments = [str(tmp_path / "base.toml"), str(made[0]), "--out", str(tmp_path / "out"), "-q"]
+    assert main([*arguments, "--effects", "viscous,restitution_slope", "--quick"]) == 0
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert verdict["effects"] == ["viscous"]
+    assert [one["sigma"] for one in verdict["records"]] == pytest.approx([2e-5, 2e-5], rel=0.25)
+    assert 0.7 < verdict["gap"]["held_out"]["after"] < 1.4
 
 
 def test_effects_that_are_one_motion_are_reported_together(separatrix, tmp_path):

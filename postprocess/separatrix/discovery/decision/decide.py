@@ -18,7 +18,7 @@ from separatrix.discovery.decision.judge import (
 )
 from separatrix.discovery.decision.misfit import missed
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
-from separatrix.discovery.fitting.base import copy_noise, renew_noise
+from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import minimise
@@ -124,10 +124,12 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
     if best is None:
         return None
     changed = renew_noise(bench.training, best.fitted.problem, best.fitted.fit, bench.scales.mass)
-    if bench.held_out is not None and best.prediction is not None and changed:
-        held = best.prediction
-        renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
-        copy_noise(bench.training, bench.held_out)
+    if bench.held_out is not None and best.prediction is not None:
+        if changed:
+            held = best.prediction
+            renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
+            copy_noise(bench.training, bench.held_out)
+        changed |= limit_noise(bench.training, bench.held_out)
     fits = [minimise(base.problem, base.fit.values, base.fit.starts, patient=True)]
     for one in lowest_misfit:
         values = shared_values(base, one.fitted)

@@ -10,12 +10,15 @@ from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nu
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.measured.signals import white_noise
 
 _PHASES = 12
 _RENEWED = 0.03
 _RENEWED_MEMORY = 0.06
 # reduced chi^2 above which correlated residuals say more about the model than about the noise
 _MISFIT = 1.5
+# noise of a held-out record over what the sensor of the training records would leave there
+_SAME_SENSOR = 1.5
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
@@ -108,6 +111,20 @@ def find_phases(data: Data, model, free: list[Free]) -> None:
         one.phase = phase
     for place, i in enumerate(missing):
         data.prepared[i].phase = float(best[place] * 2 * np.pi / _PHASES)
+
+
+def limit_noise(source: Data, target: Data) -> bool:
+    """Give records far noisier than those that are fitted the noise of the same sensor; whether any was.
+
+    Where the base machine lacks an effect it hides in the noise of records too short to measure it again.
+    """
+    shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.record.x)) > 0]
+    limited = False
+    for one in target.prepared if shares else ():
+        sensor = max(max(shares) * white_noise(one.record.x), one.resolution / np.sqrt(12))
+        if not one.sigma_stated and one.sigma > _SAME_SENSOR * sensor > 0:
+            one.sigma, limited = sensor, True
+    return limited
 
 
 def copy_noise(source: Data, target: Data) -> None:
