@@ -47,7 +47,19 @@ def test_impacts_pulses_and_rest_are_no_faults():
     for motion in (x, shaken, resting, bouncing(sigma=0.0)[1]):
         record = of(t, motion)
         assert np.array_equal(record.t, t)
-        assert not any("left out" in text for text in record.warnings)
+        assert record.warnings == []
+
+
+def test_rest_before_a_gap_is_no_held_value():
+    t = np.arange(4000) / RATE
+    x = 0.3 * np.sin(4 * np.minimum(t, 3 * np.pi / 8))
+    later = t >= 1.5
+    x[later] = 0.1 * np.cos(3 * t[later])
+    kept = (t < 1.3) | later
+    record = of(t[kept], x[kept])
+    assert np.array_equal(record.t, t[kept])
+    assert len(record.warnings) == 1
+    assert "gap" in record.warnings[0]
 
 
 def test_held_values_are_left_out():
@@ -121,6 +133,19 @@ def test_uneven_samples_that_the_motion_follows_keep_their_times():
     record = of(stamps, x + SIGMA * np.random.default_rng(2).standard_normal(stamps.size))
     assert np.array_equal(record.t, stamps)
     assert any("x follows" in text for text in record.warnings)
+
+
+@pytest.mark.parametrize("quiet", ["ring-down", "rest", "grid"])
+def test_stamps_that_a_mostly_quiet_motion_follows_stay(quiet):
+    _, stamps, _ = jittered(0.3)
+    x = 0.3 * np.exp(-4 * stamps) * np.sin(20 * stamps)
+    if quiet == "rest":
+        x = np.where(stamps < 1.2, 0.3 * np.sin(20 * stamps), 0.3 * np.sin(24.0))
+    elif quiet == "grid":
+        x = 0.01 * np.round(0.3 * np.sin(0.9 * stamps) / 0.01)
+    else:
+        x = x + 1e-7 * np.random.default_rng(2).standard_normal(stamps.size)
+    assert np.array_equal(of(stamps, x).t, stamps)
 
 
 def test_a_record_of_gaps_alone_is_refused():

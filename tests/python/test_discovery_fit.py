@@ -17,7 +17,7 @@ from separatrix.discovery.fitting.fit import blocks_of, eliminate, gauss_newton_
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.problem import Evaluation
 from separatrix.discovery.fitting.screen import project
-from separatrix.discovery.measured.preflight import white_noise
+from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.measured.smoother import impact_table, smooth
 from separatrix.discovery.options import Options
 

@@ -10,8 +10,9 @@ from scipy.signal import lfilter
 from separatrix.discovery.decision import misfit
 from separatrix.discovery.decision.decide import Decision, _without_name
 from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet
+from separatrix.discovery.fitting.base import limit_noise
 from separatrix.discovery.fitting.noise import white_share
-from separatrix.discovery.measured.preflight import white_noise
+from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 
 SAMPLES, SEGMENTS = 50, 20
@@ -95,3 +96,15 @@ def test_fourth_differences_show_the_share_of_noise_that_its_memory_leaves(memor
     random = np.random.default_rng(8).standard_normal(200_000)
     noise = lfilter([np.sqrt(1 - memory**2)], [1, -memory], random)
     assert white_noise(noise) ** 2 == pytest.approx(white_share(memory), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("taken", "stated", "left"), [(3e-2, False, 1e-3), (3e-2, True, 3e-2), (1.2e-3, False, 1.2e-3)]
+)
+def test_noise_far_above_that_of_the_same_sensor_is_limited(taken, stated, left):
+    training, held_out = data(1e-5, 1e-3), data(taken, 1e-3)
+    for one in held_out.prepared:
+        one.sigma_stated = stated
+    # a stated size below the scatter of the samples is not that of the sensor
+    assert limit_noise(training, held_out) == (left != taken)
+    assert [one.sigma for one in held_out.prepared] == pytest.approx([left, left], rel=0.1)

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Derivatives of the short-segment likelihood are those of its residuals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from program import CASE
+from separatrix.discovery.decision.where import where_maps
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import (
@@ -14,9 +17,11 @@ from separatrix.discovery.fitting.machine import (
     sensor_zeros,
 )
 from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded
+from separatrix.discovery.options import Options
 from separatrix.library import Model
 
 RATE, LENGTH = 200, 60
@@ -107,11 +112,15 @@ def test_each_record_has_its_own_zero(flown):
     assert fit.values[paths.index("nuisance:sensor_zero")] == pytest.approx(SHIFT, rel=1e-3)
     biases = [problem.machine_values(number, fit.values)["effect.sensor_bias.bias"] for number in (0, 1)]
     assert biases[1] - biases[0] == pytest.approx(SHIFT, rel=1e-3)
-    # held-out records bring zeros of their own, and only where those that were fitted had some
+    # held-out records bring zeros of their own, but not the end of a record that was fitted, nor beside a
+    # bias that is a candidate
     held_out = [one.path for one in on_other_records(problem.free, problem.prepared)]
     assert held_out.count("nuisance:sensor_zero") == 2
-    alone = [one for one in problem.free if one.path != "nuisance:sensor_zero"]
-    assert "nuisance:sensor_zero" not in [one.path for one in on_other_records(alone, problem.prepared)]
+    problem.prepared[1].record.part = ", the last 30 %"
+    held_out = [one.path for one in on_other_records(problem.free, problem.prepared)]
+    assert held_out.count("nuisance:sensor_zero") == 1
+    added = [replace(one, varies=False) for one in problem.free if one.path == "effect.sensor_bias.bias"]
+    assert len(on_other_records(added, problem.prepared)) == 1 + 2 * 2
 
 
 def test_kicks_at_impacts_are_among_what_is_tried(flown):
@@ -121,3 +130,17 @@ def test_kicks_at_impacts_are_among_what_is_tried(flown):
     found = {one.name: one for one in ceiling(problem, fit, 1.0).families}
     # constant, with speed, its square and cube, and with time and its square
     assert found["impacts"].rank == 6
+
+
+def test_missing_forces_over_time_are_those_of_each_record(flown):
+    """The second record is the shorter one."""
+    problem, values, starts = flown
+    rows = np.flatnonzero((problem.segments.record == 0) | (problem.segments.first < 600))
+    second = problem.prepared[1].record
+    for name in ("t", "x", "v"):
+        setattr(second, name, getattr(second, name)[:600])
+    problem = problem.of_segments(rows)
+    fit = minimise(problem, values, starts[rows], most=0)
+    maps = {one.name: one for one in where_maps(Fitted((), problem.model, problem, fit, ()), 1.0, Options())}
+    assert maps["time in r0"].edges[-1] == pytest.approx(6.0, abs=0.5)
+    assert maps["time in r1"].edges[-1] == pytest.approx(3.0, abs=0.5)

@@ -355,7 +355,7 @@ def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(cli, "investigate", interrupt)
     assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 130
-    assert capsys.readouterr().err.splitlines() == ["separatrix-discover: interrupted, nothing was written"]
+    assert capsys.readouterr().err.splitlines() == ["separatrix-discover: interrupted before the end"]
     assert not (tmp_path / "out").exists()
 
 
@@ -368,7 +368,7 @@ def test_a_termination_ends_with_one_line_and_leaves_nothing(tmp_path, monkeypat
         monkeypatch.setattr(cli, step, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
         assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 143
         said = capsys.readouterr().err.splitlines()
-        assert said == ["separatrix-discover: terminated, nothing was written"]
+        assert said == ["separatrix-discover: terminated before the end"]
         assert not (tmp_path / "out").exists()
     assert signal.getsignal(signal.SIGTERM) is before
 
@@ -390,3 +390,18 @@ def test_an_angle_is_told_in_rad():
         if "left out" in note
     ]
     assert f"x is {np.radians(x[150]):.6g} rad between" in said
+
+
+def test_columns_that_are_not_used_may_hold_anything(tmp_path):
+    text = "# units: s, m\nt,flag,x\n" + "\n".join(f"{k / 100},ok?,{np.cos(k / 9)}" for k in range(200))
+    (tmp_path / "flags.csv").write_text(text)
+    record = read_record(tmp_path / "flags.csv")
+    assert record.x[:2] == pytest.approx([1.0, np.cos(1 / 9)])
+    assert record.warnings == ["columns that are not used: flag"]
+
+
+def test_columns_are_read_and_not_changed():
+    t = np.arange(400) / 100
+    columns = {"t": 1e3 * t, "x": 1e3 * np.cos(3 * t)}
+    for _ in range(2):
+        assert make_record("r", columns, {"units": "ms, mm"}).t == pytest.approx(t)

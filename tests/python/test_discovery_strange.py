@@ -16,7 +16,8 @@ CASE = {"body.mass": (95.0, "kg"), "restoring.stiffness": (88.8, "N/m"), "contac
 def data(frequency: float, stated: float) -> SimpleNamespace:
     """One record of 5 s that moves at one frequency, beside a drive that is said to have another."""
     t = np.arange(2500) / 500
-    record = SimpleNamespace(name="first", x=0.3 * np.cos(frequency * t) + 0.02 * t, interval=1 / 500)
+    x = 0.3 * np.cos(frequency * t) + 0.02 * t
+    record = SimpleNamespace(name="first", x=x, interval=1 / 500, pieces=[(0, t.size)])
     prepared = [SimpleNamespace(record=record, frequency=stated)]
     return SimpleNamespace(prepared=prepared, stages=[SimpleNamespace(record=np.zeros(20, int))], last=0)
 
@@ -57,9 +58,16 @@ def test_what_is_far_from_the_case_is_said(found, said):
 
 
 def test_the_strongest_line_is_where_the_motion_is():
-    line, apart = strongest_line(data(8.96, 8.96).prepared[0])
+    line, apart, share = strongest_line(data(8.96, 8.96).prepared[0])
+    assert share > 0.9
     assert line == pytest.approx(8.96, rel=0.01)
     assert apart == pytest.approx(2 * np.pi / 5, rel=1e-3)
+
+
+def test_a_motion_without_a_clear_line_says_nothing_about_the_drive():
+    chaotic = data(8.96, 11.3)
+    chaotic.prepared[0].record.x = np.random.default_rng(2).standard_normal(2500)
+    assert other_drive(chaotic, base(1e4)) == []
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from separatrix.discovery.fitting.catalogue import BY_NAME
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
-from separatrix.discovery.wording import with_error
+from separatrix.discovery.wording import searched, with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import INTERRUPTED, TERMINATED, SeparatrixError
 from separatrix.version import __version__
@@ -34,10 +34,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"separatrix-discover: {error}", file=sys.stderr)
         return error.code
     except _TerminatedError:
-        print("separatrix-discover: terminated, nothing was written", file=sys.stderr)
+        print("separatrix-discover: terminated before the end", file=sys.stderr)
         return TERMINATED
     except KeyboardInterrupt:
-        print("separatrix-discover: interrupted, nothing was written", file=sys.stderr)
+        print("separatrix-discover: interrupted before the end", file=sys.stderr)
         return INTERRUPTED
     return 0
 
@@ -60,7 +60,7 @@ def _ending_when_told() -> Iterator[None]:
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, earlier)
+        signal.signal(signal.SIGTERM, earlier or signal.SIG_DFL)
 
 
 def _run(chosen: argparse.Namespace) -> None:
@@ -104,10 +104,6 @@ class Progress:
         print(f"[{100 * done:3.0f} %] {stage} ({passed:.1f} s{left})", file=sys.stderr, flush=True)
 
 
-def _search(verdict: dict) -> str:
-    return "the catalogue" if verdict["asked_for"] is None else "the part of the catalogue that was asked for"
-
-
 def summary(verdict: dict) -> list[str]:
     """The verdict in a few lines."""
     names = " and ".join(verdict["effects"])
@@ -116,7 +112,7 @@ def summary(verdict: dict) -> list[str]:
         "named": [f"missing: {names}"],
         "ambiguous": [f"missing: {names}" + (f", or {others}" if others else ", not beyond doubt")],
         "none": ["no missing effect"],
-        "not-in-catalogue": [f"something is missing that {_search(verdict)} does not name"],
+        "not-in-catalogue": [f"something is missing that {searched(verdict)} does not name"],
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):

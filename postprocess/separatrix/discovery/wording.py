@@ -40,6 +40,11 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def searched(verdict: dict) -> str:
+    """Where the effects of a verdict were looked for."""
+    return "the catalogue" if verdict["asked_for"] is None else "the part of the catalogue that was asked for"
+
+
 def number(value: float | None, digits: int = 4) -> str:
     """A number of the verdict as text; large ones without a power of ten up to a million."""
     if value is None:

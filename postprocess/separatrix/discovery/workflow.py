@@ -53,10 +53,10 @@ def investigate(
     options = options or Options()
     model = _model(base)
     read = [[_record(one) for one in group] for group in (records, hold_out)]
-    training, held_out, chosen = _split(*read, model)
+    still = None if rest is None else _record(rest, at_rest=True)
+    training, held_out, chosen = _split(*read, model, still)
     _all_different([*training, *held_out])
     unique_names([*training, *held_out])
-    still = None if rest is None else _record(rest, at_rest=True)
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[prepare(one, model, still) for one in group] for group in (training, held_out)]
     data = gather(prepared[0], options.segment_periods, options.segment_seconds)
@@ -103,7 +103,9 @@ def _record(one: Path | Record, at_rest: bool = False) -> Record:
     return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
-def _split(records: list[Record], hold_out: list[Record], model) -> tuple[list[Record], list[Record], str]:
+def _split(
+    records: list[Record], hold_out: list[Record], model, rest: Record | None = None
+) -> tuple[list[Record], list[Record], str]:
     """Training and held-out records; by default the last record, or the end of the only one."""
     if hold_out:
         return records, hold_out, "as asked for"
@@ -113,7 +115,7 @@ def _split(records: list[Record], hold_out: list[Record], model) -> tuple[list[R
         raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
     at = int((1 - _END) * whole.t.size)
-    period = prepare(whole, model).period_samples
+    period = prepare(whole, model, rest).period_samples
     if period is not None:
         # the end needs some periods too
         latest = whole.t[-1] - _END_PERIODS * period * whole.interval

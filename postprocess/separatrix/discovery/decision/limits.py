@@ -63,7 +63,8 @@ def detectable(bench: Bench, found: Round) -> dict[str, dict]:
             size = _by_ladder(bench, found, made)
             reason = "" if size is not None else "no size that was tried stands out so much"
         else:
-            size, reason = None, "its size is not proportional to what it does: see a run without --quick"
+            size, reason = None, "its size is not proportional to what it does"
+            reason += ": see a run without --quick" if bench.options.quick else ""
         sizes[name] = {"size": size, "path": path, "unit": unit, "reason": reason}
     return sizes
 

@@ -9,7 +9,8 @@ from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.noise import noise_of, white_share
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.measured.preflight import Prepared, white_noise
+from separatrix.discovery.measured.preflight import Prepared
+from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 from separatrix.discovery.wording import units_of
 

@@ -20,16 +20,20 @@ _BARRIERS = ("contact.upper", "contact.lower")
 _MISSED = 10.0
 # orders of harmonics and subharmonics of a drive that a motion may follow
 _ORDERS = (1, 2, 3)
+# share of the power of x that a clear line has
+_CLEAR = 0.5
 # error of the strongest line of a spectrum: share of its frequency, and of the distance of its bins
 _LINE, _BIN = 0.02, 0.5
+# points of the spectrum between two such bins
+_FINER = 8
 
 
-def other_machine(data: Data, base: Fitted, options: Options) -> list[str]:
-    """Parameters of the fitted base machine that are far from those of the case, in one sentence."""
+def other_machine(data: Data, fitted: Fitted, options: Options) -> list[str]:
+    """Parameters of the fitted machine that are far from those of the case, in one sentence."""
     spread = max(float(np.std(one.record.x)) for one in data.prepared)
-    model = base.model
+    model = fitted.model
     strange = []
-    for one, value in zip(base.problem.free, base.fit.values, strict=True):
+    for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
         found = one.physical(value)
         if one.path == "nuisance:drive_scale":
             lowest, highest = options.drive_scales
@@ -47,7 +51,7 @@ def other_machine(data: Data, base: Fitted, options: Options) -> list[str]:
     if not strange:
         return []
     said = ", ".join(strange)
-    return [f"the fitted base machine is not that of the case: {said}: other units, or another machine"]
+    return [f"the fitted machine is not that of the case: {said}: other units, or another machine"]
 
 
 def other_drive(data: Data, base: Fitted) -> list[str]:
@@ -57,7 +61,9 @@ def other_drive(data: Data, base: Fitted) -> list[str]:
         one = data.prepared[place]
         if size < _MISSED or one.frequency is None:
             continue
-        line, apart = strongest_line(one)
+        line, apart, share = strongest_line(one)
+        if share < _CLEAR:
+            continue
         wanted = [one.frequency * p / q for p in _ORDERS for q in _ORDERS]
         if all(abs(line - known) > max(_LINE * known, _BIN * apart) for known in wanted):
             notes.append(
@@ -67,10 +73,17 @@ def other_drive(data: Data, base: Fitted) -> list[str]:
     return notes
 
 
-def strongest_line(one: Prepared) -> tuple[float, float]:
-    """Frequency of the strongest line of x, and how far lines must be apart to be two [rad/s]."""
-    x = one.record.x - one.record.x.mean()
-    power = np.abs(np.fft.rfft(x * get_window("hann", x.size), 8 * x.size))
-    power[:8] = 0.0
+def strongest_line(one: Prepared) -> tuple[float, float, float]:
+    """Strongest line of x in its longest stretch without gaps.
+
+    Its frequency, how far lines must be apart to be two [rad/s], and its share of the power.
+    """
+    first, last = max(one.record.pieces, key=lambda piece: piece[1] - piece[0])
+    x = one.record.x[first:last]
+    power = np.abs(np.fft.rfft((x - x.mean()) * get_window("hann", x.size), _FINER * x.size)) ** 2
+    power[:_FINER] = 0.0
+    peak = int(np.argmax(power))
+    # a Hann window spreads a line over two of its bins on either side
+    share = power[max(0, peak - 2 * _FINER) : peak + 2 * _FINER + 1].sum() / power.sum()
     apart = 2 * np.pi / (x.size * one.record.interval)
-    return float(np.argmax(power)) * apart / 8, apart
+    return peak * apart / _FINER, apart, float(share)

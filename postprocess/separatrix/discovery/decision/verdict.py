@@ -89,7 +89,7 @@ def _candidate(one: Judged) -> dict:
         "held_out": one.held_out,
         "evidence": one.evidence,
         "reduced_chi2": fit.reduced_chi2,
-        # what is worse than the base, which it contains, has not found its minimum
+        # what is worse than the base has not found its minimum, at which the effect does nothing
         "converged": fit.converged and one.training > -WORSE,
         "starts": one.fitted.tries,
         "values": {
@@ -110,7 +110,7 @@ def _warnings(findings: Findings) -> list[str]:
     fits = _final(findings)
     for _, data, fitted in fits:
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
-    notes += other_machine(bench.training, findings.base, bench.options)
+    notes += other_machine(bench.training, fits[0][2], bench.options)
     if findings.decision.outcome == "not-in-catalogue":
         notes += other_drive(bench.training, findings.base)
     fit = findings.base.fit

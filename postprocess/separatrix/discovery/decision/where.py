@@ -77,7 +77,8 @@ def _times(problem, inside: np.ndarray) -> list[tuple | None]:
     count = max(4, 12 // len(problem.prepared))
     for number, prepared in enumerate(problem.prepared):
         rows = problem.segments.record == number
-        seconds = prepared.record.t[problem.segments.index] - prepared.record.t[0]
+        seconds = np.zeros(inside.shape)
+        seconds[rows] = prepared.record.t[problem.segments.index[rows]] - prepared.record.t[0]
         name = "time" if len(problem.prepared) == 1 else f"time in {prepared.record.name}"
         found.append(_bins(name, "s", seconds, inside & rows[:, None], count))
     return found

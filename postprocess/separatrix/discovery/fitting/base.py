@@ -119,9 +119,10 @@ def limit_noise(source: Data, target: Data) -> bool:
     Where the base machine lacks an effect it hides in the noise of records too short to measure it again.
     """
     shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.record.x)) > 0]
+    coloured = max([1.0, *shares])
     limited = False
-    for one in target.prepared if shares else ():
-        sensor = max(max(shares) * white_noise(one.record.x), one.resolution / np.sqrt(12))
+    for one in target.prepared:
+        sensor = max(coloured * white_noise(one.record.x), one.resolution / np.sqrt(12))
         if not one.sigma_stated and one.sigma > _SAME_SENSOR * sensor > 0:
             one.sigma, limited = sensor, True
     return limited

@@ -14,6 +14,7 @@ from separatrix.discovery.fitting.rescue import rescued, suspicious
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
 from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.errors import SeparatrixError
 
 # lengths of the stages over that of the longest segments
 STAGES = (0.2, 0.5, 1.0)
@@ -87,6 +88,9 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
         cut([one.record for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
         for share in STAGES
     ]
+    for number, one in enumerate(prepared):
+        if not np.any(stages[-1].record == number):
+            raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no stretch to be fitted")
     return Data(prepared, smoothed, stages)
 
 

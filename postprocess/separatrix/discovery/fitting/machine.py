@@ -17,7 +17,7 @@ _FIXED = (
 )
 _FIXED_ENDS = ("exponent", "harmonic", "tension")
 SENSOR_BIAS = "effect.sensor_bias.bias"
-_SENSOR_ZERO = "nuisance:sensor_zero"
+SENSOR_ZERO = "nuisance:sensor_zero"
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
@@ -39,6 +39,8 @@ class Free:
     size: float = 1.0
     record: int | None = None
     positive: bool = False
+    # each record has its own beside it
+    varies: bool = False
 
     def physical(self, value: float) -> float:
         """The number itself, from what is fitted."""
@@ -66,7 +68,7 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
         lower, upper = bounds_of(parameter)
         if path.endswith(_NEVER_ZERO):
             lower = max(lower, 1e-3 * value)
-        free.append(Free(path, value, lower, upper, abs(value) or 1.0))
+        free.append(Free(path, value, lower, upper, abs(value) or 1.0, varies=path == SENSOR_BIAS))
     return free
 
 
@@ -121,12 +123,11 @@ def record_nuisances(phase_known: list[bool]) -> list[Free]:
 def sensor_zeros(free: list[Free], count: int) -> list[Free]:
     """The zero of the sensor in each record but the first, beside the bias that the base machine has.
 
-    Records of other days have other zeros. With one record there is nothing to tell apart.
+    Records of other days have other zeros.
     """
-    bias = next((one for one in free if one.path == SENSOR_BIAS), None)
-    if bias is None:
-        return []
-    return [Free(_SENSOR_ZERO, 0.0, size=bias.size, record=i) for i in range(1, count)]
+    return [
+        Free(SENSOR_ZERO, 0.0, size=one.size, record=i) for one in free if one.varies for i in range(1, count)
+    ]
 
 
 def on_other_records(free: list[Free], prepared: list) -> list[Free]:
@@ -134,9 +135,10 @@ def on_other_records(free: list[Free], prepared: list) -> list[Free]:
     own = [one for one in free if one.record is None]
     if prepared[0].frequency:
         own += record_nuisances([one.phase_known for one in prepared])
-    zero = next((one for one in free if one.path == _SENSOR_ZERO), None)
-    if zero is not None:
-        own += [replace(zero, value=0.0, record=i) for i in range(len(prepared))]
+    for i, one in enumerate(prepared):
+        # a part of a record that was fitted has its zero
+        if not one.record.part:
+            own += [Free(SENSOR_ZERO, 0.0, size=bias.size, record=i) for bias in free if bias.varies]
     return own
 
 

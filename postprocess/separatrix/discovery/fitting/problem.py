@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.fitting.machine import SENSOR_BIAS, Free, drive_amplitudes
+from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared, even_interval
 from separatrix.discovery.measured.segments import Segments, padded
 from separatrix.errors import SeparatrixError
@@ -211,7 +211,7 @@ class Problem:
             ratio = self.model.parameters["drive.ratio"].value
             chosen["drive.ratio"] = ratio
             chosen["drive.ratio"] = ratio * frequency / self.model.drive_frequency(chosen)
-        zero = self._nuisance("nuisance:sensor_zero", number, values, None)
+        zero = self._nuisance(SENSOR_ZERO, number, values, None)
         if zero is not None:
             chosen[SENSOR_BIAS] = zero + chosen.get(SENSOR_BIAS, self.model.parameters[SENSOR_BIAS].value)
         return chosen
@@ -243,7 +243,7 @@ class Problem:
             if one.path == "nuisance:drive_scale":
                 for path, value in self.amplitudes.items():
                     chain[active.index(path), j] = self.prepared[number].drive_scale * value
-            elif one.path == "nuisance:sensor_zero" and one.record == number:
+            elif one.path == SENSOR_ZERO and one.record == number:
                 chain[active.index(SENSOR_BIAS), j] = 1.0
             elif not one.is_nuisance:
                 chain[active.index(one.path), j] = one.slope(values[j])

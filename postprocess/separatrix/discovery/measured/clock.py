@@ -9,7 +9,7 @@ import numpy as np
 
 from separatrix.errors import SeparatrixError
 
-_GAP = 1.5
+GAP = 1.5
 # shortest stretch that is fitted
 _FEWEST_IN_PIECE = 12
 # usual deviation of the steps of time from their median from which stamps are called uneven
@@ -29,9 +29,9 @@ def pieces_of(
     """
     steps = np.diff(t)
     usual = float(np.median(steps))
-    whole = steps[steps < _GAP * usual]
+    whole = steps[steps < GAP * usual]
     uneven = float(np.quantile(np.abs(whole / usual - 1), 0.9)) > _UNEVEN
-    gaps = _lost(t, steps, float(whole.mean())) if uneven else np.flatnonzero(steps > _GAP * usual) + 1
+    gaps = _lost(t, steps, float(whole.mean())) if uneven else np.flatnonzero(steps > GAP * usual) + 1
     pieces = list(pairwise([0, *gaps.tolist(), t.size]))
     for row in gaps[:3]:
         warnings.append(f"{where(row)}: gap of {t[row] - t[row - 1]:.4g} s; nothing is fitted across it")
@@ -82,8 +82,8 @@ def _evened(t: np.ndarray, x: np.ndarray, pieces, where, warnings: list[str]) ->
     if follows + 2 * error < 0.5:
         warnings.append(f"{said}; x does not follow: even times are taken")
         return even
-    if follows - 2 * error > 0.5:
-        warnings.append(f"{said}, and x follows: noise and impacts are found less well")
+    follow = "and x follows" if follows - 2 * error > 0.5 else "and x does not tell whether it follows"
+    warnings.append(f"{said}, {follow}: noise and impacts are found less well")
     return t
 
 
@@ -98,12 +98,13 @@ def _followed(x: np.ndarray, late: np.ndarray, interval: float, pieces) -> tuple
             delays.append(speed * np.diff(late[first:last], 4))
             places.append(np.diff(x[first:last], 4))
     delay, place = np.concatenate(delays), np.concatenate(places)
-    # impacts
-    most = 5 * 1.4826 * float(np.median(np.abs(place)))
-    place = np.clip(place, -most, most)
+    usual = 5 * 1.4826 * float(np.median(np.abs(place)))
     size = float(delay @ delay)
-    if size == 0:
+    if size == 0 or usual == 0:
         return 0.5, np.inf
+    # impacts; x that follows in a lively part of a quiet record stays
+    most = np.maximum(usual, 2 * np.abs(delay))
+    place = np.clip(place, -most, most)
     slope = float(delay @ place) / size
     # fourth differences of neighbours are correlated
     return slope, 2 * float(np.std(place - slope * delay)) / np.sqrt(size)

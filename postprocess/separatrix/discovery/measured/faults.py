@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from separatrix.discovery.measured.clock import GAP
 from separatrix.discovery.measured.signals import resolution_of, runs, white_noise
 from separatrix.errors import SeparatrixError
 
@@ -26,14 +27,15 @@ _SHORTEST_HELD = 3
 _SLOW = 3.0
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.02
-# step to and from a clipped value on a grid, over the grid: a turning point is reached level by level
-_ABRUPT = 1.5
+# step to and from a clipped value, over the grid and over the usual step: a turning point and a place of
+# rest are reached level by level, or ever more slowly
+_ABRUPT = (1.5, 0.05)
 
 
 def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
     """Rows of samples that say nothing on the motion, told in `warnings`; too many are refused."""
     _check_rate(x, where)
-    held = _held(x, unit, where, warnings)
+    held = _held(t, x, unit, where, warnings)
     rows = np.setdiff1d(np.arange(x.size), held)
     stray = _stray(t[rows], x[rows], unit, lambda row: where(rows[row]), warnings)
     return np.union1d(held, rows[stray])
@@ -66,7 +68,7 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list
         for side in (-shift, shift):
             bend = np.maximum(bend, second[_AROUND + side : _AROUND + side + x.size])
     # across a gap the samples are no neighbours
-    wide = np.flatnonzero(np.diff(t) > 1.5 * np.median(np.diff(t)))
+    wide = np.flatnonzero(_gaps(t))
     for shift in range(-1, 3):
         bend[np.clip(wide + shift, 0, x.size - 1)] = np.inf
     least = max(_STRAY[0] * max(white_noise(x), _QUIET * float(np.std(x))), _STRAY[1] * resolution_of(x))
@@ -82,13 +84,21 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list
     return rows
 
 
-def _held(x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
+def _gaps(t: np.ndarray) -> np.ndarray:
+    """Whether a sample is followed by a gap."""
+    steps = np.diff(t)
+    return steps > GAP * np.median(steps)
+
+
+def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
     """Samples that repeat one before them, until the motion goes on elsewhere."""
     least = max(_HELD[0] * white_noise(x), _HELD[1] * resolution_of(x))
+    gaps = _gaps(t)
     found = []
     for first, last in runs(np.diff(x) == 0):
         last += 1
-        if last - first < _SHORTEST_HELD or first < 1 or last > x.size - 2:
+        # a body at rest before a gap is elsewhere after it
+        if last - first < _SHORTEST_HELD or first < 1 or last > x.size - 2 or gaps[first - 1 : last].any():
             continue
         around = max(abs(x[first] - x[first - 1]), abs(x[last + 1] - x[last]))
         if abs(x[last] - x[first]) > max(least, _HELD[2] * around):
@@ -105,12 +115,13 @@ def _held(x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.nda
 
 def check_clipping(x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> None:
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself at turning points."""
-    grid = resolution_of(x)
+    steps = np.abs(np.diff(x))
+    least = max(_ABRUPT[0] * resolution_of(x), _ABRUPT[1] * float(np.median(steps[steps > 0])))
     for name, extreme in (("largest", x.max()), ("smallest", x.min())):
         long = [
             (first, last)
             for first, last in runs(x == extreme)
-            if last - first >= _CLIPPED_RUN and _is_abrupt(x, first, last, _ABRUPT * grid)
+            if last - first >= _CLIPPED_RUN and _is_abrupt(x, first, last, least)
         ]
         if not long:
             continue

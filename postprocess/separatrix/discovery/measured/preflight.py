@@ -206,8 +206,8 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
         usual = usual or interval
         if abs(interval - usual) > usual * max(_UNEVEN, 1 / steps):
             raise SeparatrixError(
-                f"{record.file}, from row {first + 1}: samples every {interval:.6g} s, before every "
-                f"{usual:.6g} s: a measured force needs one rate"
+                f"{record.file}, from {record.t[first]:.6g} s on: samples every {interval:.6g} s, before "
+                f"every {usual:.6g} s: a measured force needs one rate"
             )
     return record
 
@@ -242,7 +242,8 @@ def _check_size(prepared: Prepared, model) -> None:
             row = int(np.argmax(beyond))
             raise SeparatrixError(
                 f"{prepared.record.file}: x lies beyond {path} = {barrier.value:g} {unit} most of the time "
-                f"(row {row + 1}: {prepared.record.x[row]:g} {unit}): a record of another machine"
+                f"({prepared.record.x[row]:g} {unit} at {prepared.record.t[row]:g} s): "
+                "a record of another machine"
             )
 
 

@@ -66,11 +66,12 @@ def make_record(
 ) -> Record:
     """Check arrays that did not come from a file as if they had."""
     texts = {key: str(value) for key, value in (header or {}).items()}
-    return _checked(Path(name), Table(texts, columns), at_rest)
+    used = {key: column for key, column in columns.items() if key in ("t", *CHANNELS)}
+    return _checked(Path(name), Table(texts, used, unused=sorted(columns.keys() - used.keys())), at_rest)
 
 
 def _checked(path: Path, table: Table, at_rest: bool) -> Record:
-    header, columns = table.header, table.columns
+    header, columns = table.header, dict(table.columns)
     kept = np.arange(columns["t"].size)
 
     def where(row: int) -> str:
@@ -109,9 +110,8 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         )
     if not at_rest:
         check_clipping(x, unit, where, warnings)
-    unused = [name for name in columns if name not in ("t", *CHANNELS)] + table.unused
-    if unused:
-        warnings.append(f"columns that are not used: {', '.join(unused)}")
+    if table.unused:
+        warnings.append(f"columns that are not used: {', '.join(table.unused)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
     return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, file=str(path), **channels)
 
@@ -149,7 +149,7 @@ def _doubt_header(header: dict[str, str], numbers: dict[str, float], warnings: l
 def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> str:
     """Turn time and position into SI, as the other channels and the header are; return the unit of x."""
     if "units" not in header:
-        warnings.append("no 'units': read as s, m")
+        warnings.append("no 'units': read as s and m (rad of an angle)")
         return "m"
     words = [word.strip() for word in header["units"].split(",")]
     if len(words) < 2 or words[0] not in _TIME or words[1] not in _LENGTH:

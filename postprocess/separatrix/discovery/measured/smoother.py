@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from separatrix.discovery.measured.signals import runs
+
 # a stretch that is long enough to tune on
 _TUNED_SAMPLES = 600
 _JUMP_SIGMAS = 6.0
@@ -107,11 +109,10 @@ def stick_intervals(smoothed: Smoothed, fewest: int = 4) -> list[tuple[float, fl
     error = np.sqrt(np.stack([smoothed.covariance[:, i, i] for i in (1, 2)], axis=1))
     still = np.all(np.abs(smoothed.state[:, 1:]) < 3 * error, axis=1)
     still &= np.abs(smoothed.v) < 0.05 * np.sqrt(np.mean(smoothed.v**2))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     return [
-        (float(smoothed.t[a]), float(smoothed.t[b - 1]))
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-        if b - a >= fewest
+        (float(smoothed.t[first]), float(smoothed.t[last - 1]))
+        for first, last in runs(still)
+        if last - first >= fewest
     ]
 
 

@@ -65,6 +65,7 @@ def _read_csv(path: Path) -> Table:
         if not text.strip():
             continue
         if text.startswith("#"):
+            text = text.encode(errors="surrogateescape").decode(errors="replace")
             key, colon, value = (word.strip() for word in text[1:].partition(":"))
             if not colon:
                 continue
@@ -75,15 +76,17 @@ def _read_csv(path: Path) -> Table:
             continue
         _check_encoding(path, number, text)
         if names is None:
-            separator = next((mark for mark in ";\t" if mark in text), ",")
+            separator = next((mark for mark in ";,\t" if _has_t_and_x(text, mark)), ",")
             names = _names(path, number, text, separator)
+            used = [name for name in names if name in ("t", *CHANNELS)]
         else:
             lines.append(number)
-            rows.append(_numbers(path, number, text, separator, len(names)))
+            rows.append(_numbers(path, number, text, separator, names, used))
     if names is None or not rows:
         raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
     table = np.array(rows)
-    return Table(header, {name: table[:, i].copy() for i, name in enumerate(names)}, np.array(lines))
+    columns = {name: table[:, i].copy() for i, name in enumerate(used)}
+    return Table(header, columns, np.array(lines), [name for name in names if name not in used])
 
 
 def _lines(path: Path) -> list[str]:
@@ -110,6 +113,10 @@ def _check_place(path: Path, number: int, key: str, stands: dict[str, int], belo
         raise SeparatrixError(f"{path}:{number}: '{key}' is given again, first in line {stands[key]}")
 
 
+def _has_t_and_x(text: str, separator: str) -> bool:
+    return {"t", "x"} <= {name.strip() for name in text.split(separator)}
+
+
 def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
     names = [name.strip() for name in text.split(separator)]
     if "t" not in names or "x" not in names:
@@ -119,10 +126,13 @@ def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
     return names
 
 
-def _numbers(path: Path, number: int, text: str, separator: str, count: int) -> list[float]:
+def _numbers(
+    path: Path, number: int, text: str, separator: str, names: list[str], used: list[str]
+) -> list[float]:
     words = text.split(separator)
-    if len(words) != count:
-        raise SeparatrixError(f"{path}:{number}: {len(words)} values for {count} columns")
+    if len(words) != len(names):
+        raise SeparatrixError(f"{path}:{number}: {len(words)} values for {len(names)} columns")
+    words = [word for word, name in zip(words, names, strict=True) if name in used]
     if separator != ",":
         # a comma can only be that of decimals
         words = [word.replace(",", ".") for word in words]

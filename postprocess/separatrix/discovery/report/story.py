@@ -4,7 +4,7 @@
 
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
-from separatrix.discovery.wording import digits_of, interval, number, probability, with_unit, words
+from separatrix.discovery.wording import digits_of, interval, number, probability, searched, with_unit, words
 
 GATES = {
     "converged": "the fit converged",
@@ -54,9 +54,7 @@ def _summary(verdict: dict) -> Section:
         "ambiguous": f"Something is missing that looks like {names(verdict)}, "
         + (f"but {others} would do about as well." if others else "but not every gate is passed."),
         "none": "No effect is missing that these records could show.",
-        "not-in-catalogue": "Something is missing, and no effect "
-        + ("of the catalogue" if verdict["asked_for"] is None else "that was asked for")
-        + " explains it.",
+        "not-in-catalogue": f"Something is missing, and no effect of {searched(verdict)} explains it.",
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {said}"]
     for path, one in verdict["parameters"].items():
@@ -262,9 +260,11 @@ def _foretold(verdict: dict) -> str:
         return "No record was held out."
     one = verdict["gap"]["held_out"]
     driven = any(record["drive_frequency"] is not None for record in verdict["records"])
-    fitted = "the starts of its segments" + (" and the angle of its crank" if driven else "")
+    own = ["the starts of its segments", *(["phase and clock of its drive"] if driven else [])]
+    if any(record["sensor_bias"] is not None for record in verdict["records"]):
+        own.append("the zero of its sensor")
     return (
-        f"Only {fitted} are fitted to a held-out record. "
+        f"Of a held-out record only these are fitted: {', '.join(own)}. "
         "Reduced chi^2: "
         f"{number(one['before'])} for the base machine, {number(one['after'])} for "
         + (
