@@ -6,9 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal, norm
 from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.partial import preferred
-from separatrix.discovery.fitting.heldout import Prediction, gained
+from separatrix.discovery.fitting.heldout import Prediction, ahead, gained
 from separatrix.discovery.options import Options
 
 SEGMENTS = 40
@@ -20,7 +21,9 @@ def prediction(chi2, score, misfit):
     every = np.ones(chi2.size, bool)
     fit = SimpleNamespace(chi2=chi2, counts=np.full(chi2.size, 50), good=every)
     problem = SimpleNamespace(free=[])
-    return Prediction(np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, 0, misfit)
+    return Prediction(
+        np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, 0, misfit, np.zeros((0, 0))
+    )
 
 
 def candidate(foretold, parameters, training):
@@ -70,3 +73,28 @@ def test_more_parameters_are_taken_only_if_they_foretell_better_beyond_chance(le
     best, rivals = preferred([simple, rich], Options())
     assert best.parameters == chosen
     assert rivals == []
+
+
+def test_an_unknown_parameter_counts_once_however_many_segments_it_moves():
+    """Residuals r = c p + noise, p known up to a spread: their density is that of a dense covariance."""
+    random = np.random.default_rng(6)
+    columns, spread = random.standard_normal((SEGMENTS, 50)), 0.3
+    residual = columns * spread + random.standard_normal((SEGMENTS, 50))
+    one = prediction((residual**2).sum(axis=1), np.zeros(SEGMENTS), 1.0)
+    one.covariance = np.array([[spread**2]])
+    one.fit.reduced = SimpleNamespace(
+        matrix=(columns**2).sum(axis=1)[:, None, None], gradient=(columns * residual).sum(axis=1)[:, None]
+    )
+    exact = prediction(((residual - columns * spread) ** 2).sum(axis=1), np.zeros(SEGMENTS), 1.0)
+    exact.fit.reduced = SimpleNamespace(matrix=np.zeros((SEGMENTS, 0, 0)), gradient=np.zeros((SEGMENTS, 0)))
+    whole = np.eye(residual.size) + spread**2 * np.outer(columns.ravel(), columns.ravel())
+    density = multivariate_normal(np.zeros(residual.size), whole).logpdf(residual.ravel())
+    known = norm.logpdf(residual - columns * spread).sum()
+    assert ahead(exact, one) == pytest.approx(known - density, rel=1e-9)
+    assert 0 < ahead(exact, one) < 10
+
+
+def test_wrong_machines_are_held_against_each_other_by_their_errors():
+    worse, better = prediction([900.0], [-10.0], 500.0), prediction([400.0], [-30.0], 1.0)
+    assert ahead(better, worse) == pytest.approx(250.0)
+    assert ahead(worse, better) == pytest.approx(-250.0)

@@ -13,6 +13,7 @@ from separatrix.discovery.decision.judge import (
     equivalent,
     held_out_bounds,
     judged,
+    lead,
     margin,
     stable,
 )
@@ -170,9 +171,7 @@ def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]
     """
     order = sorted(pool, key=lambda one: -one.evidence)
     best = next((one for one in order if one.fitted.fit.converged), order[0])
-    return best, [
-        one for one in order if one is not best and best.evidence - one.evidence < margin(best, one, options)
-    ]
+    return best, [one for one in order if one is not best and lead(best, one) < margin(best, one, options)]
 
 
 def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:

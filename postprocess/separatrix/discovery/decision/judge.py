@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.catalogue import BY_NAME
 from separatrix.discovery.fitting.ceiling import Ceiling
-from separatrix.discovery.fitting.heldout import Prediction, gained
+from separatrix.discovery.fitting.heldout import Prediction, ahead, gained
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.options import Options
 
@@ -51,6 +51,14 @@ def judged(
         parts = gained(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
     return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
+
+
+def lead(one: Judged, other: Judged) -> float:
+    """Evidence of one candidate over another, of the same base, held against each other."""
+    if one.prediction is None or other.prediction is None:
+        return one.evidence - other.evidence
+    fitted = one.training - one.parameters - (other.training - other.parameters)
+    return fitted + ahead(one.prediction, other.prediction)
 
 
 def detection(one: Judged, tested: float, inflation: float) -> float:

@@ -23,6 +23,7 @@ from separatrix.discovery.decision.judge import (
     differs_from_nothing,
     held_out_bounds,
     judged,
+    lead,
     margin,
 )
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
@@ -168,9 +169,7 @@ def preferred(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged
     fewest = min(one.parameters for one in close)
     simple = [one for one in close if one.parameters == fewest]
     best = max(simple, key=lambda one: one.evidence)
-    return best, [
-        one for one in simple if one is not best and best.evidence - one.evidence < margin(best, one, options)
-    ]
+    return best, [one for one in simple if one is not best and lead(best, one) < margin(best, one, options)]
 
 
 def _clearly(one: Judged, other: Judged, options: Options) -> bool:

@@ -36,6 +36,8 @@ class Prediction:
     shared: int
     # reduced chi^2 of the training records, at least 1
     misfit: float
+    # of the machine's parameters, the first `shared` ones that are free
+    covariance: np.ndarray
 
     @property
     def reduced_chi2(self) -> float:
@@ -66,8 +68,8 @@ def predict(
     problem = Problem(model, data.prepared, data.stages[-1], whole)
     fit = again(problem, fit)
     used = covariance[np.ix_(shared, shared)]
-    score = _scores(fit, used, len(shared))
-    return Prediction(score, fit.good, problem.segments.record, problem, fit, len(shared), misfit)
+    score = _scores(fit.chi2, fit.reduced.matrix, fit.reduced.gradient, used)
+    return Prediction(score, fit.good, problem.segments.record, problem, fit, len(shared), misfit, used)
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
@@ -81,6 +83,27 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
     wrong = other.misfit > _MISFIT
     parts = 0.5 * (other.fit.chi2 - one.fit.chi2) if wrong else one.score - other.score
     return np.where(one.good & other.good, parts, 0.0)
+
+
+def ahead(one: Prediction, other: Prediction) -> float:
+    """What `one` foretells better than `other` in all, in units of log density.
+
+    Where both leave only noise, the density is that of all segments together: a parameter that is hardly
+    known errs in all of them alike, which counts once.
+    """
+    both = one.good & other.good
+    if max(one.misfit, other.misfit) > _MISFIT:
+        return float(0.5 * (other.fit.chi2 - one.fit.chi2)[both].sum())
+    return _density(one, both) - _density(other, both)
+
+
+def _density(one: Prediction, rows: np.ndarray) -> float:
+    """Log density of some segments together, their starts free, the machine known up to its covariance."""
+    reduced = one.fit.reduced
+    chi2, matrix, gradient = (
+        table[rows].sum(axis=0)[None] for table in (one.fit.chi2, reduced.matrix, reduced.gradient)
+    )
+    return float(_scores(chi2, matrix, gradient, one.covariance)[0])
 
 
 def _fit_own(
@@ -116,13 +139,14 @@ def _with(model, known: list[tuple[Free, float]]):
         return None
 
 
-def _scores(fit: Fit, covariance: np.ndarray, shared: int) -> np.ndarray:
+def _scores(chi2: np.ndarray, matrix: np.ndarray, gradient: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Log density of each segment, its start free, the machine known up to its covariance."""
+    shared = covariance.shape[0]
     values, vectors = np.linalg.eigh(covariance) if shared else (np.zeros(0), np.zeros((0, 0)))
     root = vectors * np.sqrt(np.maximum(values, 0))
-    matrix = root.T @ fit.reduced.matrix[:, :shared, :shared] @ root
-    gradient = (root.T @ fit.reduced.gradient[:, :shared, None])[:, :, 0]
+    matrix = root.T @ matrix[:, :shared, :shared] @ root
+    gradient = (root.T @ gradient[:, :shared, None])[:, :, 0]
     spread = matrix + np.eye(shared)
     explained = np.einsum("ki,ki->k", gradient, np.linalg.solve(spread, gradient[:, :, None])[:, :, 0])
     _, logarithm = np.linalg.slogdet(spread)
-    return -0.5 * (fit.chi2 - explained) - 0.5 * logarithm
+    return -0.5 * (chi2 - explained) - 0.5 * logarithm
