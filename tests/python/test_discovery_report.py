@@ -139,7 +139,7 @@ def verdict(outcome: str) -> dict:
         "records": [
             {
                 "name": name, "use": use, "samples": 600, "sigma": 1e-3, "memory": 0.0, "resolution": 0.0,
-                "drive_frequency": RATE, "drive_scale": 0.5, "phase_known": True,
+                "drive_frequency": RATE, "drive_scale": 0.5, "phase_known": True, "sensor_bias": None,
             }
             for name, use in (("f0", "training"), ("f1", "held out"))
         ],
