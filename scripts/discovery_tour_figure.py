@@ -49,7 +49,7 @@ def main(folder: Path, target: Path) -> None:
             print(f"{effect.name}: {verdict['outcome']}, {', '.join(verdict['effects'])}")
             for path, one in verdict["parameters"].items():
                 if path.startswith("effect."):
-                    print(f"  {path} = {with_error(one, 6)}")
+                    print(f"  {path} = {with_error(one)}")
             print(f"  reduced chi^2 on the held-out record: {gap['before']:.6g} -> {gap['after']:.4g}")
             for column, (label, path) in enumerate(
                 (("wrong", folder / "base.h5"), ("corrected", effect / "extended.h5"))

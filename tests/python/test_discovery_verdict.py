@@ -146,6 +146,8 @@ def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so():
     assert with_error(known) == "89 +- 0.5"
     precise = {"value": 1.1, "standard_error": 2.8e-7, "interval_95": [], "unit": "m"}
     assert with_error(precise | {"value": 1.10000031}) == "1.10000031 +- 2.8e-07 m"
+    assert with_error(precise | {"value": 20.000652, "standard_error": 1.2e-3}) == "20.0007 +- 0.0012 m"
+    assert with_error(precise | {"value": 1.0000012, "standard_error": 9.9e-5}) == "1.000001 +- 9.9e-05 m"
 
 
 def test_the_x_of_a_pendulum_is_an_angle():

@@ -55,7 +55,9 @@ def number(value: float | None, digits: int = 4) -> str:
 
 def digits_of(value: float, error: float | None) -> int:
     """Digits that show a value to two digits of its standard error, at least 4."""
-    return 4 if not error or value == 0 else max(4, math.ceil(math.log10(abs(value) / error)) + 2)
+    if not error or value == 0:
+        return 4
+    return max(4, math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2)
 
 
 def with_error(one: dict) -> str:
