@@ -22,7 +22,7 @@ def prediction(chi2, score, misfit):
     fit = SimpleNamespace(chi2=chi2, counts=np.full(chi2.size, 50), good=every)
     problem = SimpleNamespace(free=[])
     return Prediction(
-        np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, 0, misfit, np.zeros((0, 0))
+        np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, misfit, np.zeros((0, 0))
     )
 
 

@@ -125,7 +125,7 @@ def _label(fitted: Fitted) -> str:
 
 
 def distance(one: Fitted, other: Fitted, frequency: float) -> float:
-    """Root mean square of the difference of two machines [m] at a drive frequency [rad/s].
+    """Root mean square of the difference of two machines [unit of x] at a drive frequency [rad/s].
 
     Over some periods, from starts and crank angles of the records; the drive is that of the first record.
     """

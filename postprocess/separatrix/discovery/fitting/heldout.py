@@ -33,17 +33,18 @@ class Prediction:
     record: np.ndarray
     problem: Problem
     fit: Fit
-    shared: int
     # reduced chi^2 of the training records, at least 1
     misfit: float
-    # of the machine's parameters, the first `shared` ones that are free
+    # of the parameters of the machine, which come first among those that are free and were not fitted here
     covariance: np.ndarray
 
     @property
     def reduced_chi2(self) -> float:
         """Sum of squares per degree of freedom; the parameters of the machine were not fitted."""
         good = self.good
-        freedom = self.fit.counts[good].sum() - 2 * good.sum() - (len(self.problem.free) - self.shared)
+        freedom = (
+            self.fit.counts[good].sum() - 2 * good.sum() - (len(self.problem.free) - self.covariance.shape[0])
+        )
         return float(self.fit.chi2[good].sum() / max(1, freedom))
 
 
@@ -69,7 +70,7 @@ def predict(
     fit = again(problem, fit)
     used = covariance[np.ix_(shared, shared)]
     score = _scores(fit.chi2, fit.reduced.matrix, fit.reduced.gradient, used)
-    return Prediction(score, fit.good, problem.segments.record, problem, fit, len(shared), misfit, used)
+    return Prediction(score, fit.good, problem.segments.record, problem, fit, misfit, used)
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:

@@ -11,7 +11,7 @@ from separatrix.errors import SeparatrixError
 
 GAP = 1.5
 # shortest stretch that is fitted
-_FEWEST_IN_PIECE = 12
+FEWEST_IN_PIECE = 12
 # usual deviation of the steps of time from their median from which stamps are called uneven
 _UNEVEN = 0.01
 # rows on either side of an uneven step that tell a lost sample from a late stamp
@@ -37,11 +37,11 @@ def pieces_of(
         warnings.append(f"{where(row)}: gap of {t[row] - t[row - 1]:.4g} s; nothing is fitted across it")
     if gaps.size > 3:
         warnings.append(f"{gaps.size - 3} more gaps")
-    long = sum(last - first for first, last in pieces if last - first >= _FEWEST_IN_PIECE)
+    long = sum(last - first for first, last in pieces if last - first >= FEWEST_IN_PIECE)
     if long < fewest:
         raise SeparatrixError(
             f"{where(int(gaps[0]) if gaps.size else 0)}: gaps leave {long} samples in stretches of at least "
-            f"{_FEWEST_IN_PIECE}, {fewest} are needed"
+            f"{FEWEST_IN_PIECE}, {fewest} are needed"
         )
     if uneven:
         t = _evened(t, x, pieces, where, warnings)
@@ -93,7 +93,7 @@ def _followed(x: np.ndarray, late: np.ndarray, interval: float, pieces) -> tuple
     """
     delays, places = [], []
     for first, last in pieces:
-        if last - first >= _FEWEST_IN_PIECE:
+        if last - first >= FEWEST_IN_PIECE:
             speed = np.gradient(x[first:last])[2:-2] / interval
             delays.append(speed * np.diff(late[first:last], 4))
             places.append(np.diff(x[first:last], 4))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from separatrix.discovery.measured.clock import GAP
-from separatrix.discovery.measured.signals import resolution_of, runs, white_noise
+from separatrix.discovery.measured.signals import QUIET, resolution_of, runs, white_noise
 from separatrix.errors import SeparatrixError
 
 Where = Callable[[int], str]
@@ -18,8 +18,6 @@ _STRAY = (20.0, 5.0, 3.0)
 # rows on either side that show how fast steps change
 _AROUND = 5
 _MOST_STRAY = 3
-# least noise, over the scatter of x
-_QUIET = 1e-6
 # a held value ends with a jump: over the noise, the grid, and the usual steps before and after
 _HELD = (20.0, 3.0, 2.0)
 _SHORTEST_HELD = 3
@@ -71,7 +69,7 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list
     wide = np.flatnonzero(_gaps(t))
     for shift in range(-1, 3):
         bend[np.clip(wide + shift, 0, x.size - 1)] = np.inf
-    least = max(_STRAY[0] * max(white_noise(x), _QUIET * float(np.std(x))), _STRAY[1] * resolution_of(x))
+    least = max(_STRAY[0] * max(white_noise(x), QUIET * float(np.std(x))), _STRAY[1] * resolution_of(x))
     size = np.abs(off)
     rows = np.flatnonzero((size > least) & (size > _STRAY[2] * bend))
     said = [

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
 from separatrix.discovery.measured.records import Record
-from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
 
-# noise that is taken where there is none, over the scatter of x or v
-_QUIET = 1e-6
 _FEWEST_PER_PERIOD = 12
 _FEWEST_PERIODS = 2.0
 # largest difference of the intervals of two pieces, over the interval, with a measured force
@@ -100,7 +99,7 @@ def _noise(record: Record, rest: Record | None, resolution: float, unit: str, no
         notes.append(f"noise {sigma:.3g} {unit}, from fourth differences of x")
     sigma = max(sigma, floor)
     # a record that says that it has no noise was computed
-    least = _QUIET * float(np.std(record.x))
+    least = QUIET * float(np.std(record.x))
     if sigma <= (least if stated == 0 else 0):
         sigma = least
         notes.append(f"no noise found: {sigma:.3g} {unit} is taken")
@@ -113,7 +112,7 @@ def _velocity_noise(record: Record) -> float:
     stated = record.header.get("sensor_noise_sigma_m_s")
     if stated:
         return stated
-    return max(white_noise(record.v), resolution_of(record.v) / np.sqrt(12), _QUIET * float(np.std(record.v)))
+    return max(white_noise(record.v), resolution_of(record.v) / np.sqrt(12), QUIET * float(np.std(record.v)))
 
 
 def _find_drive(prepared: Prepared, model) -> None:
@@ -200,7 +199,7 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
     for first, last in record.pieces:
         steps = last - 1 - first
         # shorter ones are not fitted
-        if steps < _FEWEST_PER_PERIOD:
+        if steps < FEWEST_IN_PIECE:
             continue
         interval = float((record.t[last - 1] - record.t[first]) / steps)
         usual = usual or interval

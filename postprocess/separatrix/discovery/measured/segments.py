@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.smoother import Smoothed
 
@@ -40,7 +41,7 @@ def cut(records: list[Record], smoothed: list[Smoothed], lengths: list[int]) -> 
     for number, (record, smooth, length) in enumerate(zip(records, smoothed, lengths, strict=True)):
         smoothness = _calm(smooth)
         for first, last in record.pieces:
-            if last - first >= max(_FEWEST, min(length, 12)):
+            if last - first >= max(_FEWEST, min(length, FEWEST_IN_PIECE)):
                 rows += [(number, a, b) for a, b in _cut_piece(first, last, length, smoothness)]
     table = np.array(rows, int).reshape(-1, 3)
     return padded(table[:, 0], table[:, 1], table[:, 2])

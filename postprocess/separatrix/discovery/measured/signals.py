@@ -4,6 +4,8 @@
 
 import numpy as np
 
+# noise that is taken where none is found, over the scatter of the signal
+QUIET = 1e-6
 # variance of fourth differences of white noise of variance 1
 _FOURTH = 70.0
 # deviation of a multiple of the step of a grid from a whole number
@@ -19,7 +21,7 @@ def white_noise(x: np.ndarray) -> float:
 
 
 def resolution_of(x: np.ndarray) -> float:
-    """The step of the grid that the values lie on [m], 0 if there is none."""
+    """The step of the grid that the values lie on, 0 if there is none."""
     levels = np.unique(x)
     if levels.size < 2:
         return 0.0
