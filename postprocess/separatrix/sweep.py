@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from separatrix import pair_sweep, style
 from separatrix.case import describe_case, resolved_case, version_text
-from separatrix.labels import axis_label, count_text, plain
+from separatrix.labels import axis_label, count_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import table
 from separatrix.regions import Boundary, Region, boundaries, regions
@@ -42,7 +42,7 @@ def amplitude_diagram(result: xr.Dataset, title: str) -> Figure:
     handles += _draw_barriers(ax, result)
     handles += _draw_regions(ax, result, name)
     ax.set_xlabel(axis_label(result[name]))
-    ax.set_ylabel(r"extreme positions $x_\mathrm{max}$, $x_\mathrm{min}$ (m)")
+    ax.set_ylabel(rf"extreme positions $x_\mathrm{{max}}$, $x_\mathrm{{min}}$ ({unit(result['x_max'])})")
     caption = [*_caption(result, name), *_limits_caption(result), plain(version_text(result))]
     compose(figure, title, caption, handles, columns=5)
     return figure
@@ -70,8 +70,8 @@ def bifurcation_diagram(result: xr.Dataset, title: str) -> Figure:
         )
     _draw_run_pair(bottom, values, speed, result)
     _draw_barriers(top, result)
-    top.set_ylabel("position $x$ (m)\nonce per drive period")
-    bottom.set_ylabel("mean impact\nspeed (m/s)")
+    top.set_ylabel(f"position $x$ ({unit(result['strobe_x'])})\nonce per drive period")
+    bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
     bottom.set_xlabel(axis_label(result[name]))
     bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
     top.set_xlim(values.min(), values.max())

@@ -6,6 +6,7 @@
 !> the parameter changes and its angle carries over exactly.
 module sweep
   use attractors, only: features_t, most_coordinates, regime_impact, regime_non_impact
+  use circle, only: point_near
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: int64, wp
@@ -82,7 +83,7 @@ contains
     if (allocated(moving%pair)) held%mark = held%features%regime
     n = coordinates_of(moving)
     sizes = scales_of(moving, held%features%amplitude)
-    held%period = period_of(points(:n, :), sizes(:n))
+    held%period = period_of(points(:n, :), sizes(:n), moving%machine%turn)
     held%features%word = 0
     if (held%period > 0) held%features%word = word_of(moving, held%state, held%period)
   end subroutine hold_parameter
@@ -98,6 +99,7 @@ contains
     features%x_max = none
     features%x_min = none
     features%v_max = none
+    features%rotation = none
   end function no_features
 
   !> Event word of the `period` drive periods that follow a state.
@@ -118,15 +120,15 @@ contains
   end function word_of
 
   !> Smallest number of drive periods after which the samples repeat, 0 if none up to half of them does.
-  pure integer function period_of(samples, size_of_motion) result(period)
-    real(wp), intent(in) :: samples(:, :), size_of_motion(:)
+  pure integer function period_of(samples, size_of_motion, turn) result(period)
+    real(wp), intent(in) :: samples(:, :), size_of_motion(:), turn
     integer :: p, i
     logical :: repeats
     period = 0
     do p = 1, size(samples, 2)/2
       repeats = .true.
       do i = 1, size(samples, 2) - p
-        repeats = repeats .and. norm2((samples(:, i + p) - samples(:, i)) &
+        repeats = repeats .and. norm2((point_near(samples(:, i + p), samples(:, i), turn) - samples(:, i)) &
                                       /(size_of_motion + tiny(1.0_wp))) <= same_point
       end do
       if (repeats) then
