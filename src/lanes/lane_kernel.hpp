@@ -169,6 +169,24 @@ inline mask prove(const lane_machine &m, mask found, const lane_group &g) {
   return proven;
 }
 
+// Restitution at an impact speed w; as `restitution_at` of `contact_law.f90`.
+inline vec restitution_at(const lane_machine &m, vec w) {
+  vec k = m.restitution;
+  if (m.restitution_law == linear_restitution) {
+    k = m.restitution - m.coefficients[0] * w;
+    put(k, k < 0.0, vec{});
+  } else if (m.restitution_law == power_restitution) {
+    vec fallen = k * exponential(-m.coefficients[1] * logarithm(w / m.coefficients[0]));
+    put(k, w > m.coefficients[0], fallen);
+  } else if (m.restitution_law == viscoelastic_restitution) {
+    vec root = exponential(logarithm(w) / 5.0);
+    vec fallen = 1.0 - m.coefficients[0] * root + m.coefficients[1] * (root * root);
+    put(fallen, fallen < 0.0, vec{});
+    put(k, w > 2.2250738585072014e-308, pick(fallen < 1.0, fallen, 1));
+  }
+  return k;
+}
+
 // The events of the lanes `due`: Newton's impact or the reversal of friction, and the flight that follows.
 // Returns those that the scalar code must look at: sticking, chatter, a body that has left the domain.
 template <bool damping, bool layer>
@@ -176,7 +194,10 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   mask hit = g.hits > 0.5;
   vec w = g.direction * g.end_v, gap = g.direction * (barrier - g.end_x);
   vec push = -g.direction * g.end_a - m.kinetic;
-  mask plain = pick(hit, m.restitution * w > m.slow, push > m.break_away) & (magnitude(g.end_x) < m.domain);
+  vec restitution = m.restitution;
+  if (m.restitution_law != constant_restitution && any(due & hit))
+    restitution = restitution_at(m, w);
+  mask plain = pick(hit, restitution * w > m.slow, push > m.break_away) & (magnitude(g.end_x) < m.domain);
   turning turn;
   bool turns = layer && any(due & ~hit);
   if (turns) {
@@ -186,7 +207,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   }
   mask rare = due & ~plain;
   due = due & plain;
-  vec v = pick(hit, -m.restitution * g.end_v, 0);
+  vec v = pick(hit, -restitution * g.end_v, 0);
   vec v_jump = pick(hit, v - g.end_v, 0);
   vec y_jump = (-2 * m.offset) * g.direction, a_jump = (2 * m.kinetic) * g.direction;
   if (damping)

@@ -32,6 +32,8 @@ struct lane_machine {
   // Sliding and break-away friction per mass [m/s^2].
   double kinetic, break_away;
   double upper, lower, restitution;
+  // How the restitution depends on the impact speed, and the two numbers of that law.
+  double restitution_law, coefficients[2];
   // Rebounds up to this speed [m/s] may belong to a chatter sequence: left to the scalar code.
   double slow;
   // |x| up to which a flight is kept [m].
@@ -46,6 +48,10 @@ struct lane_machine {
   double cosine[most_harmonics], sine[most_harmonics];
   lane_layer layer;
 };
+
+// Laws of restitution, by the numbers of `contact_law.f90`.
+const double constant_restitution = 0, linear_restitution = 1, power_restitution = 2,
+             viscoelastic_restitution = 3;
 
 // What a lane is doing.
 const double lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4;

@@ -134,6 +134,30 @@ inline reg exponential(reg x) {
 
 inline vec exponential(vec x) { return {exponential(x.low), exponential(x.high)}; }
 
+// Natural logarithm of normal x > 0.
+inline reg logarithm(reg x) {
+  const int64_t of_half = 0x3FE0000000000000, of_fraction = 0x000FFFFFFFFFFFFF;
+  reg_mask bits = (reg_mask)x;
+  reg twos = (reg)((reg_mask)all(to_integer) + ((bits >> 52) - 1022)) - to_integer;
+  reg f = (reg)((bits & of_fraction) | of_half);
+  reg_mask small = f < 0.70710678118654752440;
+  f = small ? 2.0 * f : f;
+  twos = small ? twos - 1.0 : twos;
+  f = f - 1.0;
+  reg s = f / (2.0 + f), z = s * s;
+  reg r = z * (6.666666666666735130e-01 +
+               z * (3.999999999940941908e-01 +
+                    z * (2.857142874366239149e-01 +
+                         z * (2.222219843214978396e-01 +
+                              z * (1.818357216161805012e-01 +
+                                   z * (1.531383769920937332e-01 + z * 1.479819860510658591e-01))))));
+  reg half_square = 0.5 * f * f;
+  return twos * 6.93147180369123816490e-01 -
+         ((half_square - (s * (half_square + r) + twos * 1.90821492927058770002e-10)) - f);
+}
+
+inline vec logarithm(vec x) { return {logarithm(x.low), logarithm(x.high)}; }
+
 } // namespace
 
 #endif

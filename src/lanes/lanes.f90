@@ -5,7 +5,6 @@
 !> stops at its time, or is left to the event loop of module `motion` where something rare is due. What comes out of a lane does
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
-  use contact_law, only: contact_constant
   use elementary, only: exponential, logarithm
   use exact_flow, only: flow_t
   use kinds, only: wp
@@ -46,7 +45,7 @@ module lanes
   type, bind(c) :: machine_t
     real(c_double) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, period = 0
     real(c_double) :: rest = 0, offset = 0, kinetic = 0, break_away = 0
-    real(c_double) :: upper = 0, lower = 0, restitution = 0, slow = 0, domain = 0
+    real(c_double) :: upper = 0, lower = 0, restitution = 0, restitution_law = 0, coefficients(2) = 0, slow = 0, domain = 0
     real(c_double) :: bound_periodic = 0, bound_free = 0, close = 0, stride = 0
     integer(c_int) :: harmonics = 0
     real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
@@ -105,16 +104,15 @@ contains
     widest_lanes = separatrix_lane_width()
   end function widest_lanes
 
-  !> Lanes for one body with a closed form, no Stribeck layer, no harmonic at resonance, and rigid barriers of constant
-  !> restitution, if its options ask for lanes.
+  !> Lanes for one body with a closed form, no Stribeck layer, no harmonic at resonance, and rigid barriers, if its options ask
+  !> for lanes.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     real(wp) :: fastest
     flow%width = moving%options%lane_width
     flow%available = flow%width > 0 .and. moving%exact .and. moving%flow%harmonics <= most_harmonics
-    flow%available = flow%available .and. .not. allocated(moving%pair) .and. .not. moving%machine%contact%soft .and. &
-      moving%machine%contact%kind == contact_constant
+    flow%available = flow%available .and. .not. allocated(moving%pair) .and. .not. moving%machine%contact%soft
     if (.not. flow%available) return
     associate (from => moving%flow, m => flow%machine, law => moving%machine)
       m%natural = from%natural
@@ -130,6 +128,8 @@ contains
       m%upper = law%contact%upper
       m%lower = law%contact%lower
       m%restitution = law%contact%restitution
+      m%restitution_law = law%contact%kind
+      m%coefficients = law%contact%coefficients
       m%slow = chatter_speed(law)
       m%domain = moving%options%domain
       m%bound_free = from%natural**7/from%damped
