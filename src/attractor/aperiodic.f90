@@ -127,7 +127,11 @@ contains
       if (boxes_meet(found, catalogue(k))) then
         ! What is not known does not widen what is.
         if (found%kind == kind_not_known .and. catalogue(k)%kind == kind_chaotic) return
-        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) catalogue(k) = found
+        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) then
+          catalogue(k)%kind = kind_chaotic
+          catalogue(k)%features = found%features
+          catalogue(k)%multiplier = found%multiplier
+        end if
         call widen(catalogue(k), found%points)
         catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
         return
