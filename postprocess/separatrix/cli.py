@@ -10,9 +10,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from separatrix import basin, contact, points, style, sweep, trajectory
+from separatrix import style
 from separatrix.arguments import Parser, list_of, whole_number
 from separatrix.errors import USAGE, SeparatrixError
+from separatrix.figures import basin, contact, points, sweep, trajectory
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
 from separatrix.save import FORMATS, save

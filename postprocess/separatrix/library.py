@@ -17,11 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.errors import SeparatrixError
+from separatrix.program import NATIVE, SOURCE_TREE
 
 __all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
-
-# of an installation that was not copied elsewhere
-SOURCE_TREE = Path(__file__).resolve().parents[2]
 
 _NONE = 1e308  # bounds beyond this mean that there is none
 _TEXT = 4096
@@ -239,13 +237,13 @@ def effects() -> dict[str, Effect]:
 
 
 def library_path() -> Path:
-    """Return where the library is: $SEPARATRIX_LIBRARY, beside the installed program, or in build/lib."""
+    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, in build/lib, beside the program."""
     asked = os.environ.get("SEPARATRIX_LIBRARY")
     if asked:
         return Path(asked)
     program = shutil.which("separatrix")
-    folders = [Path(program).resolve().parent.parent / "lib"] if program else []
-    folders.append(SOURCE_TREE / "build" / "lib")
+    folders = [NATIVE / "lib", SOURCE_TREE / "build" / "lib"]
+    folders += [Path(program).resolve().parent.parent / "lib"] if program else []
     for folder in folders:
         path = folder / "libseparatrix.so"
         if path.is_file():

@@ -15,6 +15,13 @@ if(SEPARATRIX_MPI)
   target_compile_definitions(separatrix_mpi INTERFACE SEPARATRIX_MPI)
 endif()
 
+# Debian's shared HDF5 brings in curl and Kerberos for a driver that nothing here uses; a static one leaves that out.
+if(SEPARATRIX_STATIC)
+  set(HDF5_USE_STATIC_LIBRARIES ON)
+  set(ZLIB_USE_STATIC_LIBS ON)
+  set(CMAKE_FIND_LIBRARY_SUFFIXES .a)
+endif()
+
 # With both kinds of HDF5 installed, the module takes the one that is asked for or, silently, the other.
 set(HDF5_PREFER_PARALLEL ${SEPARATRIX_MPI})
 find_package(HDF5 1.10 REQUIRED COMPONENTS C Fortran HL)

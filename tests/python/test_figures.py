@@ -12,9 +12,10 @@ import xarray as xr
 from figure_probes import V0, X0, draw, drawn, legend_texts
 from matplotlib.figure import Figure
 from sample_files import write_basin, write_points, write_sweep, write_trajectory
-from separatrix import basin, cli, points, style, sweep, trajectory
+from separatrix import cli, style
+from separatrix.figures import basin, points, sweep, trajectory
+from separatrix.figures.regions import Boundary, boundaries, regions
 from separatrix.open import open_result, table
-from separatrix.regions import Boundary, boundaries, regions
 
 
 def test_runs_and_branches_are_all_drawn(tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ import pytest
 from figure_probes import V0, X0, colour_at, draw, legend_texts
 from matplotlib.colors import to_rgb
 from sample_files import write_basin
-from separatrix import basin, reduce, style
+from separatrix import reduce, style
+from separatrix.figures import basin
 from separatrix.labels import share_texts
 
 

@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from separatrix import pair_sweep, style
-from separatrix.case import describe_case, resolved_case, version_text
+from separatrix import style
+from separatrix.figures import pair_sweep
+from separatrix.figures.caption import describe_case, resolved_case, version_text
+from separatrix.figures.regions import Boundary, Region, boundaries, regions
 from separatrix.labels import axis_label, count_text, plain
 from separatrix.layout import compose
 from separatrix.open import table
-from separatrix.regions import Boundary, Region, boundaries, regions
 
 _UP, _DOWN = 0, 1
 _NOT_RUN = 0

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from separatrix import contact, energy, pair, style
-from separatrix.case import describe_case, resolved_case, version_text
+from separatrix import style
+from separatrix.figures import contact, energy, pair
+from separatrix.figures.caption import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names

@@ -9,8 +9,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from separatrix import style
-from separatrix.case import describe_case, version_text
 from separatrix.classes import class_counts, classes
+from separatrix.figures.caption import describe_case, version_text
 from separatrix.labels import axis_label, count_text, plain, share_texts
 from separatrix.layout import compose
 

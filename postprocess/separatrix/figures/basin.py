@@ -17,9 +17,9 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from separatrix import style
-from separatrix.case import describe_case, start_pieces, version_text
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes
 from separatrix.errors import USAGE, SeparatrixError
+from separatrix.figures.caption import describe_case, start_pieces, version_text
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
 from separatrix.layout import compose
 from separatrix.open import table
