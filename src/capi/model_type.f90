@@ -5,12 +5,13 @@
 module model_type
   use case_echo, only: echo_case
   use case_reader, only: load_case, load_case_text
+  use case_setup, only: options_of
   use case_type, only: case_t, drive_law
   use case_values, only: allowed_range, bounds_t
   use errors, only: error_t, fail
-  use kinds, only: int64, wp
+  use kinds, only: wp
   use law_table, only: law_choice_t, set_value
-  use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
+  use motion_state, only: options_t
   use parameter_list, only: list_parameters, parameter_t, put_values
   use status, only: exit_bad_case, exit_usage
   use suggest, only: nearest_word
@@ -115,21 +116,12 @@ contains
   end subroutine laws_with_force
 
   !> Integrator options of the case with another `tolerance` of the adaptive flight.
-  pure function model_options(model, tolerance) result(options)
+  function model_options(model, tolerance) result(options)
     type(model_t), intent(in) :: model
     real(wp), intent(in) :: tolerance
     type(options_t) :: options
-    select case (model%the_case%integrator%flight)
-    case ('exact')
-      options%flight = flight_exact
-    case ('adaptive')
-      options%flight = flight_adaptive
-    case default
-      options%flight = flight_auto
-    end select
+    options = options_of(model%the_case)
     options%tolerance = tolerance
-    options%event_budget = int(model%the_case%integrator%event_budget, int64)
-    options%domain = model%the_case%run%domain
   end function model_options
 
   !> The resolved case with other values. Code 65 if together they make no valid case.
