@@ -18,6 +18,8 @@ __all__ = ["Case", "linspace", "load"]
 
 # The program cuts an override that is longer.
 _LONGEST_SETTING = 4000
+# A setting that is longer is not repeated in messages.
+_SHORT = 60
 
 
 class linspace:  # noqa: N801
@@ -46,8 +48,7 @@ class Case:
         try:
             self._model = Model.from_settings(text, self._name, self._settings)
         except CaseError as error:
-            # "--set" is the spelling of the command line
-            raise CaseError(str(error).replace("--set ", ""), error.code) from None
+            raise CaseError(_in_python(str(error), self._settings), error.code) from None
 
     @classmethod
     def from_text(cls, text: str, directory: str | Path = ".") -> Self:
@@ -56,7 +57,7 @@ class Case:
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, object], directory: str | Path = ".") -> Self:
-        """Return the case of nested mappings: `{"body": {"mass": "1 kg"}, "friction": {"law": "viscous", ...}}`."""
+        """Return the case of nested mappings: `{"body": {"mass": "1 kg"}, "friction": {"law": ...}}`."""
         # a key of a table of its own has to be a mapping; all others are values of a table
         settings = [f"{key}={toml(value)}" for key, value in _flat(tables)]
         return cls("", Path(directory) / "case.toml", settings)
@@ -65,9 +66,9 @@ class Case:
         """Return this case with other values: `case.with_(drive__ratio=1.3)`, or `{"drive.ratio": 1.3}`.
 
         Keys are those of a case file; two underscores stand for a dot, and `axis[1].count` is written as a
-        key of a mapping. Values are numbers in SI units, texts with a unit ("12 mm"), lists, or mappings that replace a
-        whole table: `case.with_(friction={"law": "viscous", "damping": 0.2})`. What is unknown or out of
-        bounds is a CaseError.
+        key of a mapping. Values are numbers in SI units, texts with a unit ("12 mm"), lists, or mappings
+        that replace a whole table: `case.with_(friction={"law": "viscous", "damping": 0.2})`. What is
+        unknown or out of bounds is a CaseError.
         """
         new = {**(changes or {}), **{key.replace("__", "."): value for key, value in more.items()}}
         settings = [f"{key}={toml(value)}" for key, value in new.items()]
@@ -177,6 +178,15 @@ def toml(value: object) -> str:
     if isinstance(value, Iterable):
         return "[" + ", ".join(toml(item) for item in value) + "]"
     raise CaseError(f"found {value!r}, allowed a number, a text, a list or a mapping", USAGE)
+
+
+def _in_python(message: str, settings: Iterable[str]) -> str:
+    """A message without the spelling of the command line, and without what would fill a screen."""
+    message = message.replace("--set ", "")
+    for setting in settings:
+        if len(setting) > _SHORT:
+            message = message.replace(f"{setting}: ", f"{setting.partition('=')[0]}: ")
+    return message
 
 
 def _flat(tables: Mapping[str, object]) -> list[tuple[str, object]]:

@@ -30,7 +30,7 @@ class SeparatrixWarning(UserWarning):
     """Something in a run that should be known to judge its results."""
 
 
-class Interrupted(KeyboardInterrupt):  # noqa: N818
+class Interrupted(KeyboardInterrupt):
     """A run was stopped; what it has done is kept, and `resume` goes on with it.
 
     It is a KeyboardInterrupt: nothing that does not ask for it swallows it. `done` is the share of the work

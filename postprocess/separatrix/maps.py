@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`basin`, `sweep`, `points`, `run`: what the program computes, as Datasets."""
 
-import shutil
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from separatrix.cases import Case, as_case, linspace, toml
+from separatrix.cases import Case, as_case, linspace
 from separatrix.errors import USAGE, CaseError, Interrupted, SeparatrixError
+from separatrix.labelling import Labelling, axis_values, can_label
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.runner import StoppedError, cores, run
@@ -54,7 +55,7 @@ class _Work:
             with Progress(self.progress) as told:
                 self._compute(place, target, told, resume=self.resume or folder is not None)
         except StoppedError as stop:
-            again = "; call again with resume=True, or resume() of this exception" if self.output else "; resume() goes on"
+            again = "; resume() goes on" + (", and so does resume=True" if self.output else "")
             raise Interrupted(
                 f"stopped at {100 * stop.done:.0f} %{again}", stop.done, lambda: self(own)
             ) from None
@@ -108,6 +109,7 @@ def basin(
     /,
     *,
     output: str | Path | None = None,
+    threads: int | None = None,
     workers: int | None = None,
     ranks: int | None = None,
     progress: bool | Report | None = None,
@@ -123,17 +125,18 @@ def basin(
     case
         The machine, as a Case or the file of one.
     axes, **more
-        Axes by name: `x0`, `v0`, `crank_angle`, or the path of a parameter (`{"drive.ratio": ...}`, as a keyword
-        `drive__ratio=...`). Values are `sx.linspace(first, last, count)`, the same as a tuple
-        `(first, last, count)`, an ascending list or array, or a whole number: that many values over the range of the
-        case. None takes an axis away. Axes of the case that are not named stay; new ones come first, as the slowest.
+        Axes by name: `x0`, `v0`, `crank_angle`, or the path of a parameter (`{"drive.ratio": ...}`, as a
+        keyword `drive__ratio=...`). Values are `sx.linspace(first, last, count)`, the same as a tuple
+        `(first, last, count)`, an ascending list or array, or a whole number: that many values over the range
+        of the case. None takes an axis away. Axes of the case that are not named stay; new ones come first,
+        as the slowest.
     output
-        The result file. Without one the result is kept in memory.
-    workers
-        Serial processes on this machine, each with a share of the tiles. None: one for each core, or one
-        for small maps. The result does not depend on it, to the bit.
-    ranks
-        Ranks of MPI instead, where the program has been built with it.
+        The result file. Without one the result is kept in memory and computed in this process.
+    threads, workers, ranks
+        Choose one: threads of this process (the default without `output`); serial processes on this machine,
+        each with a share of the tiles (the default with `output`); ranks of MPI, where the program has been
+        built with it. How many: by default one for each core, or one for small maps. The result does not
+        depend on it, to the bit.
     progress
         True, False, None (a bar in a terminal or a notebook), or a function of (things, done, total).
     resume
@@ -151,6 +154,11 @@ def basin(
     number = int(np.prod(sizes)) if sizes else 0
     if output is None and number > _MOST_IN_MEMORY:
         raise SeparatrixError(f"{number} points are kept in a file: give output=FILE", USAGE)
+    here = output is None and workers is None and ranks is None and time_limit is None
+    if threads is not None and not here:
+        raise SeparatrixError("threads: allowed without output, workers, ranks and time_limit", USAGE)
+    if here and can_label(case):
+        return Labelling(case, _workers(threads, None, number, "threads"), progress)()
     work = _Work(
         "basin", case, _path(output), _workers(workers, ranks, number), ranks, progress, resume, overwrite,
         time_limit, lambda place: [],
@@ -183,7 +191,8 @@ def sweep(
     case
         The machine, as a Case or the file of one. What is not given is that of its table [sweep].
     parameter, values
-        The path of what is swept and its values: `sx.linspace(first, last, count)`, a tuple of the same, or an array.
+        The path of what is swept and its values, evenly spaced: `sx.linspace(first, last, count)`, a tuple
+        of the same, or an array.
     directions
         "both", "up" or "down".
     starts, x0, v0
@@ -193,7 +202,8 @@ def sweep(
     limit_tolerance
         Width to which the limits of a region are bracketed.
     output, ranks, progress, resume, overwrite, time_limit
-        As for `basin`. A sweep runs on one core, or on `ranks` of MPI: each value begins where the one before ended.
+        As for `basin`. A sweep runs on one core, or on `ranks` of MPI: each value begins where the one
+        before ended.
     """
     case = as_case(case)
     table = dict(case.resolved.get("sweep", {}))
@@ -204,7 +214,7 @@ def sweep(
             raise CaseError(f"sweep over {parameter}: values are missing", USAGE)
     if values is not None:
         table = {key: value for key, value in table.items() if key not in ("from", "to", "count", "values")}
-        table |= _axis_values("values", values, None)
+        table |= _even(_axis_values(table["parameter"], values, None))
     given = {
         "directions": directions, "starts": starts, "x0": x0, "v0": v0, "samples": samples,
         "limit_tolerance": limit_tolerance,
@@ -231,9 +241,9 @@ def points(
 ) -> xr.Dataset:
     """Return the state at the end of the duration of many starts.
 
-    `starts` has the columns x0 [m], v0 [m/s] and optionally the drive ratio: a mapping, a DataFrame, a Dataset, or an
-    array with two or three columns; or each as a keyword, `points(case, x0=[...], v0=0.0)`. The rest is as for
-    `basin`.
+    `starts` has the columns x0 [m], v0 [m/s] and optionally the drive ratio: a mapping, a DataFrame, a
+    Dataset, or an array with two or three columns; or each as a keyword, `points(case, x0=[...], v0=0.0)`.
+    The rest is as for `basin`.
     """
     case = as_case(case)
     table = _starts(starts, columns)
@@ -276,14 +286,24 @@ def _with_axes(case: Case, asked: Mapping[str, Values]) -> Case:
             axes.append(old[name])
         elif asked[name] is not None:
             axes.append({"name": name} | _axis_values(name, asked[name], old.get(name)))
-    return case.with_({"axis": axes})
+    try:
+        return case.with_({"axis": axes})
+    except CaseError as error:
+        # "axis=[...]: key 'axis[1]': found ..."
+        text = re.sub(r"^axis(=\[.*\])?: ", "", str(error), flags=re.MULTILINE)
+        text = re.sub(
+            r"key 'axis\[(\d+)\](?:\.name)?", lambda found: f"axis '{axes[int(found[1]) - 1]['name']}", text
+        )
+        raise CaseError(f"{case.name}: {text}", error.code) from None
 
 
 def _axis_values(name: str, values: Values, old: Mapping[str, object] | None) -> dict[str, object]:
     """Return the keys of an axis."""
     if isinstance(values, int | np.integer) and not isinstance(values, bool):
         if old is None:
-            raise CaseError(f"axis {name}: found a count alone, allowed where the case has such an axis", USAGE)
+            raise CaseError(
+                f"axis {name}: found a count alone, allowed where the case has such an axis", USAGE
+            )
         first, last = (old["from"], old["to"]) if "from" in old else (old["values"][0], old["values"][-1])
         return {"from": first, "to": last, "count": int(values)}
     if isinstance(values, float | np.floating):
@@ -298,6 +318,17 @@ def _axis_values(name: str, values: Values, old: Mapping[str, object] | None) ->
     return {"values": array.tolist()}
 
 
+def _even(axis: dict[str, object]) -> dict[str, object]:
+    """Return first, last and count of values that have to be evenly spaced."""
+    if "values" not in axis:
+        return axis
+    values = np.array(axis["values"])
+    even = {"from": float(values[0]), "to": float(values[-1]), "count": values.size}
+    if not np.allclose(axis_values(even), values, rtol=1e-12, atol=1e-12 * np.abs(values).max()):
+        raise CaseError("values: found unevenly spaced ones, allowed for a sweep is sx.linspace(...)", USAGE)
+    return even
+
+
 def _size(axis: Mapping[str, object]) -> int:
     return int(axis["count"]) if "count" in axis else len(axis["values"])
 
@@ -310,7 +341,7 @@ def _path(output: str | Path | None) -> Path | None:
     return None if output is None else Path(output).expanduser()
 
 
-def _workers(workers: int | None, ranks: int | None, number: int) -> int:
+def _workers(workers: int | None, ranks: int | None, number: int, name: str = "workers") -> int:
     if ranks is not None:
         if workers not in (None, 1):
             raise SeparatrixError("workers and ranks: choose one", USAGE)
@@ -320,7 +351,7 @@ def _workers(workers: int | None, ranks: int | None, number: int) -> int:
     if workers is None:
         return 1 if number < _FEW_POINTS else cores()
     if workers < 1:
-        raise SeparatrixError(f"workers: found {workers}, allowed 1 or more", USAGE)
+        raise SeparatrixError(f"{name}: found {workers}, allowed 1 or more", USAGE)
     return int(workers)
 
 
@@ -329,7 +360,13 @@ def _starts(starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarr
     if starts is None:
         given = dict(columns)
     elif hasattr(starts, "keys"):
-        given = {str(key): starts[key] for key in starts.keys() if str(key) in ("x0", "v0", "ratio")}  # noqa: SIM118
+        # a table may have further columns, a mapping is written for this
+        further = hasattr(starts, "to_dict")
+        given = {
+            str(key): starts[key]
+            for key in starts.keys()  # noqa: SIM118
+            if not further or str(key) in ("x0", "v0", "ratio")
+        }
     else:
         array = np.asarray(starts, float)
         if array.ndim != 2 or array.shape[1] not in (2, 3):
@@ -338,7 +375,8 @@ def _starts(starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarr
     unknown = set(given) - {"x0", "v0", "ratio"}
     if unknown or not {"x0", "v0"} <= set(given):
         raise SeparatrixError(
-            f"starts: found the columns {', '.join(given) or 'none'}, allowed x0, v0 and optionally ratio", USAGE
+            f"starts: found the columns {', '.join(given) or 'none'}, allowed x0, v0 and optionally ratio",
+            USAGE,
         )
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in given.values()))
     if arrays[0].ndim != 1:

@@ -88,4 +88,10 @@ def _new_bar(things: str, total: int, done: int) -> object:
     else:
         from tqdm import tqdm
     # what was done before this run has no part in the rate
-    return tqdm(total=total, initial=done if done > 0.5 * total else 0, unit=" " + things, unit_scale=True, leave=False)
+    return tqdm(
+        total=total,
+        initial=done if done > 0.5 * total else 0,
+        unit=" " + things,
+        unit_scale=True,
+        leave=False,
+    )

@@ -122,7 +122,7 @@ def _start(
         text=True,
         errors="replace",
         env={**_MPI_ENVIRONMENT, **os.environ, **(environment or {})} if ranks or environment else None,
-        # A group of its own: Ctrl-C in a terminal reaches this process alone, which then asks the program to stop.
+        # A group of its own: Ctrl-C reaches this process alone, which then asks the program to stop.
         process_group=0,
         preexec_fn=_end_with_parent(),
     )

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One style for all figures: print widths, fonts, colours that colour-blind readers can tell apart."""
 
+import io
 from contextlib import AbstractContextManager
 
 import matplotlib
@@ -75,9 +76,23 @@ def context() -> AbstractContextManager:
     return matplotlib.rc_context(_RC)
 
 
+class PrintFigure(Figure):
+    """A figure that is saved in this style whatever the settings of the caller, and shown by notebooks."""
+
+    def savefig(self, *arguments: object, **options: object) -> None:
+        """Save it as matplotlib does."""
+        with context():
+            super().savefig(*arguments, **options)
+
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=200)
+        return image.getvalue()
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size in mm; no window system is needed."""
-    figure = Figure(figsize=(width / 25.4, height / 25.4))
+    figure = PrintFigure(figsize=(width / 25.4, height / 25.4))
     FigureCanvasAgg(figure)
     return figure
 

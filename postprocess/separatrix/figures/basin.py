@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Basin maps: which motion each starting point leads to."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -37,7 +39,7 @@ class _Panel:
     plane: Plane
 
 
-def figures(path: str | Path, result: xr.Dataset, field: str | None, title: str) -> dict[str, Figure]:
+def figures(path: str | Path | None, result: xr.Dataset, field: str | None, title: str) -> dict[str, Figure]:
     """Return the maps of a basin file by name: regime and attractor, or the one field that is asked for.
 
     Without any label there is no map of the attractors, unless it is asked for.
@@ -48,11 +50,12 @@ def figures(path: str | Path, result: xr.Dataset, field: str | None, title: str)
             known = ", ".join(
                 key for key, var in result.data_vars.items() if var.dims == result["regime"].dims
             )
-            raise SeparatrixError(f"{path}: no field '{name}'; known fields: {known}", USAGE)
+            where = "" if path is None else f"{path}: "
+            raise SeparatrixError(f"{where}no field '{name}'; known fields: {known}", USAGE)
     return {name: basin_map(path, result, name, title) for name in names}
 
 
-def basin_map(path: str | Path, result: xr.Dataset, field: str, title: str) -> Figure:
+def basin_map(path: str | Path | None, result: xr.Dataset, field: str, title: str) -> Figure:
     """Return the map of one field over the initial conditions, one panel per value of the other axes."""
     down, across = plane_axes(result)
     others = [name for name in result[field].dims if name not in (down, across)]
@@ -101,12 +104,16 @@ def _labelled(result: xr.Dataset) -> bool:
 
 
 def _read_panels(
-    path: str | Path, result: xr.Dataset, field: str, axes: tuple, others: list[str], places: list[tuple]
+    path: str | Path | None,
+    result: xr.Dataset,
+    field: str,
+    axes: tuple,
+    others: list[str],
+    places: list[tuple],
 ) -> list[_Panel]:
     dims = result[field].dims
     panels = []
-    with h5py.File(path, "r") as file:
-        dataset = file[field]
+    with _source(path, result, field) as dataset:
         if axes[0] is None:
             dataset = _Strip(dataset)
         plane = (dims.index(axes[0]), dims.index(axes[1])) if axes[0] else (1, 0)
@@ -123,13 +130,23 @@ def _read_panels(
     return panels
 
 
+@contextmanager
+def _source(path: str | Path | None, result: xr.Dataset, field: str) -> Iterator[h5py.Dataset | np.ndarray]:
+    """The field in its file, which is read by slabs, or without a path in memory."""
+    if path is None:
+        yield result[field].values
+    else:
+        with h5py.File(path, "r") as file:
+            yield file[field]
+
+
 class _Strip:
     """A dataset with one axis seen as one with a second axis of length 1."""
 
     ndim = 2
     chunks = None
 
-    def __init__(self, dataset: h5py.Dataset) -> None:
+    def __init__(self, dataset: h5py.Dataset | np.ndarray) -> None:
         self._dataset = dataset
         self.shape = (*dataset.shape, 1)
         self.dtype = dataset.dtype
