@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a new user does with an installed wheel; run by scripts/wheel.
 
-wheel_check.py                     a map in threads, in processes and by the program, its figure, `verify`, a motion
+wheel_check.py                     a map in threads and in processes, its figure, a motion, `verify`
 wheel_check.py --compare ONE TWO   whether two maps have the same bits
 """
 
@@ -35,7 +35,7 @@ def main() -> None:
         assert differing(*map(sx.open_result, sys.argv[2:4])) == []
         print(f"  {sys.argv[2]} and {sys.argv[3]}: the same bits")
         return
-    print(f"  separatrix {sx.__version__} in {Path(sx.__file__).parent}, imported in {1000 * IMPORTED:.0f} ms")
+    print(f"  {Path(sx.__file__).parent}, imported in {1000 * IMPORTED:.0f} ms")
     assert IMPORTED < 0.5, IMPORTED
     case = sx.load("basin_coulomb.toml")
     result = sx.basin(case, x0=60, v0=50)

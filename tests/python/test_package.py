@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The package as it is installed: one version, a quick import, the program and the library that it finds."""
 
+import importlib.machinery
+import importlib.util
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -89,3 +92,24 @@ def test_the_program_is_found_in_the_package_then_in_the_build(
     monkeypatch.setenv("SEPARATRIX_PROGRAM", str(tmp_path / "absent"))
     with pytest.raises(SeparatrixError, match="absent: no such file"):
         program.program_path()
+
+
+def test_a_release_writes_the_version_everywhere(source_dir: Path, tmp_path: Path) -> None:
+    loader = importlib.machinery.SourceFileLoader("release", str(source_dir / "scripts" / "release"))
+    release = importlib.util.module_from_spec(importlib.util.spec_from_loader("release", loader))
+    loader.exec_module(release)
+    for name in release.PLACES:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(source_dir / name, tmp_path / name)
+    old = {name: (tmp_path / name).read_text() for name in release.PLACES}
+    with pytest.raises(SystemExit, match="allowed is a version"):
+        release.write("1.2", tmp_path)
+    # twice, because the first makes lines that the second replaces
+    for version in ("9.8.6", "9.8.7"):
+        assert release.write(version, tmp_path) == 0
+    for name in release.PLACES:
+        new = (tmp_path / name).read_text()
+        assert new != old[name]
+        assert "9.8.7" in new
+        assert name == "CHANGELOG.md" or "9.8.6" not in new
+    assert cmake_version(tmp_path) == "9.8.7"

@@ -3,6 +3,7 @@
 """Python computes what the program computes, to the bit, and says what is wrong as it does."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -315,3 +316,20 @@ def test_results_draw_the_figures_of_the_command(
     assert motion.separatrix.plot("phase")._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(sx.SeparatrixError, match="no figure 'fase'; there are"):
         motion.separatrix.plot("fase")
+
+
+def test_the_code_of_the_guide_runs(
+    source_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every Python block of docs/python.md, one after the other, and what it says that it prints."""
+    guide = (source_dir / "docs" / "python.md").read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```", guide, re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 4
+    (tmp_path / "examples").symlink_to(source_dir / "examples")
+    monkeypatch.chdir(tmp_path)
+    said: list[str] = []
+    names = {"print": lambda *what: said.append(" ".join(map(str, what)))}
+    for block in blocks:
+        exec(compile(block, "docs/python.md", "exec"), names)
+    assert said == re.findall(r"print\(error\) +# (.*)", guide)
+    assert (tmp_path / "bifurcation.png").stat().st_size > 10_000
