@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from separatrix.figures.look import Look
+
 
 @xr.register_dataset_accessor("separatrix")
 class Accessor:
@@ -89,13 +91,24 @@ class Accessor:
         case = self.case.with_(parameters) if not parameters else self.case.with_(**parameters)
         return trajectory(case, x0, v0, crank_angle, duration=duration, samples=samples)
 
-    def plot(self, name: str | None = None, *, title: str | None = None) -> "Figure":
+    def plot(
+        self,
+        name: str | None = None,
+        *,
+        title: str | None = None,
+        style_sheet: str | Path | None = None,
+        **wishes: object,
+    ) -> "Figure":
         """Return a figure of this result, the first if no `name` is given.
 
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
-        "settle_time", ...), of a sweep "amplitude" and "bifurcation", of a trajectory "history", "phase",
-        "energy" and "contact", of points "regime".
-        Notebooks show the figure; `savefig` writes it, `save` in several formats.
+        "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
+        "phase", "energy" and "contact", of points "regime". Notebooks show the figure; `savefig` writes it,
+        `save` in several formats.
+
+        `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
+        slice={"drive.ratio": 1.2}, axes=("v0", "x0"), units=["mm"], shade=True, attractors=False,
+        colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
         from separatrix.figures import basin, points, sweep, trajectory
@@ -103,12 +116,13 @@ class Accessor:
 
         kind = self.kind
         heading = plain(title or str(self._result.attrs.get("title", "")))
-        with style.context():
+        look = _look(wishes)
+        with style.context(style_sheet):
             if kind == "basin":
-                made = basin.figures(None, self._result, name, heading)
+                made = basin.figures(None, self._result, name, heading, look)
             else:
                 modules = {"sweep": sweep, "trajectory": trajectory, "points": points}
-                made = modules[kind].figures(self._result, heading)
+                made = modules[kind].figures(self._result, heading, look)
         if name is not None and name not in made:
             raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)
         return made[name] if name else next(iter(made.values()))
@@ -120,16 +134,49 @@ class Accessor:
         *,
         formats: Sequence[str] = ("png", "pdf"),
         dpi: int = 300,
-        title: str | None = None,
+        **wishes: object,
     ) -> list[Path]:
-        """Write a figure as STEM.png, STEM.pdf, ...; return the paths."""
+        """Write a figure as STEM.png, STEM.pdf, ...; return the paths. `wishes` as for `plot`."""
         from separatrix import style
         from separatrix.save import save
 
-        figure = self.plot(name, title=title)
+        figure = self.plot(name, **wishes)
         with style.context():
             return save(figure, Path(stem), formats, dpi)
+
+    def animate(
+        self,
+        parameter: str,
+        path: str | Path,
+        field: str = "attractor",
+        *,
+        title: str | None = None,
+        frames_per_second: float = 5.0,
+        dpi: int = 150,
+        **wishes: object,
+    ) -> Path:
+        """Write a map moving through one of its parameters, as .gif or, with ffmpeg, as .mp4."""
+        from separatrix.figures.animation import animate
+        from separatrix.labels import plain
+
+        self._require("basin")
+        heading = plain(title or str(self._result.attrs.get("title", "")))
+        look = _look(wishes)
+        return animate(self._result, parameter, Path(path), heading, field, look, frames_per_second, dpi)
 
     def _require(self, kind: str) -> None:
         if self.kind != kind:
             raise SeparatrixError(f"this is a {self.kind}, not a {kind}", USAGE)
+
+
+def _look(wishes: dict[str, object]) -> "Look":
+    """The wishes as a Look; unknown ones are named."""
+    from dataclasses import fields
+
+    from separatrix.figures.look import Look
+
+    known = [one.name for one in fields(Look)]
+    for name in wishes:
+        if name not in known:
+            raise SeparatrixError(f"found '{name}', allowed {', '.join(known)}", USAGE)
+    return Look(**wishes)
