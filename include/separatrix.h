@@ -31,6 +31,11 @@ int separatrix_model_read(const char *path, separatrix_model **model, char *mess
 int separatrix_model_from_text(const char *text, const char *directory, separatrix_model **model,
                                char *message, size_t message_size);
 
+/* The same with settings on top, each "key.path=value" with a TOML value, as `--set` of the program takes them;
+ * `name` stands for the file in messages, and its folder is where files that the case names are looked for. */
+int separatrix_model_with(const char *text, const char *name, int setting_count, const char *const *settings,
+                          separatrix_model **model, char *message, size_t message_size);
+
 /* Frees a model; NULL is allowed. */
 void separatrix_model_free(separatrix_model *model);
 

@@ -10,25 +10,19 @@ import functools
 import os
 import shutil
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from separatrix.errors import SeparatrixError
+from separatrix.errors import CaseError
+from separatrix.program import NATIVE, SOURCE_TREE
 
 __all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
 
-# of an installation that was not copied elsewhere
-SOURCE_TREE = Path(__file__).resolve().parents[2]
-
 _NONE = 1e308  # bounds beyond this mean that there is none
 _TEXT = 4096
-
-
-class CaseError(SeparatrixError):
-    """A case, a value or a call that the library refuses; `code` is that of the program."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +99,20 @@ class Model:
         """Return the model of a case in memory; files that it names are looked for in `directory`."""
         handle = ctypes.c_void_p()
         _call("separatrix_model_from_text", text.encode(), os.fsencode(directory), ctypes.byref(handle))
+        return cls(handle)
+
+    @classmethod
+    def from_settings(cls, text: str, name: str | Path, settings: Sequence[str]) -> "Model":
+        """Return the model of a case in memory with "key.path=value" on top, as `--set` takes them.
+
+        `name` stands for the file in messages; files that the case names are looked for in its folder.
+        """
+        handle = ctypes.c_void_p()
+        lines = (ctypes.c_char_p * len(settings))(*(line.encode() for line in settings))
+        _call(
+            "separatrix_model_with",
+            *(text.encode(), os.fsencode(name), len(settings), lines, ctypes.byref(handle)),
+        )
         return cls(handle)
 
     @property
@@ -239,13 +247,13 @@ def effects() -> dict[str, Effect]:
 
 
 def library_path() -> Path:
-    """Return where the library is: $SEPARATRIX_LIBRARY, beside the installed program, or in build/lib."""
+    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, in build/lib, beside the program."""
     asked = os.environ.get("SEPARATRIX_LIBRARY")
     if asked:
         return Path(asked)
     program = shutil.which("separatrix")
-    folders = [Path(program).resolve().parent.parent / "lib"] if program else []
-    folders.append(SOURCE_TREE / "build" / "lib")
+    folders = [NATIVE / "lib", SOURCE_TREE / "build" / "lib"]
+    folders += [Path(program).resolve().parent.parent / "lib"] if program else []
     for folder in folders:
         path = folder / "libseparatrix.so"
         if path.is_file():

@@ -333,20 +333,6 @@ def test_maps_before_and_after(
     assert {"bifurcation", "impact-speeds"} <= {name for name, _ in page.pictures}
 
 
-def test_the_program_of_a_build_in_the_source_tree_is_found(
-    source_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert comparison.SOURCE_TREE == source_dir
-    monkeypatch.delenv("SEPARATRIX_PROGRAM", raising=False)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(comparison, "SOURCE_TREE", tmp_path)
-    assert comparison.program_path() is None
-    program = tmp_path / "build" / "bin" / "separatrix"
-    program.parent.mkdir(parents=True)
-    program.touch()
-    assert comparison.program_path() == program
-
-
 def test_no_program_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SEPARATRIX_PROGRAM", str(tmp_path / "absent"))
     make(tmp_path, "named")

@@ -2,10 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a figure says about the case that it shows, taken from the resolved case of the file."""
 
+import functools
+import re
 import tomllib
 
 import numpy as np
 import xarray as xr
+
+from separatrix.errors import CaseError
+from separatrix.figures.look import Look
+from separatrix.library import Model
 
 # symbol and unit of the parameters that matter for a caption, in this order
 _FRICTION = {
@@ -16,7 +22,7 @@ _FRICTION = {
     "stribeck_exponent": (r"$\delta$", ""),
 }
 _CONTACT = {
-    "restitution": ("$k$", ""),
+    "restitution": ("restitution $k$", ""),
     "upper": (r"$x_\mathrm{upper}$", "m"),
     "lower": (r"$x_\mathrm{lower}$", "m"),
 }
@@ -28,6 +34,15 @@ _STOP = {
     "damping": ("damping", ""),
 }
 _SOFT = {key: _STOP[key] for key in ("stiffness", "exponent", "damping")}
+# the numbers of the other laws: what a caption needs besides so that the run can be repeated
+_FURTHER = {
+    "body.mass": "$m$",
+    "body.gravity": "$g$",
+    "restoring.stiffness": "$c$",
+    "restoring.free_length": "$l_0$",
+}
+# not mentioned where they are 0, as they are by default
+_ZERO = ("drive.mean", "drive.angle", "restoring.free_length")
 _START = {"x0": ("$x_0$", "m"), "v0": ("$v_0$", "m/s")}
 _LAW_NAMES = {
     "none": "no",
@@ -75,6 +90,79 @@ def describe_case(result: xr.Dataset) -> list[str]:
     if ratio is not None and "drive_ratio" not in axes:
         pieces.append(rf"$\Omega_p/\omega$ = {ratio:g}")
     return pieces
+
+
+def caption_pieces(result: xr.Dataset, look: Look, short: list[str]) -> list[str]:
+    """Return the pieces of a caption that say what was computed: `short`, and all else in a full one."""
+    return [*short, *(machine_pieces(result) if look.caption == "full" else [])]
+
+
+def shown(pieces: list[str], look: Look) -> list[str]:
+    """Return the pieces of a caption, or none where none is wanted."""
+    return [] if look.caption == "none" else pieces
+
+
+def machine_pieces(result: xr.Dataset) -> list[str]:
+    """Return what `describe_case` leaves out of the machine and its run, to six digits and with units."""
+    case = resolved_case(result)
+    axes, units = _axes(result, case), _units(str(result.attrs.get("resolved_case", "")))
+    pieces = []
+    for family in ("body", "restoring", "friction", "contact", "drive"):
+        law = case.get(family)
+        if isinstance(law, dict):
+            pieces += _law_pieces(family, law, axes, units)
+    for name, effect in case.get("effect", {}).items():
+        pieces += _law_pieces(f"effect.{name}", effect, axes, units)
+    run = case.get("run", {})
+    if "duration" in run:
+        longer = f", at most {run['extension']:g} times that" if result.attrs.get("kind") == "basin" else ""
+        pieces.append(f"duration {run['duration']:.6g} s{longer}")
+    return pieces
+
+
+def _law_pieces(family: str, law: dict, axes: set[str], units: dict[str, str]) -> list[str]:
+    said = {"friction": _FRICTION, "contact": {**_CONTACT, **_STOP}, "body": _BODIES}.get(family, {})
+    if family == "body" and "driven_mass" not in law:
+        said = {}
+    texts = []
+    for key, value in law.items():
+        path = f"{family}.{key}"
+        if key == "law" or key in said or path == "drive.ratio" or path.replace(".", "_") in axes:
+            continue
+        numbers = value if isinstance(value, list) else [value]
+        if value == 0 and path in _ZERO:
+            continue
+        if not all(isinstance(one, int | float) and abs(one) < _HUGE for one in numbers):
+            continue
+        shown = ", ".join(f"{one:.6g}" for one in numbers[:12]) + (", ..." if len(numbers) > 12 else "")
+        shown = f"({shown})" if isinstance(value, list) else shown
+        name = _FURTHER.get(path, key.replace("_", " "))
+        unit = units.get(f"{path}[1]" if isinstance(value, list) else path, "")
+        texts.append(f"{name} = {shown} {'' if unit == '1' else raised(unit)}".rstrip())
+    law_name = str(law.get("law", "")).replace("_", " ")
+    heading = {
+        "drive": f"{law_name.replace('fourier', 'Fourier')} drive",
+        "restoring": f"{law_name} spring",
+    }.get(family, "")
+    if family.startswith("effect."):
+        heading = family.removeprefix("effect.").replace("_", " ")
+    if law_name in ("linear", "none", "harmonic") and family == "restoring":
+        heading = ""
+    return [", ".join([heading, *texts] if heading else texts)] if texts else []
+
+
+@functools.lru_cache(4)
+def _units(resolved: str) -> dict[str, str]:
+    """Units of the parameters of a case, as the library knows them; without it, none."""
+    try:
+        return {path: one.unit for path, one in Model.from_text(resolved).parameters.items()}
+    except CaseError:
+        return {}
+
+
+def raised(unit: str) -> str:
+    """Return a unit with its powers raised."""
+    return re.sub(r"\^(-?[\d.]+)", lambda power: f"$^{{{power[1]}}}$", unit)
 
 
 def _two_bodies(case: dict, axes: set[str]) -> list[str]:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.case import describe_case, resolved_case, version_text
+from separatrix.figures.caption import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names

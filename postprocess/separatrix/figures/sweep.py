@@ -9,22 +9,29 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from separatrix import pair_sweep, style
-from separatrix.case import describe_case, resolved_case, version_text
-from separatrix.labels import axis_label, count_text, plain
+from separatrix import style
+from separatrix.figures import pair_sweep
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
+from separatrix.figures.look import DEFAULT, UNITS, Look
+from separatrix.figures.regions import Boundary, Region, boundaries, limit_texts, regions
+from separatrix.labels import axis_label, count_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import table
-from separatrix.regions import Boundary, Region, boundaries, limit_texts, regions
 
 _UP, _DOWN = 0, 1
 _NOT_RUN = 0
 
 
-def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figures of a sweep file by name."""
     if "driven_mass" in resolved_case(result).get("body", {}):
         return {"regimes": pair_sweep.regimes(result, swept_axis(result), title)}
-    return {"amplitude": amplitude_diagram(result, title), "bifurcation": bifurcation_diagram(result, title)}
+    look.require("sweep", "region", "units")
+    result = look.selected(result)
+    return {
+        "amplitude": amplitude_diagram(result, title, look),
+        "bifurcation": bifurcation_diagram(result, title, look),
+    }
 
 
 def swept_axis(result: xr.Dataset) -> str:
@@ -32,55 +39,80 @@ def swept_axis(result: xr.Dataset) -> str:
     return next(name for name in result["x_max"].dims if name != "direction")
 
 
-def amplitude_diagram(result: xr.Dataset, title: str) -> Figure:
+def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return extreme positions against the swept parameter, both runs, with the regions of motion."""
     name = swept_axis(result)
-    figure = style.new_figure(style.DOUBLE_COLUMN, 85.0)
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
     ax = figure.add_subplot()
     handles = _draw_branches(ax, result, name)
     handles += _draw_runs(ax, result, name)
     handles += _draw_barriers(ax, result)
     handles += _draw_regions(ax, result, name)
     ax.set_xlabel(axis_label(result[name]))
-    ax.set_ylabel(r"extreme positions $x_\mathrm{max}$, $x_\mathrm{min}$ (m)")
-    caption = [*_caption(result, name), *_limits_caption(result), plain(version_text(result))]
-    compose(figure, title, caption, handles, columns=5)
+    ax.set_ylabel(rf"extreme positions $x_\mathrm{{max}}$, $x_\mathrm{{min}}$ ({unit(result['x_max'])})")
+    caption = [*_caption(result, name, look), *_limits_caption(result), plain(version_text(result))]
+    compose(figure, title, shown(caption, look), handles, columns=5)
     return figure
 
 
-def bifurcation_diagram(result: xr.Dataset, title: str) -> Figure:
+def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return stroboscopic positions and mean impact speeds against the swept parameter."""
     name = swept_axis(result)
-    figure = style.new_figure(style.DOUBLE_COLUMN, 105.0)
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 105.0)))
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     values = result[name].values
     strobe = result["strobe_x"].transpose("direction", name, "sample").values
     speed = result["mean_impact_speed"].transpose("direction", name).values
-    for place, code in _directions(result):
-        colour, size = ((style.RUN_UP, 5.0), (style.RUN_DOWN, 0.9))[code]
-        along = np.broadcast_to(values[:, np.newaxis], strobe.shape[1:])
-        top.scatter(
-            along,
-            strobe[place],
-            s=size,
-            c=colour,
-            marker="o",
-            linewidths=0,
-            rasterized=strobe[0].size > 2000,
-        )
-    _draw_run_pair(bottom, values, speed, result)
+    runs = _directions(result)
+    agree = _runs_agree(strobe) if len(runs) == 2 else np.zeros(values.size, bool)
+    colours = {code: (style.RUN_UP, style.RUN_DOWN)[code] for _, code in runs}
+    for place, code in runs:
+        _thin_points(top, values, strobe[place], ~agree, colours[code])
+        _thin_points(bottom, values, speed[place][:, np.newaxis], ~agree, colours[code])
+    _thin_points(top, values, strobe[0], agree, style.BOTH_RUNS)
+    _thin_points(bottom, values, speed[0][:, np.newaxis], agree, style.BOTH_RUNS)
     _draw_barriers(top, result)
-    top.set_ylabel("position $x$ (m)\nonce per drive period")
-    bottom.set_ylabel("mean impact\nspeed (m/s)")
+    top.set_ylabel(f"position $x$ ({unit(result['strobe_x'])})\nonce per drive period")
+    bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
     bottom.set_xlabel(axis_label(result[name]))
     bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
     top.set_xlim(values.min(), values.max())
     for letter, ax in zip("ab", (top, bottom), strict=True):
         ax.set_title(f"{letter})", loc="left")
-    caption = [f"last {result.sizes['sample']} stroboscopic points of each hold", *_caption(result, name)]
+    caption = [
+        f"last {result.sizes['sample']} stroboscopic points of each hold",
+        *_caption(result, name, look),
+    ]
     caption.append(plain(version_text(result)))
-    compose(figure, title, caption, [*_run_handles(result), *_barrier_handles(result)], columns=4)
+    dots = [_dot(colour, ("run-up", "run-down")[code]) for code, colour in colours.items()]
+    dots += [_dot(style.BOTH_RUNS, "both alike")] if agree.any() else []
+    compose(figure, title, shown(caption, look), [*dots, *_barrier_handles(result)], columns=4)
     return figure
+
+
+def _dot(colour: str, label: str) -> Line2D:
+    return Line2D(
+        [], [], linestyle="", marker="o", markersize=2.5, markeredgewidth=0, color=colour, label=label
+    )
+
+
+def _thin_points(ax: Axes, values: np.ndarray, points: np.ndarray, chosen: np.ndarray, colour: str) -> None:
+    """Draw points so small that a band shows where the motion is often; where there are few, larger ones."""
+    if not chosen.any():
+        return
+    along = np.broadcast_to(values[:, np.newaxis], points.shape)
+    size = float(np.clip(250.0 / values.size, 0.25, 2.5))
+    rasterized = points.size > 2000
+    ax.scatter(along[chosen], points[chosen], s=size, c=colour, linewidths=0, rasterized=rasterized, zorder=3)
+
+
+def _runs_agree(strobe: np.ndarray) -> np.ndarray:
+    """Where both runs show the same motion: extremes of the points that differ by at most 5 % of all."""
+    finite = np.isfinite(strobe)
+    room = 0.05 * (np.ptp(strobe[finite]) if finite.any() else 0.0)
+    low, high = strobe.min(axis=2), strobe.max(axis=2)
+    with np.errstate(invalid="ignore"):
+        return (np.abs(low[0] - low[1]) <= room) & (np.abs(high[0] - high[1]) <= room)
 
 
 def _draw_branches(ax: Axes, result: xr.Dataset, name: str) -> list[Line2D]:
@@ -147,7 +179,11 @@ def _directions(result: xr.Dataset) -> list[tuple[int, int]]:
 
 
 def _barriers(result: xr.Dataset) -> list[float]:
-    return [float(result.attrs[key]) for key in ("barrier_upper", "barrier_lower") if key in result.attrs]
+    """Their places in the unit of the positions."""
+    one = UNITS.get(unit(result["x_max"]), ("m", 1.0))[1]
+    return [
+        float(result.attrs[key]) / one for key in ("barrier_upper", "barrier_lower") if key in result.attrs
+    ]
 
 
 def _draw_barriers(ax: Axes, result: xr.Dataset) -> list[Line2D]:
@@ -222,8 +258,11 @@ def _write_above(
     )
 
 
-def _caption(result: xr.Dataset, name: str) -> list[str]:
-    return [*describe_case(result), f"{count_text(result.sizes[name])} values of the swept parameter"]
+def _caption(result: xr.Dataset, name: str, look: Look) -> list[str]:
+    return [
+        *caption_pieces(result, look, describe_case(result)),
+        f"{count_text(result.sizes[name])} values of the swept parameter",
+    ]
 
 
 def _limits_caption(result: xr.Dataset) -> list[str]:

@@ -9,8 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from separatrix import style
-from separatrix.case import describe_case, version_text
 from separatrix.classes import class_counts, classes
+from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, count_text, plain, share_texts
 from separatrix.layout import compose
 
@@ -18,9 +19,10 @@ from separatrix.layout import compose
 _MARKERS = "osD^vP*X"
 
 
-def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figure of a points file by name."""
-    return {"regime": scatter(result, title)}
+    look.require("list of points")
+    return {"regime": scatter(result, title, look)}
 
 
 def scatter_axes(result: xr.Dataset) -> tuple[str, str]:
@@ -31,7 +33,7 @@ def scatter_axes(result: xr.Dataset) -> tuple[str, str]:
     return across, up
 
 
-def scatter(result: xr.Dataset, title: str) -> Figure:
+def scatter(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the starting points by regime."""
     across, up = scatter_axes(result)
     codes = result["regime"].values
@@ -40,7 +42,7 @@ def scatter(result: xr.Dataset, title: str) -> Figure:
     shares = share_texts(class_counts(entries, counts))
     size = float(np.clip(400.0 / np.sqrt(codes.size), 0.5, 14.0))
 
-    figure = style.new_figure(style.SINGLE_COLUMN, 65.0)
+    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 65.0)))
     ax = figure.add_subplot()
     handles = []
     for entry, share, marker in zip(entries, shares, _MARKERS, strict=False):
@@ -61,6 +63,10 @@ def scatter(result: xr.Dataset, title: str) -> Figure:
     ax.xaxis.set_major_locator(MaxNLocator(6))
     ax.set_xlabel(axis_label(result[across]))
     ax.set_ylabel(axis_label(result[up]))
-    caption = [*describe_case(result), f"$N$ = {count_text(codes.size)} points", plain(version_text(result))]
-    compose(figure, title, caption, handles)
+    caption = [
+        *caption_pieces(result, look, describe_case(result)),
+        f"$N$ = {count_text(codes.size)} points",
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), handles)
     return figure

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from separatrix import pair, style
-from separatrix.case import describe_case, resolved_case, version_text
+from separatrix import style
+from separatrix.figures import pair
+from separatrix.figures.caption import describe_case, resolved_case, version_text
 from separatrix.labels import plain
 from separatrix.layout import compose
 
@@ -32,7 +33,7 @@ def loops(result: xr.Dataset, title: str) -> Figure:
         order = order[np.linspace(0, len(found) - 1, MOST_LOOPS).round().astype(int)]
     handles = []
     for place, index in enumerate(order):
-        colour = style.palette(MOST_LOOPS)[place]
+        colour = style.OKABE_ITO[place]
         _draw(axes, found[index], colour)
         handles.append(Line2D([], [], color=colour, label=f"{found[index][1]:.3g} m/s"))
     caption = [f"{len(order)} of {len(found)} contacts, by impact speed", *describe_case(result)]
@@ -48,7 +49,7 @@ def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
         found = contacts(pair.relative_to_stop(result))
         if not found:
             continue
-        colour = style.palette(max(3, len(results)))[place]
+        colour = style.OKABE_ITO[place % len(style.OKABE_ITO)]
         fastest = max(found, key=lambda item: item[1])
         _draw(axes, fastest, colour)
         law = resolved_case(result)["contact"]["law"].replace("_", " ")

@@ -11,8 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from separatrix import contact, energy, pair, style
-from separatrix.case import describe_case, resolved_case, version_text
+from separatrix import style
+from separatrix.figures import contact, energy, pair
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
+from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -24,23 +26,24 @@ _MOST_MARKERS = 150
 _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 
 
-def figures(result: xr.Dataset, title: str) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figures of a trajectory file by name."""
+    look.require("trajectory")
     two_bodies = "driver_x" in result
-    made = {"history": pair.history(result, title) if two_bodies else time_history(result, title)}
+    made = {"history": pair.history(result, title) if two_bodies else time_history(result, title, look)}
     # files of earlier versions have no energies of one body
     if "kinetic_energy" in result:
-        caption = pair.caption(result) if two_bodies else _caption(result)
-        made["energy"] = energy.decomposition(result, title, caption)
+        caption = pair.caption(result) if two_bodies else _caption(result, look)
+        made["energy"] = energy.decomposition(result, title, shown(caption, look))
     seen = pair.relative_to_stop(result)
     if "contact_force" in result:
         made["contact"] = contact.loops(seen, title)
-    return {**made, "phase": phase_portrait(seen, title)}
+    return {**made, "phase": phase_portrait(seen, title, look)}
 
 
-def time_history(result: xr.Dataset, title: str) -> Figure:
+def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the position during the whole run and, enlarged, during the last periods."""
-    figure = style.new_figure(style.DOUBLE_COLUMN, 100.0)
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 100.0)))
     whole, zoom = figure.subplots(2, 1)
     time, position = result["time"].values, result["x"].values
     whole.plot(*_envelope(time, position), color=style.MOTION, linewidth=0.7)
@@ -70,8 +73,8 @@ def time_history(result: xr.Dataset, title: str) -> Figure:
         handles.append(
             Line2D([], [], linestyle="", marker="v", markersize=2.5, color=style.IMPACT, label="impact")
         )
-    caption = [f"b) the last {ZOOM_PERIODS} drive periods", *_caption(result)]
-    compose(figure, title, caption, handles, columns=4)
+    caption = [f"b) the last {ZOOM_PERIODS} drive periods", *_caption(result, look)]
+    compose(figure, title, shown(caption, look), handles, columns=4)
     return figure
 
 
@@ -82,18 +85,18 @@ def _end(result: xr.Dataset) -> float:
     return float(duration if time.size > 1 and abs(duration - time[-1]) <= time[1] - time[0] else time[-1])
 
 
-def phase_portrait(result: xr.Dataset, title: str) -> Figure:
+def phase_portrait(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return velocity against position during the last `window` seconds, impacts as jumps.
 
     A body that stands still then is shown from its start.
     """
-    figure = style.new_figure(style.SINGLE_COLUMN, 68.0)
+    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 68.0)))
     ax = figure.add_subplot()
     window = float(result.attrs["window"])
     start = float(result["time"].values[-1]) - window
-    shown = f"last {window:g} s"
+    window_text = f"last {window:g} s"
     if not np.ptp(result["x"].values[result["time"].values >= start]) > 0:
-        start, shown = float(result["time"].values[0]), "from the start to rest"
+        start, window_text = float(result["time"].values[0]), "from the start to rest"
     position, velocity, jumps = steady_path(result, start)
     ax.plot(position, velocity, color=style.MOTION, linewidth=0.8)
     for x, before, after in jumps[-_MOST_MARKERS:]:
@@ -105,7 +108,7 @@ def phase_portrait(result: xr.Dataset, title: str) -> Figure:
     handles = [Line2D([], [], color=style.MOTION, linewidth=0.8, label="motion"), *_barrier_handle(result)]
     if jumps:
         handles.append(Line2D([], [], color=style.IMPACT, linewidth=0.8, label="impact"))
-    compose(figure, title, [shown, *_caption(result)], handles, columns=3)
+    compose(figure, title, shown([window_text, *_caption(result, look)], look), handles, columns=3)
     return figure
 
 
@@ -190,9 +193,9 @@ def _barrier_handle(result: xr.Dataset) -> list[Line2D]:
     return [Line2D([], [], color=style.BARRIER, linewidth=1.2, label="barrier")]
 
 
-def _caption(result: xr.Dataset) -> list[str]:
+def _caption(result: xr.Dataset, look: Look) -> list[str]:
     attributes = result.attrs
-    pieces = describe_case(result)
+    pieces = caption_pieces(result, look, describe_case(result))
     pieces += [_start_text(result), f"steady motion: {_regime_text(attributes['regime'])}"]
     pieces.append(f"amplitude {attributes['amplitude']:.4g} m")
     pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} m/s")

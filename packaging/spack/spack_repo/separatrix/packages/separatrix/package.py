@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spack recipe: `spack repo add packaging/spack`, then `spack install separatrix`."""
+"""Spack recipe (Spack 1.0 and newer): `spack repo add packaging/spack/spack_repo/separatrix`, `spack install separatrix`."""
+
+from spack_repo.builtin.build_systems.cmake import CMakePackage
 
 from spack.package import *
 
@@ -11,7 +13,7 @@ class Separatrix(CMakePackage):
     license("GPL-3.0-or-later")
     maintainers = []
 
-    # Spack builds the checkout in which it is told to: `spack develop`, or `spack install separatrix@main`.
+    # Of a checkout: `spack develop --path . separatrix@main`. A release adds version(..., sha256=...) of its archive.
     version("main", branch="main", git="file:///path/to/separatrix")
 
     variant("mpi", default=True, description="Ranks that share the work, parallel HDF5")
