@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,7 +21,7 @@ from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
 from separatrix.discovery.wording import searched, with_error
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import INTERRUPTED, TERMINATED, SeparatrixError
+from separatrix.errors import INTERNAL, INTERRUPTED, NO_MEMORY, TERMINATED, SeparatrixError
 from separatrix.version import __version__
 
 
@@ -33,12 +34,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SeparatrixError as error:
         print(f"separatrix-discover: {error}", file=sys.stderr)
         return error.code
+    except MemoryError as error:
+        print(f"separatrix-discover: not enough memory: {error or 'thin the records'}", file=sys.stderr)
+        return NO_MEMORY
     except _TerminatedError:
         print("separatrix-discover: terminated before the end", file=sys.stderr)
         return TERMINATED
     except KeyboardInterrupt:
         print("separatrix-discover: interrupted before the end", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}:{place.lineno}"
+        said = f"{type(error).__name__} in {where}: {error}"
+        print(f"separatrix-discover: internal error, please report it: {said}", file=sys.stderr)
+        return INTERNAL
     return 0
 
 
@@ -132,8 +142,8 @@ def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
-        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write, "
-        "130 interrupted, 143 terminated.",
+        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 70 internal error, "
+        "71 not enough memory, 73 cannot write, 130 interrupted, 143 terminated.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

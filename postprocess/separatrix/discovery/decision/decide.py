@@ -217,7 +217,7 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     if left:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
-    elif fits[0][1].fit.reduced_chi2 > bench.options.adequate_chi2:
+    elif fits[0][1].fit.sample_chi2 > bench.options.adequate_chi2:
         decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
     if decision.base_ceiling.p < bench.options.gap_share * bench.options.detection_level:
         decision.outcome = "not-in-catalogue"

@@ -161,4 +161,4 @@ def adequate(one: Judged, options: Options) -> bool:
     share = gained / max(gained + one.ceiling.closable, 1e-300)
     clean = one.ceiling.p > options.detection_level
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
-    return bool(one.fitted.fit.reduced_chi2 <= options.adequate_chi2 and (clean or closed))
+    return bool(one.fitted.fit.sample_chi2 <= options.adequate_chi2 and (clean or closed))

@@ -132,7 +132,7 @@ def distance(one: Fitted, other: Fitted, frequency: float) -> float:
     rows = np.arange(0, one.fit.starts.shape[0], max(1, one.fit.starts.shape[0] // 12))
     segments, prepared = one.problem.segments, one.problem.prepared
     angles = [
-        one.problem.crank_angle(r, one.fit.values, float(prepared[r].record.t[first]))
+        one.problem.crank_angle(r, one.fit.values, float(prepared[r].samples.t[first]))
         for r, first in zip(segments.record[rows], segments.first[rows], strict=True)
     ]
     start = np.column_stack([one.fit.starts[rows], angles])

@@ -88,7 +88,7 @@ def _candidate(one: Judged) -> dict:
         "training": one.training,
         "held_out": one.held_out,
         "evidence": one.evidence,
-        "reduced_chi2": fit.reduced_chi2,
+        "reduced_chi2": fit.sample_chi2,
         # what is worse than the base has not found its minimum, at which the effect does nothing
         "converged": fit.converged and one.training > -WORSE,
         "starts": one.fitted.tries,
@@ -187,10 +187,10 @@ def _parameters(fitted: Fitted) -> dict:
 def _gap(findings: Findings) -> dict:
     decision = findings.decision
     best = decision.accepted[0] if decision.accepted else None
-    gap = {"training": {"before": findings.base.fit.reduced_chi2, "noise_floor": 1.0}}
-    gap["training"]["after"] = best.fitted.fit.reduced_chi2 if best else gap["training"]["before"]
+    gap = {"training": {"before": findings.base.fit.sample_chi2, "noise_floor": 1.0}}
+    gap["training"]["after"] = best.fitted.fit.sample_chi2 if best else gap["training"]["before"]
     if decision.foretold is not None:
-        before = decision.foretold.reduced_chi2
+        before = decision.foretold.sample_chi2
         gap["held_out"] = {"before": before, "noise_floor": 1.0}
-        gap["held_out"]["after"] = best.prediction.reduced_chi2 if best else before
+        gap["held_out"]["after"] = best.prediction.sample_chi2 if best else before
     return gap

@@ -41,11 +41,19 @@ class Prediction:
     @property
     def reduced_chi2(self) -> float:
         """Sum of squares per degree of freedom; the parameters of the machine were not fitted."""
+        return float(self.fit.chi2[self.good].sum() / max(1, self._freedom))
+
+    @property
+    def sample_chi2(self) -> float:
+        """The same per degree of freedom of all samples, those of condensed stretches included."""
+        squares, freedom = self.fit.condensed(self.good)
+        return float((self.fit.chi2[self.good].sum() + squares) / max(1.0, self._freedom + freedom))
+
+    @property
+    def _freedom(self) -> int:
         good = self.good
-        freedom = (
-            self.fit.counts[good].sum() - 2 * good.sum() - (len(self.problem.free) - self.covariance.shape[0])
-        )
-        return float(self.fit.chi2[good].sum() / max(1, freedom))
+        own = len(self.problem.free) - self.covariance.shape[0]
+        return int(self.fit.counts[good].sum() - 2 * good.sum() - own)
 
 
 def predict(

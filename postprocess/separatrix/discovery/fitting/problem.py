@@ -56,6 +56,28 @@ class Problem:
         chosen = padded(old.record[rows], old.first[rows], old.last[rows])
         return Problem(self.model, self.prepared, chosen, self.free)
 
+    def left_over(self) -> tuple[np.ndarray, np.ndarray]:
+        """What condensed stretches of each segment leave over, and its degrees of freedom.
+
+        The machine has no part in it: it says how large the noise is beside the one that is assumed.
+        """
+        squares, freedom = np.zeros(self.segments.count), np.zeros(self.segments.count)
+        for number, prepared in enumerate(self.prepared):
+            samples = prepared.samples
+            if not samples.condensed:
+                continue
+            rows = np.flatnonzero(self.segments.record == number)
+            first, last = self.segments.first[rows], self.segments.last[rows]
+            white = samples.left / prepared.sigma**2
+            count = samples.freedom
+            if samples.v is not None:
+                white = white + samples.left_v / prepared.velocity_sigma**2
+                count = 2 * count
+            for table, per_row in ((squares, white), (freedom, count)):
+                total = np.concatenate([[0.0], np.cumsum(per_row)])
+                table[rows] = total[last] - total[first]
+        return squares, freedom
+
     @property
     def values(self) -> np.ndarray:
         """Values that the free parameters start from."""
@@ -64,23 +86,25 @@ class Problem:
     def _part(self, number: int) -> dict:
         """The segments of one record as lists for the simulator."""
         record = self.prepared[number].record
+        fitted = self.prepared[number].samples
         rows = np.flatnonzero(self.segments.record == number)
         first, last = self.segments.first[rows], self.segments.last[rows]
         offsets = np.concatenate([[0], np.cumsum(last - first)])
         samples = np.concatenate(
             [np.arange(a, b) for a, b in zip(first, last, strict=True)] or [np.zeros(0, int)]
         )
-        starts = record.t[first]
-        times = record.t[samples] - np.repeat(starts, last - first)
+        starts = fitted.t[first]
+        times = fitted.t[samples] - np.repeat(starts, last - first)
         return {
             "rows": rows,
             "offsets": offsets,
             "times": times,
             "starts": starts,
             "inside": self.segments.inside[rows],
-            "x": record.x[samples],
-            "v": None if record.v is None else record.v[samples],
-            "force": _force_argument(record, first),
+            "x": fitted.x[samples],
+            "v": None if fitted.v is None else fitted.v[samples],
+            "samples": samples,
+            "force": _force_argument(record, fitted.place[first]),
         }
 
     def evaluate(self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True) -> Evaluation:
@@ -128,9 +152,12 @@ class Problem:
             if memory == 0:
                 continue
             rows = np.flatnonzero(self.segments.record == number)
+            linked = prepared.samples.linked[self.segments.index[rows]][:, 1:]
+            linked = linked.reshape(linked.shape + (1,) * (table.ndim - 2))
             for first in range(0, table.shape[1], length):
                 part = table[rows, first : first + length]
-                part[:, 1:] = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
+                freed = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
+                part[:, 1:] = np.where(linked, freed, part[:, 1:])
                 table[rows, first : first + length] = part
         used = np.tile(self.segments.inside, (1, table.shape[1] // length))
         table[~used] = 0
@@ -169,18 +196,22 @@ class Problem:
             n = len(directions)
             out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
-        for channel, (measured, computed, sigma) in enumerate(
+        spread = prepared.samples.spread(prepared.memory)[part["samples"]]
+        for channel, (measured, computed, size) in enumerate(
             ((part["x"], result.x, prepared.sigma), (part["v"], result.v, prepared.velocity_sigma))
         ):
             if measured is None:
                 continue
             columns = slice(channel * length, (channel + 1) * length)
+            sigma = size * spread
             out.residual[rows, columns] = np.nan_to_num(_padded((measured - computed) / sigma, inside))
             out.used[rows, columns] = inside
             if derivatives:
                 by_start, by_parameter = jacobians[channel]
-                out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma, inside))
-                out.by_parameter[rows, columns] = np.nan_to_num(_padded(by_parameter / sigma, inside))
+                out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma[:, None], inside))
+                out.by_parameter[rows, columns] = np.nan_to_num(
+                    _padded(by_parameter / sigma[:, None], inside)
+                )
 
     def _simulate(
         self,
@@ -295,7 +326,7 @@ def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def _force_argument(record, first: np.ndarray):
-    """Force of a record for segments that begin at the samples `first`.
+    """Force of a record for segments that begin at the places `first`, in samples.
 
     Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
     there are leaves room for the last times, which need not be quite even.

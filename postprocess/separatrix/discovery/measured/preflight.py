@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
+from separatrix.discovery.measured.condense import Samples, whole
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.discovery.wording import units_of
@@ -35,6 +36,8 @@ class Prepared:
     sigma_stated: bool = False
     velocity_sigma_stated: bool = False
     frequency: float | None = None
+    # of the free machine [rad/s], where it has one
+    natural: float | None = None
     phase: float = 0.0
     # known: measured as a channel; stated: in the header, refined by the fit
     phase_known: bool = False
@@ -42,6 +45,13 @@ class Prepared:
     drive_scale: float = 1.0
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
+    # what is fitted: all samples, or fewer rows that say as much
+    samples: Samples | None = None
+
+    def __post_init__(self) -> None:
+        """Fit every sample, unless something else is said."""
+        if self.samples is None:
+            self.samples = whole(self.record)
 
     @property
     def period_samples(self) -> float | None:
@@ -120,6 +130,7 @@ def _find_drive(prepared: Prepared, model) -> None:
     ratio = model.parameters.get("drive.ratio")
     if ratio is None or not ratio.value:
         return
+    prepared.natural = model.drive_frequency({"drive.ratio": 1.0})
     if record.phi is not None:
         prepared.frequency, prepared.phase = turning(record)
         if prepared.frequency * record.duration < np.pi:

@@ -28,6 +28,10 @@ NUMBERS = {
     "phase",
 }
 """Header keys with one number."""
+MOST_SAMPLES = 10_000_000
+"""Samples of a record that are read."""
+# lines of a header; bytes of a row with two numbers
+_MOST_HEADER, _FEWEST_BYTES = 1000, 8
 KEYS = NUMBERS | {"units"}
 """All header keys that mean something."""
 
@@ -54,13 +58,62 @@ def read_table(path: Path) -> Table:
 
 
 def _read_csv(path: Path) -> Table:
+    return _read_plain(path) or _read_by_lines(path)
+
+
+def _read_plain(path: Path) -> Table | None:
+    """A well-formed file at once; None where anything in it needs a closer look."""
+    begun: list[str] = []
+    with path.open(encoding="utf-8", errors="surrogateescape") as file:
+        for line in file:
+            begun.append(line)
+            if line.strip() and not line.startswith("#"):
+                break
+            if len(begun) > _MOST_HEADER:
+                return None
+        first = file.readline()
+    names = [name.strip() for name in begun[-1].split(",")] if begun else []
+    if "t" not in names or "x" not in names or not first.strip():
+        return None
+    check_length(path, path.stat().st_size // max(1, len(first)))
+    used = [name for name in names if name in ("t", *CHANNELS)]
+    try:
+        # any comment, blank line or short row among the numbers is left to the closer look
+        table = np.loadtxt(path, delimiter=",", comments=None, skiprows=len(begun), ndmin=2)
+    except ValueError:
+        return None
+    if table.shape[1] != len(names) or len(set(names)) != len(names):
+        return None
+    head = _parsed(path, begun)
+    lines = np.arange(len(begun) + 1, len(begun) + 1 + len(table))
+    if sum(1 for _ in path.open("rb")) != lines[-1]:
+        return None
+    columns = {name: table[:, names.index(name)].copy() for name in used}
+    return Table(head.header, columns, lines, [name for name in names if name not in used])
+
+
+def check_length(path: Path, samples: int) -> None:
+    """Refuse a record of more samples than fit into the memory of a usual machine."""
+    if samples > MOST_SAMPLES:
+        raise SeparatrixError(
+            f"{path}: about {samples:.3g} samples, at most {MOST_SAMPLES:.0e} a record are read: keep a "
+            f"part of it, or every {int(-(-samples // MOST_SAMPLES))}th row"
+        )
+
+
+def _read_by_lines(path: Path) -> Table:
+    return _parsed(path, _lines(path), whole=True)
+
+
+def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
+    """Header, names and (of a `whole` file) rows, line by line."""
     header: dict[str, str] = {}
     stands: dict[str, int] = {}
     names: list[str] | None = None
     separator = ","
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(_lines(path), start=1):
+    for number, line in enumerate(text_lines, start=1):
         text = line.strip(" \r\n")
         if not text.strip():
             continue
@@ -82,6 +135,8 @@ def _read_csv(path: Path) -> Table:
         else:
             lines.append(number)
             rows.append(_numbers(path, number, text, separator, names, used))
+    if not whole:
+        return Table(header, {})
     if names is None or not rows:
         raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
     table = np.array(rows)
@@ -91,6 +146,7 @@ def _read_csv(path: Path) -> Table:
 
 def _lines(path: Path) -> list[str]:
     """Lines of a text; bytes that are no UTF-8 are kept, because comments may hold anything."""
+    check_length(path, path.stat().st_size // _FEWEST_BYTES)
     content = path.read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise SeparatrixError(f"{path}: text in UTF-16, expected UTF-8")
@@ -147,6 +203,8 @@ def _read_hdf5(path: Path) -> Table:
     try:
         with h5py.File(path) as file:
             header, units = _texts(file)
+            if isinstance(file.get("t"), h5py.Dataset):
+                check_length(path, file["t"].size)
             columns = {
                 name: np.asarray(file[name][()], float)
                 for name in ("t", *CHANNELS)
