@@ -131,6 +131,7 @@ def summary(verdict: dict) -> list[str]:
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"
         )
+    lines += [f"  {one['text']}" for one in verdict["remains"]]
     lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
     lines += [f"  {reason}" for reason in verdict["reasons"]]
     if verdict["separating_experiment"]:

@@ -11,6 +11,7 @@ from separatrix.discovery.decision.decoys import decoys
 from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.limits import detectable, equivalents, separating_experiment
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
+from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine
 from separatrix.discovery.decision.where import Map, sentences, where_maps
@@ -52,6 +53,7 @@ def verdict_of(findings: Findings) -> dict:
         "base_parameters": _parameters(findings.base),
         "where": sentences(findings.maps),
         "gap": _gap(findings),
+        "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
         "gates": best.gates if best else {},
         "p_value": best.p if best else None,
         "reasons": decision.reasons,
@@ -74,6 +76,15 @@ def verdict_of(findings: Findings) -> dict:
         "seed": bench.options.seed,
         "version": __version__,
     }
+
+
+def _remaining(findings: Findings) -> list[Remains]:
+    """What the accepted effect leaves of the gap."""
+    decision = findings.decision
+    if not decision.accepted:
+        return []
+    mass = findings.bench.scales.mass
+    return remains_of(findings.base, decision.foretold, decision.accepted[0], mass)
 
 
 def d_prime(found: Round) -> dict[str, float]:

@@ -109,6 +109,17 @@ class Fit:
         squares, freedom = self.condensed(self.good)
         return (self.total + squares) / max(1.0, self.freedom + freedom)
 
+    @property
+    def samples(self) -> float:
+        """Residuals of all samples of the good segments."""
+        return float(self.counts[self.good].sum()) + self.condensed(self.good)[1]
+
+    @property
+    def excess(self) -> float:
+        """What chi^2 of all samples has beyond its degrees of freedom."""
+        squares, freedom = self.condensed(self.good)
+        return self.total + squares - self.freedom - freedom
+
     def condensed(self, rows: np.ndarray) -> tuple[float, float]:
         """Sum of squares of what condensed stretches of some segments leave over, degrees of freedom."""
         if self.left_over is None:

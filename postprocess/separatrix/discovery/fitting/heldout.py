@@ -50,6 +50,12 @@ class Prediction:
         return float((self.fit.chi2[self.good].sum() + squares) / max(1.0, self._freedom + freedom))
 
     @property
+    def excess(self) -> float:
+        """What chi^2 of all samples has beyond its degrees of freedom."""
+        squares, freedom = self.fit.condensed(self.good)
+        return float(self.fit.chi2[self.good].sum() + squares - self._freedom - freedom)
+
+    @property
     def _freedom(self) -> int:
         good = self.good
         own = len(self.problem.free) - self.covariance.shape[0]

@@ -14,8 +14,8 @@ from separatrix.errors import SeparatrixError
 
 @dataclass
 class Evaluation:
-    """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…,
-    p).
+    """Residuals over their noise (segments, channels*length, then nuisances that were measured), derivatives
+    by start (…, 2) and parameters (…, p).
 
     `used` is 0 where a segment has no sample; `failed` is true where the simulator gave one up (its rows are
     0); `steady` is false where the sequence of impacts would change under a small step, so that the
@@ -79,6 +79,23 @@ class Problem:
         return squares, freedom
 
     @property
+    def channels(self) -> int:
+        """How many of x and v are compared."""
+        return 2 if any(part["v"] is not None for part in self._parts) else 1
+
+    def _known_nuisances(self) -> list[tuple[int, float, np.ndarray]]:
+        """Places and errors of nuisances that were measured, and the segments that share what this says.
+
+        Each is one more residual of its record, of which every segment has its part, so that sums and
+        resampled sums over the segments hold it.
+        """
+        return [
+            (place, one.error, rows)
+            for place, one in enumerate(self.free)
+            if one.error is not None and (rows := np.flatnonzero(self.segments.record == one.record)).size
+        ]
+
+    @property
     def values(self) -> np.ndarray:
         """Values that the free parameters start from."""
         return np.array([one.value for one in self.free])
@@ -110,9 +127,9 @@ class Problem:
     def evaluate(self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True) -> Evaluation:
         """Simulate all segments from `starts` (segments, 2) of x and v."""
         shape = self.segments.inside.shape
-        channels = 2 if any(part["v"] is not None for part in self._parts) else 1
         count, length = shape
-        width = channels * length
+        measured = self._known_nuisances()
+        width = self.channels * length + len(measured)
         out = Evaluation(
             residual=np.zeros((count, width)),
             used=np.zeros((count, width)),
@@ -134,6 +151,11 @@ class Problem:
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
+        for column, (place, error, rows) in enumerate(measured, start=self.channels * length):
+            out.residual[rows, column] = -values[place] / error
+            out.used[rows, column] = 1 / rows.size
+            if derivatives:
+                out.by_parameter[rows, column, place] = 1 / error
         # what was not flown to its end says nothing
         for table in (out.residual, out.by_start, out.by_parameter):
             if table is not None:
@@ -154,13 +176,13 @@ class Problem:
             rows = np.flatnonzero(self.segments.record == number)
             linked = prepared.samples.linked[self.segments.index[rows]][:, 1:]
             linked = linked.reshape(linked.shape + (1,) * (table.ndim - 2))
-            for first in range(0, table.shape[1], length):
+            for first in range(0, self.channels * length, length):
                 part = table[rows, first : first + length]
                 freed = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
                 part[:, 1:] = np.where(linked, freed, part[:, 1:])
                 table[rows, first : first + length] = part
-        used = np.tile(self.segments.inside, (1, table.shape[1] // length))
-        table[~used] = 0
+        used = np.tile(self.segments.inside, (1, self.channels))
+        table[:, : used.shape[1]][~used] = 0
         return table
 
     def _evaluate_record(

@@ -56,8 +56,8 @@ def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarr
         rows = np.flatnonzero(problem.segments.record == number)
         spread = prepared.samples.spread(prepared.memory)[problem.segments.index[rows]][:, :, None]
         columns[rows, :length] = moved[rows, :, 0] / (prepared.sigma * spread)
-        if width > length and prepared.record.v is not None:
-            columns[rows, length:] = moved[rows, :, 1] / (prepared.velocity_sigma * spread)
+        if problem.channels > 1 and prepared.record.v is not None:
+            columns[rows, length : 2 * length] = moved[rows, :, 1] / (prepared.velocity_sigma * spread)
     return problem.whitened(columns)
 
 

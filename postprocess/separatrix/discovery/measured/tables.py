@@ -3,6 +3,7 @@
 """Tables of numbers with a header of keys, from CSV or HDF5."""
 
 import codecs
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,6 +27,7 @@ NUMBERS = {
     "x0_m",
     "v0_m_s",
     "phase",
+    "phi_noise_sigma_rad",
 }
 """Header keys with one number."""
 MOST_SAMPLES = 10_000_000
@@ -72,7 +74,7 @@ def _read_plain(path: Path) -> Table | None:
             if len(begun) > _MOST_HEADER:
                 return None
         first = file.readline()
-    names = [name.strip() for name in begun[-1].split(",")] if begun else []
+    names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
     if "t" not in names or "x" not in names or not first.strip():
         return None
     check_length(path, path.stat().st_size // max(1, len(first)))
@@ -132,6 +134,7 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
             separator = next((mark for mark in ";,\t" if _has_t_and_x(text, mark)), ",")
             names = _names(path, number, text, separator)
             used = [name for name in names if name in ("t", *CHANNELS)]
+            _units_of_names(header, text, separator, used)
         else:
             lines.append(number)
             rows.append(_numbers(path, number, text, separator, names, used))
@@ -170,11 +173,25 @@ def _check_place(path: Path, number: int, key: str, stands: dict[str, int], belo
 
 
 def _has_t_and_x(text: str, separator: str) -> bool:
-    return {"t", "x"} <= {name.strip() for name in text.split(separator)}
+    return {"t", "x"} <= {_named(name)[0] for name in text.split(separator)}
+
+
+def _named(text: str) -> tuple[str, str]:
+    """Name of a column and its unit, '' where there is none, from `x`, `x [mm]` or `x (mm)`."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", text.strip())
+    return (found.group(1), found.group(2)) if found else (text.strip(), "")
+
+
+def _units_of_names(header: dict[str, str], text: str, separator: str, used: list[str]) -> None:
+    """Units beside the names of columns count as if the header had them."""
+    units = [_named(name) for name in text.split(separator)]
+    told = [f"{name} {unit}" for name, unit in units if unit and name in used]
+    if told:
+        header.setdefault("units", ", ".join(told))
 
 
 def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
-    names = [name.strip() for name in text.split(separator)]
+    names = [_named(name)[0] for name in text.split(separator)]
     if "t" not in names or "x" not in names:
         raise SeparatrixError(f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]'")
     if len(set(names)) != len(names):
