@@ -149,7 +149,13 @@ def _parser() -> Parser:
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"
     )
-    parser.add_argument("records", metavar="RECORD", nargs="+", type=Path, help="record to fit (CSV or HDF5)")
+    parser.add_argument(
+        "records",
+        metavar="RECORD",
+        nargs="+",
+        type=Path,
+        help="record to fit (CSV, HDF5, .mat, .npz, UFF 58, TDMS)",
+    )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results")
     parser.add_argument(
         "--hold-out",

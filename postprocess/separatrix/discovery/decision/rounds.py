@@ -10,7 +10,7 @@ from separatrix.discovery.decision.judge import Judged, judged
 from separatrix.discovery.fitting.catalogue import CATALOGUE, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import blocks_of, eliminate, solve_scaled
-from separatrix.discovery.fitting.heldout import Prediction, predict
+from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
@@ -46,7 +46,8 @@ class Bench:
         free, fit = fitted.problem.free, fitted.fit
         guess = None if other is None else other.fit.starts
         misfit = max(1.0, fit.reduced_chi2)
-        return predict(self.held_out, fitted.model, free, fit.values, fitted.covariance, misfit, guess)
+        known = Known(fit.values, fitted.covariance, fitted.unseen)
+        return predict(self.held_out, fitted.model, free, known, misfit, guess)
 
 
 @dataclass

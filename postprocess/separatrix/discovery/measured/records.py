@@ -11,8 +11,9 @@ import numpy as np
 
 from separatrix.discovery.measured.clock import pieces_of
 from separatrix.discovery.measured.faults import check_clipping, left_out
+from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
-from separatrix.discovery.measured.tables import CHANNELS, Table, read_table
+from separatrix.discovery.measured.tables import CHANNELS, Table
 from separatrix.errors import SeparatrixError
 
 _FEWEST_SAMPLES = 60

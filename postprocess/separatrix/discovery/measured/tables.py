@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.errors import SeparatrixError
 from separatrix.trial import try_first
 
 CHANNELS = ("x", "v", "force", "phi")
@@ -48,18 +48,8 @@ class Table:
     unused: list[str] = field(default_factory=list)
 
 
-def read_table(path: Path) -> Table:
-    """Read one file; what cannot be read is refused with the line and the reason."""
-    if path.is_dir():
-        raise SeparatrixError(f"{path}: a folder, expected a record (CSV or HDF5)", NO_INPUT)
-    if not path.is_file():
-        raise SeparatrixError(f"{path}: no such file", NO_INPUT)
-    with path.open("rb") as file:
-        is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
-    return _read_hdf5(path) if is_hdf5 else _read_csv(path)
-
-
-def _read_csv(path: Path) -> Table:
+def read_csv(path: Path) -> Table:
+    """Read a text: comments with keys, a row of names, rows of numbers."""
     return _read_plain(path) or _read_by_lines(path)
 
 
@@ -215,7 +205,8 @@ def _numbers(
         raise SeparatrixError(f"{path}:{number}: '{text}' is not a row of numbers") from None
 
 
-def _read_hdf5(path: Path) -> Table:
+def read_hdf5(path: Path) -> Table:
+    """Read datasets with the names of the columns; keys are attributes."""
     try_first(path, lambda: _texts(h5py.File(path)))
     try:
         with h5py.File(path) as file:
