@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.arguments import Parser, list_of, positive, whole_number
-from separatrix.discovery.fitting.catalogue import BY_NAME
+from separatrix.discovery.fitting.catalogue import STARTS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
@@ -174,7 +174,7 @@ def _parser() -> Parser:
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")
     parser.add_argument("--seed", type=whole_number(0), default=1, help="of all random choices [1]")
     parser.add_argument(
-        "--effects", metavar="LIST", type=list_of(BY_NAME), help="only these effects of the catalogue"
+        "--effects", metavar="LIST", type=list_of(STARTS), help="only these effects of the catalogue"
     )
     parser.add_argument(
         "--segment-periods",

@@ -56,7 +56,7 @@ class Options:
     least_effect: float = 0.02
     # share of the gap, in training and on held-out records, that may remain of one that is closed but for so
     # little: what it leaves has another reason
-    remaining: float = 1e-3
+    remaining: float = 1e-2
     # size of what counts as visible, in standard errors
     visible: float = 5.0
     bootstraps: int = 400

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.fitting.catalogue import BY_NAME
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.options import Options
+from separatrix.library import effects
 
 _BLOCKS = 2
 
@@ -131,7 +131,7 @@ def equivalent(one: Judged, other: Judged) -> bool:
     """Whether what two fits do not share is two names of the same motion."""
     mine, theirs = set(one.fitted.names), set(other.fitted.names)
     left, right = mine - theirs, theirs - mine
-    return len(left) == len(right) == 1 and right.pop() in BY_NAME[left.pop()].equivalent
+    return len(left) == len(right) == 1 and right.pop() in effects()[left.pop()].confused
 
 
 def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.judge import Judged, judged
-from separatrix.discovery.fitting.catalogue import CATALOGUE, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
@@ -127,21 +127,21 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
     absent: dict[str, str] = {}
-    for effect in CATALOGUE:
-        if effect.name in base.names or (options.candidates and effect.name not in options.candidates):
+    for name in STARTS:
+        if name in base.names or (options.candidates and name not in options.candidates):
             continue
-        if any(path.startswith(f"effect.{effect.name}.") for path in base.model.parameters):
+        if any(path.startswith(f"effect.{name}.") for path in base.model.parameters):
             continue
-        made = candidate(base.model, free, base.names, effect.name, bench.scales)
+        made = candidate(base.model, free, base.names, name, bench.scales)
         if isinstance(made, str):
-            absent[effect.name] = made
+            absent[name] = made
         else:
-            candidates[effect.name] = made
+            candidates[name] = made
     options.progress(f"screening {len(candidates)} effects", at)
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
-    absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
+    absent = {name: absent[name] for name in STARTS if name in absent}
     return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
 
 
