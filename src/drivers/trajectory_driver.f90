@@ -9,9 +9,8 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use contact_law, only: barrier_positions, contact_at_speed, force_on_body
+  use contact_law, only: barrier_positions
   use discover, only: discover_attractors, sort_attractors
-  use drive_law, only: foot_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
@@ -20,8 +19,8 @@ module trajectory_driver
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
+  use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
-  use pair, only: driven_by_motion
   use record_writer, only: write_record
   use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
@@ -202,7 +201,8 @@ contains
       call schema%add_variable('driver_v', type_float64, ['time'], units='m/s', long_name='velocity of the driving body', &
                                data=log%sample_driver(2, :log%samples))
     else
-      call add_foot(moving, crank_angle, log, schema)
+      call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
+                               data=foot_positions(moving, crank_angle, log))
     end if
     if (moving%machine%contact%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
@@ -212,32 +212,6 @@ contains
       flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
       data=real(log%sample_mode(:log%samples), wp))
   end subroutine add_history
-
-  !> Forces of soft barriers at the samples.
-  function contact_forces(moving, log) result(forces)
-    type(motion_t), intent(in) :: moving
-    type(log_t), intent(in) :: log
-    real(wp) :: forces(log%samples), place(2, log%samples)
-    place = log%sample_data(2:3, :log%samples)
-    if (allocated(moving%pair)) then
-      if (moving%pair%machine%carried) place = place - log%sample_driver(:, :log%samples)
-    end if
-    forces = force_on_body(contact_at_speed(moving%machine%contact, log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
-  end function contact_forces
-
-  subroutine add_foot(moving, crank_angle, log, schema)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: crank_angle
-    type(log_t), intent(in) :: log
-    type(schema_t), intent(inout) :: schema
-    real(wp) :: foot(log%samples)
-    integer :: i
-    do i = 1, log%samples
-      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
-    end do
-    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
-                             data=foot)
-  end subroutine add_foot
 
   !> Where the energy went by the end, or until the motion was given up.
   subroutine add_book(book, complete, schema)
@@ -270,12 +244,7 @@ contains
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: kinetic(log%samples)
-    kinetic = 0.5_wp*moving%machine%mass*log%sample_data(3, :log%samples)**2
-    if (allocated(moving%pair)) then
-      if (moving%pair%machine%drive /= driven_by_motion) then
-        kinetic = kinetic + 0.5_wp*moving%pair%machine%mass*log%sample_driver(2, :log%samples)**2
-      end if
-    end if
+    kinetic = kinetic_energies(moving, log)
     associate (book => log%sample_book(:, :log%samples))
       call add('energy', book(5, :), 'energy of spring and bodies')
       call add('kinetic_energy', kinetic, 'kinetic energy')

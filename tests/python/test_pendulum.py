@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from separatrix import trajectory
+from separatrix.figures import trajectory
 from separatrix.open import open_result
 
 SMALL = ["--set", "axis[1].count=6", "--set", "axis[2].count=5"]
