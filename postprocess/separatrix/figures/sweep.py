@@ -13,7 +13,7 @@ from separatrix import style
 from separatrix.figures import pair_sweep
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
-from separatrix.figures.regions import Boundary, Region, boundaries, regions
+from separatrix.figures.regions import Boundary, Region, boundaries, limit_texts, regions
 from separatrix.labels import axis_label, count_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import table
@@ -266,13 +266,5 @@ def _caption(result: xr.Dataset, name: str, look: Look) -> list[str]:
 
 
 def _limits_caption(result: xr.Dataset) -> list[str]:
-    limits = table(result, "limits")
-    if not limits.sizes.get("limit", 0):
-        return []
-    columns = (limits[key].values for key in ("name", "lower", "upper"))
-    texts = [
-        f"{str(text).replace('_', ' ')} {lower:.6g} to {upper:.6g}"
-        for text, lower, upper in zip(*columns, strict=True)
-        if np.isfinite(lower + upper)
-    ]
+    texts = limit_texts(table(result, "limits"))
     return ["brackets: " + ", ".join(texts)] if texts else []
