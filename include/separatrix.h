@@ -215,6 +215,24 @@ int separatrix_effect_parameter(int index, char *effect, size_t effect_size, cha
                                 size_t meaning_size, char *parameter, size_t parameter_size, char *unit,
                                 size_t unit_size, double *numbers, char *message, size_t message_size);
 
+/* Row `index` of the effects, one per effect: its name; the function that it is one shape of, and over what;
+ * what it changes: "flight", "barrier" or "sensor"; its parameters in which what it does is linear near zero;
+ * those that are positive sizes; the law or parameter that a machine must have for it. Lists are parted by
+ * blanks. Code 64 beyond the last row. */
+int separatrix_effect(int index, char *name, size_t name_size, char *family, size_t family_size, char *acts,
+                      size_t acts_size, char *amplitudes, size_t amplitudes_size, char *sizes,
+                      size_t sizes_size, char *needs, size_t needs_size, char *message, size_t message_size);
+
+/* Row `index` of the pairs of effects that can be the same motion, and when. Code 64 beyond the last row. */
+int separatrix_effect_confusion(int index, char *one, size_t one_size, char *other, size_t other_size,
+                                char *reason, size_t reason_size, char *message, size_t message_size);
+
+/* The model with an effect added, `count` of whose parameters are given as keys[count] and values[count]; the
+ * others take their defaults. Code 65 if that makes no valid case. To be freed like any other. */
+int separatrix_model_with_effect(const separatrix_model *model, const char *effect, int count,
+                                 const char *const *keys, const double *values, separatrix_model **extended,
+                                 char *message, size_t message_size);
+
 #ifdef __cplusplus
 }
 #endif

@@ -7,6 +7,8 @@ from collections.abc import Callable
 USAGE = 64
 BAD_DATA = 65
 NO_INPUT = 66
+INTERNAL = 70
+NO_MEMORY = 71
 CANNOT_CREATE = 73
 STOPPED = 75
 INTERRUPTED = 130
