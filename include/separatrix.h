@@ -31,6 +31,11 @@ int separatrix_model_read(const char *path, separatrix_model **model, char *mess
 int separatrix_model_from_text(const char *text, const char *directory, separatrix_model **model,
                                char *message, size_t message_size);
 
+/* The same with settings on top, each "key.path=value" with a TOML value, as `--set` of the program takes them;
+ * `name` stands for the file in messages, and its folder is where files that the case names are looked for. */
+int separatrix_model_with(const char *text, const char *name, int setting_count, const char *const *settings,
+                          separatrix_model **model, char *message, size_t message_size);
+
 /* Frees a model; NULL is allowed. */
 void separatrix_model_free(separatrix_model *model);
 
@@ -209,6 +214,24 @@ int separatrix_model_text(const separatrix_model *model, int chosen_count, const
 int separatrix_effect_parameter(int index, char *effect, size_t effect_size, char *meaning,
                                 size_t meaning_size, char *parameter, size_t parameter_size, char *unit,
                                 size_t unit_size, double *numbers, char *message, size_t message_size);
+
+/* Row `index` of the effects, one per effect: its name; the function that it is one shape of, and over what;
+ * what it changes: "flight", "barrier" or "sensor"; its parameters in which what it does is linear near zero;
+ * those that are positive sizes; the law or parameter that a machine must have for it. Lists are parted by
+ * blanks. Code 64 beyond the last row. */
+int separatrix_effect(int index, char *name, size_t name_size, char *family, size_t family_size, char *acts,
+                      size_t acts_size, char *amplitudes, size_t amplitudes_size, char *sizes,
+                      size_t sizes_size, char *needs, size_t needs_size, char *message, size_t message_size);
+
+/* Row `index` of the pairs of effects that can be the same motion, and when. Code 64 beyond the last row. */
+int separatrix_effect_confusion(int index, char *one, size_t one_size, char *other, size_t other_size,
+                                char *reason, size_t reason_size, char *message, size_t message_size);
+
+/* The model with an effect added, `count` of whose parameters are given as keys[count] and values[count]; the
+ * others take their defaults. Code 65 if that makes no valid case. To be freed like any other. */
+int separatrix_model_with_effect(const separatrix_model *model, const char *effect, int count,
+                                 const char *const *keys, const double *values, separatrix_model **extended,
+                                 char *message, size_t message_size);
 
 #ifdef __cplusplus
 }

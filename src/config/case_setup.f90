@@ -60,6 +60,7 @@ contains
     type(span_t) :: span
     span%duration = the_case%run%duration
     span%window = the_case%run%window
+    span%whole_periods = the_case%run%average == 'whole_periods'
     span%extension = the_case%run%extension
     span%stop_when_captured = the_case%run%stop == 'captured'
   end function span_of

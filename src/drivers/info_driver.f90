@@ -3,16 +3,16 @@
 
 !> `separatrix info`: what is in a file.
 module info_driver
-  use attractors, only: regime_names
+  use attractors, only: kind_chaotic, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t, fail
   use event_words, only: word_text
-  use journal, only: json_text
+  use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
   use map_verify, only: probe_file
   use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
-  use text, only: join, to_text
+  use text, only: interval_text, join, to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -257,12 +257,20 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: table(:, :)
+    real(wp), allocatable :: table(:, :), entry_kinds(:)
     character(len=:), allocatable :: line
     integer :: i, k
+    integer(int64) :: kind
     if (.not. reader%has('/catalogue/attractor')) return
     call reader%read_columns([('/catalogue/'//catalogue_columns(k), k=1, size(catalogue_columns))], table, error)
+    ! Older files do not have it.
+    if (.not. allocated(error)) then
+      if (reader%has('/catalogue/kind')) call reader%read_values('/catalogue/kind', entry_kinds, error)
+    end if
     if (allocated(error)) return
+    if (allocated(entry_kinds)) then
+      if (size(entry_kinds) /= size(table, 1)) deallocate (entry_kinds)
+    end if
     if (json) body = body//', "catalogue": ['
     if (.not. json) body = body//new_line('a')//'  catalogue (R, L: impact at upper, lower barrier; S: stick; '// &
       'C, D: chatter; . : end of a period):'
@@ -283,6 +291,14 @@ contains
           line = line//to_text(whole(table(i, k)))
         end select
       end do
+      if (allocated(entry_kinds)) then
+        kind = whole(entry_kinds(i))
+        if (kind >= 1 .and. kind <= last_kind) then
+          if (json) line = line//', "kind": '//json_text(trim(kind_names(kind)))
+          if (.not. json .and. kind == kind_chaotic) line = line//', chaotic'
+          if (.not. json .and. kind == kind_not_known) line = line//', not known to be periodic: perhaps a long transient'
+        end if
+      end if
       if (json) body = body//trim(merge(', ', '  ', i > 1))//'{'//line//'}'
       if (.not. json) body = body//new_line('a')//'    '//line
     end do
@@ -322,12 +338,15 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: names(:)
+    character(len=*), parameter :: group = '/limits/', columns(4) = [character(len=14) :: 'lower', 'upper', 'observed_lower', &
+      'observed_upper']
+    character(len=:), allocatable :: names(:), line
     real(wp), allocatable :: ends(:, :)
-    integer :: i
+    integer :: i, k, last
     if (.not. reader%has('/limits/name')) return
+    last = merge(4, 2, reader%has('/limits/observed_upper'))
     call reader%read_strings('/limits/name', names, error)
-    if (.not. allocated(error)) call reader%read_columns(['/limits/lower', '/limits/upper'], ends, error)
+    if (.not. allocated(error)) call reader%read_columns(group//columns(:last), ends, error)
     if (allocated(error)) return
     if (size(ends, 1) /= size(names)) then
       call fail(error, exit_io, "the columns of '/limits' in '"//reader%path//"' differ in length")
@@ -337,10 +356,16 @@ contains
     if (.not. json) body = body//new_line('a')//'  limits:'
     do i = 1, size(names)
       if (json) then
-        body = body//trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))//', "lower": '// &
-          to_text(ends(i, 1))//', "upper": '//to_text(ends(i, 2))//'}'
+        line = trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))
+        do k = 1, last
+          line = line//', "'//trim(columns(k))//'": '//json_number(ends(i, k))
+        end do
+        body = body//line//'}'
       else
-        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(ends(i, 1), 6)//' .. '//to_text(ends(i, 2), 6)
+        line = 'not known'
+        if (abs(ends(i, 1)) <= huge(1.0_wp)) line = interval_text(ends(i, :2), ' .. ')
+        if (last == 4) line = line//'; in steps '//interval_text(ends(i, 3:), ' .. ')
+        body = body//new_line('a')//'    '//trim(names(i))//': '//line
       end if
     end do
     if (json) body = body//']'

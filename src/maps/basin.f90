@@ -16,7 +16,7 @@ module basin
   use status, only: exit_bad_case
   use text, only: to_text
   use trajectories, only: block_size, describe_all, journey_t, run_trajectories
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -67,6 +67,7 @@ contains
     call open_slice(grid, span, slice, journey%moving, error)
     if (allocated(error)) return
     journey%span = span
+    call fit_window(journey%moving%machine%period, journey%span)
     journey%describe = describe
     call prepare_lanes(journey%moving, journey%flow)
   end subroutine open_journey
