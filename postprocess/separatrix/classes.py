@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names and colours of the classes of a coded field: regimes, attractors, periods, event words."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -54,6 +55,13 @@ def classes(result: xr.Dataset, field: str, counts: dict[int, int]) -> list[Clas
     return nothing + _most_frequent(result, field, coded, counts)
 
 
+def recoloured(entries: list[Class], colours: Sequence[str]) -> list[Class]:
+    """Return the classes with other colours, in their order, for as many as are given."""
+    coded = [entry for entry in entries if entry.codes != (0,)]
+    new = dict(zip((entry.codes for entry in coded), colours, strict=False))
+    return [replace(entry, colour=new.get(entry.codes, entry.colour)) for entry in entries]
+
+
 def class_index(image: np.ndarray, entries: list[Class]) -> np.ndarray:
     """Return the position in `entries` of the code at each pixel."""
     index = np.zeros(image.shape, dtype=np.int16)
@@ -88,10 +96,14 @@ def _text(result: xr.Dataset, field: str, code: int) -> str:
     if field == "attractor":
         return _attractor_text(result, code) if code else "no attractor"
     if field == "period":
-        return f"period {code}" if code else "not periodic"
+        return f"period {code}" if code else "no period known"
     if field == "event_word":
-        return f"word {decode_word(code)}" if code else "no events"
+        return _word_text(decode_word(code)) if code else "no cycle known"
     return flag_text(flag_names(result[field]).get(code, str(code)))
+
+
+def _word_text(word: str) -> str:
+    return f"word {word}" if word.strip(".") else "no events"
 
 
 def _attractor_text(result: xr.Dataset, identity: int) -> str:
@@ -106,7 +118,24 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
     regimes = [flag_text(names.get(int(r), str(r))) for r in np.unique(catalogue["regime"].values[mine])]
     periods = [int(p) for p in np.unique(catalogue["period"].values[mine])]
     if periods == [0]:
-        period = "not periodic"
+        period = _aperiodic_text(catalogue, mine)
     else:
         period = ("period " if len(periods) == 1 else "periods ") + ", ".join(str(p) for p in periods)
-    return f"attractor {identity}: {' or '.join(regimes)}, {period}"
+    return f"attractor {identity}: {' or '.join(regimes)}, {period}{_rotation_text(catalogue, mine)}"
+
+
+def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return ', -1 turns per period' for a cycle of an angle that goes round; '' where it does not, or not always so."""
+    if "rotation_number" not in catalogue:
+        return ""
+    turns = np.unique(catalogue["rotation_number"].values[mine])
+    return f", {turns[0]:+.4g} turns per drive period" if turns.size == 1 and abs(turns[0]) > 0 else ""
+
+
+def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return what is known of entries without a period; older files do not tell."""
+    if "kind" not in catalogue:
+        return "not periodic"
+    names = flag_names(catalogue["kind"])
+    kinds = {names.get(int(kind), "") for kind in np.unique(catalogue["kind"].values[mine])}
+    return "chaotic" if kinds == {"chaotic"} else "not known to be periodic"

@@ -6,12 +6,13 @@
 !> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
 !> velocity of both where nothing ties either to the ground.
 module strobe
-  use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck
+  use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck, wrap_range
   use contact_law, only: contact_t
   use energy, only: energy_of_body, record_with_book
-  use kinds, only: wp
+  use event_words, only: canonical_word
+  use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: log_t, record_sample, state_t, tally_t
+  use motion_state, only: log_t, record_sample, reset_tally, state_t, take_turns, tally_t
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion
   use pair_flight, only: body_state, driver_of, energy_of
   use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
@@ -20,7 +21,7 @@ module strobe
   private
 
   public :: strobe_t, coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, section_state, &
-    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, rest_lasts, energy_now, record_end
+    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, cycle_word, rest_lasts, energy_now, record_end
 
   !> Coordinates of two bodies.
   integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5
@@ -108,6 +109,7 @@ contains
       strobe%state = body_state(strobe%pair)
     else
       strobe%state = start_state(moving, start(1), start(2), start(3))
+      call take_turns(moving%machine%turn, strobe%state)
     end if
   end function start_strobe
 
@@ -138,6 +140,7 @@ contains
     integer :: n
     if (.not. allocated(moving%pair)) then
       strobe%state = start_state(moving, point(1), point(2), 0.0_wp)
+      call take_turns(moving%machine%turn, strobe%state)
       return
     end if
     n = coordinates_of(moving)
@@ -196,7 +199,9 @@ contains
     w = moving%machine%drive_frequency
     scales = 1
     if (.not. allocated(moving%pair)) then
-      scales(:2) = half_range*[1.0_wp, w]
+      length = half_range
+      if (moving%machine%turn > 0) length = min(length, moving%machine%turn/2)
+      scales(:2) = length*[1.0_wp, w]
     else
       counts = counts_of(moving)
       n = count(counts)
@@ -235,6 +240,7 @@ contains
       strobe%state = body_state(strobe%pair)
     else
       call advance_period(moving, strobe%state, tally, reason, log)
+      call take_turns(moving%machine%turn, strobe%state, tally)
     end if
   end subroutine advance_strobe_period
 
@@ -245,8 +251,30 @@ contains
     real(wp), intent(in) :: periods
     type(features_t) :: features
     features = regime_of(tally, periods)
+    features%rotation = real(tally%turns, wp)/periods
+    call wrap_range(features, moving%machine%turn)
     if (allocated(moving%pair) .and. features%regime == regime_at_rest) features%regime = regime_stuck
   end function features_over
+
+  !> Event word of the cycle of `periods` drive periods that a state on the section has reached, wherever on it that is.
+  pure integer(int64) function cycle_word(moving, strobe, periods) result(word)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    integer, intent(in) :: periods
+    integer(int64) :: words(periods)
+    type(strobe_t) :: later
+    type(tally_t) :: tally
+    integer :: i, reason
+    later = strobe
+    words = 0
+    do i = 1, periods
+      call reset_tally(tally, later%state, allocated(moving%pair))
+      call advance_strobe_period(moving, later, tally, reason)
+      if (reason /= 0) exit
+      words(i) = tally%word
+    end do
+    word = canonical_word(words)
+  end function cycle_word
 
   !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move
   !> as one in a way that is given.

@@ -4,6 +4,7 @@
 !> `separatrix verify`: checksums, invariants, and a random sample of the points run again: in double precision,
 !> which must give what the file holds, and in quadruple precision, which tells how far it can be trusted.
 module verify_driver
+  use angle_units, only: unit_of
   use attractors, only: regime_names
   use axis, only: axis_t
   use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
@@ -25,6 +26,8 @@ module verify_driver
   use random, only: uniform
   use reference, only: run_reference
   use refinement, only: origin_contradicted
+  use restoring_law, only: position_is_angle
+  use second_look, only: recall_second_look
   use serial_team, only: serial_team_t
   use span_check, only: check_periods
   use statistics, only: share_upper_limit
@@ -49,6 +52,8 @@ module verify_driver
     !> Every point was run again.
     logical :: whole = .false.
     real(wp) :: x_deviation = 0, v_deviation = 0
+    !> The positions are angles.
+    logical :: is_angle = .false.
     character(len=:), allocatable :: first_difference
   end type audit_t
 
@@ -79,6 +84,7 @@ contains
                                                     the_case, error)
     if (.not. allocated(error)) call check_invariants(reader, kind, points, error)
     if (.not. allocated(error)) then
+      audit%is_angle = position_is_angle(the_case%laws)
       select case (kind)
       case ('basin')
         call audit_map(reader, journal, the_case, the_case%axes, '', command%sample, command%seed, audit, error)
@@ -144,6 +150,7 @@ contains
     grid = grid_of(the_case, axes)
     call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
                            error)
+    if (.not. allocated(error)) call recall(reader, alone, journal, grid, the_case, catalogues, error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
@@ -172,6 +179,25 @@ contains
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
+
+  !> Adds to the catalogues what a second look of the file found.
+  subroutine recall(reader, alone, journal, grid, the_case, catalogues, error)
+    type(reader_t), intent(in) :: reader
+    type(serial_team_t), intent(in) :: alone
+    type(journal_t), intent(in) :: journal
+    type(grid_t), intent(in) :: grid
+    type(case_t), intent(in) :: the_case
+    type(catalogue_t), intent(inout) :: catalogues(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(int64), allocatable :: lengths(:)
+    if (.not. reader%has('/second_look/start')) return
+    call reader%read_values('/second_look/start', values, error)
+    if (.not. allocated(error)) call reader%lengths('/second_look/start', lengths, error)
+    if (allocated(error)) return
+    call recall_second_look(alone, journal, grid, span_of(the_case), the_case%attractors%max_period, values, int(lengths(2)), &
+                            catalogues, error)
+  end subroutine recall
 
   !> Indices of point `i` of the sample: each point once where the sample is the `whole`, else a random one.
   pure function sampled(shape, whole, seed, i) result(index)
@@ -385,7 +411,8 @@ contains
       trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
-      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s'
+      to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
+      unit_of('m/s', audit%is_angle)
     if (.not. audit%whole) write (output_unit, '(a)') &
       '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &
       ' % of the labels would change'
