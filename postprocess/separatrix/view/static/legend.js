@@ -55,6 +55,17 @@ export function classLegend({ values, names, offset, hidden, toggle }) {
   return h("div", { class: "legend", role: "group", "aria-label": "Legend" }, ...buttons, more);
 }
 
+/** The class of an event word that was computed now: that of the file, or a new one in `names`. */
+export function wordClass(names, word) {
+  let text = "";
+  for (let rest = word; rest > 0; rest = Math.floor(rest / 8)) text += ["", "R", "L", "S", "C", "D", "+", "."][rest % 8];
+  const found = Object.entries(names).find(([, name]) => name === (text || "none"));
+  if (found) return Number(found[0]);
+  const next = Object.keys(names).length;
+  names[next] = text || "none";
+  return next;
+}
+
 /** The scale of a variable of numbers. */
 export function scaleLegend(painter, label, unit) {
   const canvas = h("canvas", { class: "scale", role: "img", "aria-label": `Colours from ${quantity(painter.range[0], unit, 3)} (dark) to ${quantity(painter.range[1], unit, 3)} (light)${painter.log ? ", logarithmic" : ""}` });
