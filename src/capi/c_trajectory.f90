@@ -17,7 +17,7 @@ module c_trajectory
   use status, only: exit_usage, reason_time_over
   use text, only: to_text
   use trajectories, only: run_trajectories
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_positive_inf, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
   implicit none
@@ -118,7 +118,10 @@ contains
     real(wp), intent(inout) :: summary(:)
     type(attractor_t) :: no_catalogue(0)
     type(outcome_t) :: ends(1)
-    call run_trajectory(prepared%journey%moving, no_catalogue, prepared%journey%span, start(1), start(2), start(3), outcome, log)
+    type(span_t) :: span
+    span = prepared%journey%span
+    call fit_window(prepared%journey%moving%machine%period, span)
+    call run_trajectory(prepared%journey%moving, no_catalogue, span, start(1), start(2), start(3), outcome, log)
     call run_trajectories(prepared%journey, no_catalogue, reshape(start, [3, 1]), ends)
     associate (last => ends(1))
       summary(:6) = [last%x, last%v, real(last%impacts, wp), last%last_impact_speed, real(last%features%regime, wp), &
