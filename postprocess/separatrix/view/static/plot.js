@@ -45,7 +45,7 @@ export function frame(context, box, across, up) {
     line(context, x, top + height, x, top + height + 5);
     context.fillText(aText.texts[i], Math.min(x, left + width - 8), top + height + 7);
   });
-  const b = ticks(up.low, up.high, height / 55), bText = tickTexts(b);
+  const b = ticks(up.low, up.high, height / 42), bText = tickTexts(b);
   context.textAlign = "right";
   context.textBaseline = "middle";
   b.values.forEach((value, i) => {
