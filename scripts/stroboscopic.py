@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Periodic orbits, stable or not, on the stroboscopic map that the library flies.
 
-Newton's method needs the map and its derivative: both come from flights of libseparatrix, the derivative from central
-differences of fourth order, so that multipliers have ten digits. A fold or a doubling is where the determinant of the
-linearised map less a multiplier of +1 or -1 is zero; at a graze the highest point of a motion is at the barrier.
+Newton's method needs the map and its derivative: both come from flights of libseparatrix, the derivative from
+central differences of fourth order, so that multipliers have ten digits. A fold or a doubling is where the
+determinant of the linearised map less a multiplier of +1 or -1 is zero.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,8 +40,10 @@ class Orbit:
 class Map:
     """The stroboscopic map of a case, with some of its parameters set."""
 
-    def __init__(self, model: Model, values: Mapping[str, float] | None = None, step: float = 2e-4, angle: float = 0.0):
-        """`values` replace those of the case; `step` of the differences; `angle` of the crank at the section."""
+    def __init__(
+        self, model: Model, values: Mapping[str, float] | None = None, step: float = 2e-4, angle: float = 0.0
+    ):
+        """`values` of parameters, `step` of the differences, `angle` of the crank at the section."""
         self.model, self.step, self.angle = model, step, angle
         self.values = dict(values or {})
         self.duration = 2 * np.pi / model.drive_frequency(self.values)
@@ -89,9 +91,13 @@ class Map:
         phase = np.mod(self.angle + flown.impact.time * 2 * np.pi / self.duration, 2 * np.pi)
         return Orbit(point, self.matrix(point, step), np.abs(flown.impact.speed_before), phase)
 
-    def orbits(self, x: tuple[float, float], v: tuple[float, float], impacts: int, side: int = 24) -> list[Orbit]:
+    def orbits(
+        self, x: tuple[float, float], v: tuple[float, float], impacts: int, side: int = 24
+    ) -> list[Orbit]:
         """All orbits with so many impacts that Newton's method finds from a grid of starts."""
-        grid = np.stack(np.meshgrid(np.linspace(*x, side), np.linspace(*v, side), indexing="ij"), -1).reshape(-1, 2)
+        grid = np.stack(np.meshgrid(np.linspace(*x, side), np.linspace(*v, side), indexing="ij"), -1).reshape(
+            -1, 2
+        )
         residual = np.max(np.abs(self.image(grid) - grid), axis=1)
         found: list[Orbit] = []
         for guess in grid[np.argsort(residual)[: 2 * side]]:
@@ -120,7 +126,12 @@ class Map:
 
 
 def follow(
-    at: Callable[[float], Map], first: float, last: float, guess: np.ndarray, steps: int = 40, least: float = 1e-5
+    at: Callable[[float], Map],
+    first: float,
+    last: float,
+    guess: np.ndarray,
+    steps: int = 40,
+    least: float = 1e-5,
 ) -> list[tuple[float, Orbit]]:
     """Follow an orbit from one value of a parameter towards another by secants.
 
@@ -164,8 +175,8 @@ def doubling(at: Callable[[float], Map], low: float, high: float, guess: np.ndar
 def fold(at: Callable[[float], Map], value: float, guess: np.ndarray, step: float) -> tuple[float, Orbit]:
     """The value at which two orbits meet, a multiplier being +1.
 
-    Newton's method on the three equations: fixed point, and zero determinant of the linearised map less one. `step` is
-    that of the differences, small beside the distance of the orbits from a graze.
+    Newton's method on three equations: fixed point, and zero determinant of the linearised map less one.
+    `step` is that of the differences, small beside the distance of the orbits from a graze.
     """
     unknown = np.array([*guess, value])
 

@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the cases of examples/validation/ and the referee of tests/referee/ and writes docs/validation.md.
 
-The numbers of others and the functions that compute ours are in validation_rows.py, the prose is in validation.md.in.
-The referee's report is kept in the output folder and made again where it is older than the program or the referee.
+The numbers of others are in validation_numbers.py, ours come from validation_rows.py, the prose is in
+validation.md.in. The referee's reports are kept in the output folder until the program or the referee is newer.
 """
 
 import argparse
@@ -16,7 +16,8 @@ from pathlib import Path
 
 import validation_rows as rows
 from markdown import table
-from validation_rows import SOURCE, THEIRS, Program, Row
+from validation_numbers import NOT_YET, THEIRS
+from validation_rows import SOURCE, Program, Row
 
 sys.path.insert(0, str(SOURCE / "tests" / "referee"))
 import compare  # noqa: E402
@@ -49,14 +50,18 @@ def page(found: list[Row], report: dict, version: dict[str, str]) -> str:
     parts = [section(name, list(group)) for name, group in groupby(found, key=lambda row: THEIRS[row.key][0])]
     missed = [[THEIRS[row.key][0], *line(row)] for row in found if row.verdict != "agrees"]
     head = ["source", "number", "theirs", "ours", "difference", "bar", "verdict"]
-    return (SOURCE / "scripts" / "validation.md.in").read_text().format(
-        **version,
-        differs=table(head, missed) if missed else "Nothing.",
-        count=len(found),
-        tables="\n\n".join(parts),
-        not_yet=table(["source", "what", "why"], [list(item) for item in rows.NOT_YET]),
-        referee=compare.summary_table(report),
-        disagreements=compare.disagreements(report),
+    return (
+        (SOURCE / "scripts" / "validation.md.in")
+        .read_text()
+        .format(
+            **version,
+            differs=table(head, missed) if missed else "Nothing.",
+            count=len(found),
+            tables="\n\n".join(parts),
+            not_yet=table(["source", "what", "why"], [list(item) for item in NOT_YET]),
+            referee=compare.summary_table(report),
+            disagreements=compare.disagreements(report),
+        )
     )
 
 
@@ -72,7 +77,9 @@ def main() -> int:
     """Run everything; the exit code is 1 where a number differs or the referee finds something wrong."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--build", type=Path, default=SOURCE / "build", help="build folder [build]")
-    parser.add_argument("--out", type=Path, default=SOURCE / "out" / "validation", help="files [out/validation]")
+    parser.add_argument(
+        "--out", type=Path, default=SOURCE / "out" / "validation", help="files [out/validation]"
+    )
     options = parser.parse_args()
     build, folder = options.build.resolve(), options.out.resolve()
     version = version_of(build / "bin" / "separatrix")

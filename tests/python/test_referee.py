@@ -52,7 +52,10 @@ def test_it_finds_the_orbit_with_one_impact_and_its_multipliers(referee, librari
 
 
 def test_it_agrees_with_itself_in_other_steps_and_more_digits(referee, libraries):
-    cases = (oscillator(1.0, 2.87, 0.04, 0.0), oscillator(1.5, 2.26, 0.0, 0.5, kinetic_coefficient=0.2, static_coefficient=0.3))
+    cases = (
+        oscillator(1.0, 2.87, 0.04, 0.0),
+        oscillator(1.5, 2.26, 0.0, 0.5, kinetic_coefficient=0.2, static_coefficient=0.3),
+    )
     for case in cases:
         ends = [
             referee.strobes(library, referee.machine_of(case, step), -1.0, 0.3, 30)[-1]
@@ -79,13 +82,15 @@ def test_the_program_is_not_contradicted(referee, separatrix, source_dir, tmp_pa
     path.write_text(text)
     court = comparison.Court.of(separatrix.parents[1], tmp_path)
     report = comparison.compare(court, path)
-    assert {part: report[part]["listed"] for part in comparison.PARTS if report[part]["counts"].get("wrong")} == {}
+    assert {
+        part: report[part]["listed"] for part in comparison.PARTS if report[part]["counts"].get("wrong")
+    } == {}
     assert sum(report["basin"]["counts"].values()) == 64
     assert report["basin"]["counts"]["agrees"] >= 60
 
 
 def test_a_wrong_claim_is_seen(referee, libraries):
-    """The comparison can fail: another period, another place, another count of impacts, a cycle called none."""
+    """Another period, another place, another count of impacts, a cycle called none."""
     comparison = importlib.import_module("compare")
     machine = referee.machine_of(oscillator(1.0, 1.0))
     (found,) = referee.outcomes(libraries[0], machine, np.array([[-0.5, 0.0]]))

@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the program says of the machines of cases/, beside what the independent referee finds.
 
-For each case: the grid of starts (`basin`), the state of these motions after 40 drive periods (`points`), both runs over
-the values of a parameter, and many starts at each value (`sweep`). Each comparison gets a verdict:
+For each case: the grid of starts (`basin`), the state of these motions after 40 drive periods (`points`),
+both runs over the values of a parameter, and many starts at each value (`sweep`). The verdicts:
 
     agrees      same cycle, period and impacts per period; or no cycle for both
     not known   no label, or a period beyond `max_period` called not periodic: silence, not an error
@@ -107,8 +107,15 @@ class Court:
         others = referee.outcomes(self.extended, machine, beside, self.effort)
         return any(not same_motion(machine, found, other) for other in others)
 
-    def judge(self, machine: Machine, start: np.ndarray, found: Outcome, claim: Claim, points: np.ndarray | None,
-              longest: int) -> str:
+    def judge(
+        self,
+        machine: Machine,
+        start: np.ndarray,
+        found: Outcome,
+        claim: Claim,
+        points: np.ndarray | None,
+        longest: int,
+    ) -> str:
         """Hold a claim against the referee's outcome; `points` lie on the cycle that the program means."""
         verdict = judged(machine, found, claim, points, longest)
         return "rounding" if verdict == "wrong" and self.sensitive(machine, start, found) else verdict
@@ -186,7 +193,7 @@ def compare_basin(court: Court, path: Path, case: dict, kinds: Counter) -> Verdi
 
 
 def compare_sweep(court: Court, path: Path, case: dict, kinds: Counter) -> tuple[Verdicts, Verdicts]:
-    """Both runs of a sweep, which the referee goes on with from their last section points, and its many starts."""
+    """Both runs of a sweep, whose last section points the referee goes on from, and its many starts."""
     name, longest = case["sweep"]["parameter"], case["attractors"]["max_period"]
     runs, many = Verdicts(), Verdicts()
     with h5py.File(court.run("sweep", path)) as file:
@@ -200,7 +207,9 @@ def compare_sweep(court: Court, path: Path, case: dict, kinds: Counter) -> tuple
         begun = np.concatenate([ends[:, k], starts])
         outcomes = referee.outcomes(court.double, machine, begun, court.effort)
         claims = [Claim(0, int(held[0][i, k]), float(held[1][i, k])) for i in range(2)]
-        claims += [Claim(int(found[0][k, i]), int(found[1][k, i]), float(found[2][k, i])) for i in range(len(starts))]
+        claims += [
+            Claim(int(found[0][k, i]), int(found[1][k, i]), float(found[2][k, i])) for i in range(len(starts))
+        ]
         for i, (outcome, claim) in enumerate(zip(outcomes, claims, strict=True)):
             verdict = court.judge(machine, begun[i], outcome, claim, None, longest)
             where = {"run": ("up", "down")[i]} if i < 2 else {"start": begun[i].tolist()}
@@ -216,7 +225,9 @@ def compare_points(court: Court, path: Path, case: dict) -> tuple[Verdicts, floa
     listed, ends = court.folder / f"{path.stem}.csv", court.folder / f"{path.stem}_ends.csv"
     listed.write_text("x0,v0\n" + "".join(f"{float(x)!r},{float(v)!r}\n" for x, v in starts))
     ends.unlink(missing_ok=True)
-    court.run("points", path, f"run.duration={PERIODS * machine.period!r}", words=("--list", listed, "--csv", ends))
+    court.run(
+        "points", path, f"run.duration={PERIODS * machine.period!r}", words=("--list", listed, "--csv", ends)
+    )
     ours = np.genfromtxt(ends, delimiter=",", names=True, dtype=None, encoding=None)
     ways = ((court.extended, 0.0), (court.double, 0.0), (court.extended, BESIDE))
     worst = 0.0
@@ -230,8 +241,12 @@ def compare_points(court: Court, path: Path, case: dict) -> tuple[Verdicts, floa
         verdict = "agrees" if apart < 1e-7 + 100 * noise and (counted or noise > 1e-6) else "wrong"
         if noise < 1e-9:
             worst = max(worst, apart)
-        verdicts.add(verdict, start=[float(x), float(v)], ours=f"{int(ours['impacts'][k])} impacts",
-                     referee=f"{int(flown[0][2])} impacts, {apart:.1e} apart")
+        verdicts.add(
+            verdict,
+            start=[float(x), float(v)],
+            ours=f"{int(ours['impacts'][k])} impacts",
+            referee=f"{int(flown[0][2])} impacts, {apart:.1e} apart",
+        )
     return verdicts, worst
 
 
@@ -256,7 +271,7 @@ def kept_report(build: Path, folder: Path, names: Iterable[str] = NAMES) -> dict
     reports = {}
     for name in names:
         path, kept = CASES / f"{name}.toml", folder / f"{name}.json"
-        sources = (court.program, path, *HERE.glob("*.c"), HERE / "compare.py", HERE / "referee.py")
+        sources = (court.program, path, *HERE.glob("*.[ch]"), HERE / "compare.py", HERE / "referee.py")
         if not kept.is_file() or kept.stat().st_mtime < max(item.stat().st_mtime for item in sources):
             print(f"referee: {name}", flush=True)
             kept.write_text(json.dumps(compare(court, path), indent=1))

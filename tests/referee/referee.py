@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The independent referee (referee.c) in Python: machines from case files, outcomes of many starts.
 
-It reads the same case files as the program, with `tomllib` and in SI numbers alone, and shares no code with it.
+It reads the same case files as the program, by `tomllib` and in SI numbers alone, and shares no code with it.
 """
 
 import ctypes
@@ -29,6 +29,9 @@ class Machine(ctypes.Structure):
         ("frequency", ctypes.c_double),
         ("cosine", ctypes.c_double * HARMONICS),
         ("sine", ctypes.c_double * HARMONICS),
+        ("samples", ctypes.c_int),
+        ("interval", ctypes.c_double),
+        ("force", ctypes.POINTER(ctypes.c_double)),
         ("longest_step", ctypes.c_double),
     ]
 
@@ -53,7 +56,7 @@ class _Outcome(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Effort:
-    """How long a motion is followed: longest period looked for, drive periods before and at most, of exponents."""
+    """How long a motion is followed, in drive periods: `exponents` is how long they are averaged."""
 
     longest: int = 128
     least: int = 64
@@ -64,7 +67,7 @@ class Effort:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where a start ends up. `period` is 0 without a cycle; counts are per cycle (else per `Effort.exponents`)."""
+    """Where a start ends up; `period` is 0 without a cycle. Counts are per cycle or `Effort.exponents`."""
 
     period: int
     turns: int
@@ -94,7 +97,8 @@ def build(folder: Path, long: bool = False) -> ctypes.CDLL:
     """Compile referee.c into `folder` (in long double if asked) and load it."""
     path = folder / f"referee{'_long' if long else ''}.so"
     source = HERE / "referee.c"
-    if not path.is_file() or path.stat().st_mtime < source.stat().st_mtime:
+    newest = max(item.stat().st_mtime for item in (source, *HERE.glob("*.h")))
+    if not path.is_file() or path.stat().st_mtime < newest:
         flags = ["-O2", "-shared", "-fPIC", *(["-DREAL_IS_LONG"] if long else [])]
         compiler = os.environ.get("CC", "cc")
         subprocess.run([compiler, *flags, "-o", path, source, "-lm"], check=True)
@@ -115,7 +119,9 @@ def machine_of(case: dict, step: float = 0.8) -> Machine:
     machine.damping = friction.get("damping", 0.0) / mass
     gravity = body.get("gravity", 9.81)
     machine.kinetic = friction.get("kinetic_coefficient", 0.0) * gravity
-    machine.static_friction = friction.get("static_coefficient", friction.get("kinetic_coefficient", 0.0)) * gravity
+    machine.static_friction = (
+        friction.get("static_coefficient", friction.get("kinetic_coefficient", 0.0)) * gravity
+    )
     machine.upper, machine.lower = contact.get("upper", math.inf), contact.get("lower", -math.inf)
     if contact["law"] == "newton":
         machine.restitution = contact["restitution"]
@@ -131,7 +137,9 @@ def machine_of(case: dict, step: float = 0.8) -> Machine:
     else:
         raise ValueError(f"the referee has no drive law {drive['law']}")
     for n, (a, b) in enumerate(zip(cosine, sine, strict=True), 1):
-        turned = (a - 1j * b) * complex(math.cos(n * drive.get("angle", 0.0)), math.sin(n * drive.get("angle", 0.0)))
+        turned = (a - 1j * b) * complex(
+            math.cos(n * drive.get("angle", 0.0)), math.sin(n * drive.get("angle", 0.0))
+        )
         machine.cosine[n - 1], machine.sine[n - 1] = spring * turned.real, -spring * turned.imag
     return machine
 
@@ -142,7 +150,9 @@ def with_value(case: dict, path: str, value: float) -> dict:
     return {**case, family: {**case[family], name: value}}
 
 
-def outcomes(library: ctypes.CDLL, machine: Machine, starts: np.ndarray, effort: Effort | None = None) -> list[Outcome]:
+def outcomes(
+    library: ctypes.CDLL, machine: Machine, starts: np.ndarray, effort: Effort | None = None
+) -> list[Outcome]:
     """Where the starts, rows of x and v at crank angle 0, end up."""
     effort = effort or Effort()
     starts = np.ascontiguousarray(starts, float)

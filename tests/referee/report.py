@@ -44,7 +44,15 @@ def summary_table(reports: dict[str, dict]) -> str:
     for name, report in reports.items():
         cells = {part: cell(report[part]) for part in PARTS}
         points = [cells["basin"], cells["points"], f"{report['worst']:.1e}"]
-        rows.append([f"`{name}`: {report['title']}", motions(report["kinds"]), *points, cells["runs"], cells["starts"]])
+        rows.append(
+            [
+                f"`{name}`: {report['title']}",
+                motions(report["kinds"]),
+                *points,
+                cells["runs"],
+                cells["starts"],
+            ]
+        )
     return table(head, rows)
 
 
@@ -61,15 +69,30 @@ def disagreements(reports: dict[str, dict]) -> str:
                 shown.setdefault(key, []).append(item)
             for key, count in alike.most_common():
                 verdict, first = key[0], shown[key][0]
-                cause = EXPLAINED.get((name, part), CAUSES[verdict]) if verdict == "wrong" else CAUSES[verdict]
-                rows.append([f"`{name}`", part, verdict, str(count), where(first), first["ours"], first["referee"], cause])
+                cause = (
+                    EXPLAINED.get((name, part), CAUSES[verdict]) if verdict == "wrong" else CAUSES[verdict]
+                )
+                rows.append(
+                    [
+                        f"`{name}`",
+                        part,
+                        verdict,
+                        str(count),
+                        where(first),
+                        first["ours"],
+                        first["referee"],
+                        cause,
+                    ]
+                )
     head = ["machine", "part", "verdict", "number", "first", "ours", "referee", "cause"]
     return table(head, rows) if rows else "None."
 
 
 def kind_of(text: str) -> str:
     """A motion without its numbers: label and period."""
-    return ", ".join(word for word in text.split(", ") if word.startswith(("label", "no label", "period", "chaos", "slow")))
+    return ", ".join(
+        word for word in text.split(", ") if word.startswith(("label", "no label", "period", "chaos", "slow"))
+    )
 
 
 def where(item: dict) -> str:
