@@ -13,6 +13,7 @@ from separatrix.case import describe_case, version_text
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names, table
+from separatrix.regions import brackets, limit_texts
 
 _COLOURS = {0: style.RUN_UP, 1: style.RUN_DOWN}
 _NAMES = {0: "run-up", 1: "run-down"}
@@ -52,7 +53,7 @@ def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
     top.set_xlim(values.min(), values.max())
     for letter, ax in zip("ab", (top, bottom), strict=True):
         ax.set_title(f"{letter})", loc="left")
-    caption = [*describe_case(result), *limit_texts(result), plain(version_text(result))]
+    caption = [*describe_case(result), *_limits_caption(result), plain(version_text(result))]
     compose(figure, title, caption, handles, columns=min(5, len(handles)))
     return figure
 
@@ -65,10 +66,7 @@ def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:
     names = flag_names(result["regime"])
     order = np.argsort(values)
     values, codes = values[order], codes[order]
-    limits = table(result, "limits")
-    middles = (
-        np.sort((limits["lower"].values + limits["upper"].values) / 2) if "lower" in limits else np.zeros(0)
-    )
+    middles = np.sort(brackets(table(result, "limits"), in_steps=True).mean(axis=1))
     found = []
     start = values[0]
     for k in range(1, values.size + 1):
@@ -83,13 +81,5 @@ def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:
     return found
 
 
-def limit_texts(result: xr.Dataset) -> list[str]:
-    """Return the bracketed limits as text."""
-    limits = table(result, "limits")
-    if not limits.sizes.get("limit", 0):
-        return ["one regime throughout"]
-    columns = (limits[key].values for key in ("name", "lower", "upper"))
-    return [
-        f"{flag_text(str(text))} {lower:.6g} to {upper:.6g}"
-        for text, lower, upper in zip(*columns, strict=True)
-    ]
+def _limits_caption(result: xr.Dataset) -> list[str]:
+    return limit_texts(table(result, "limits")) or ["one regime throughout"]

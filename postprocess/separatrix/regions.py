@@ -36,11 +36,32 @@ class Region:
     text: str
 
 
+def brackets(limits: xr.Dataset, *, in_steps: bool = False) -> np.ndarray:
+    """Return the ends of each limit: of the settled motion where known, else (or always) as seen in steps."""
+    if "lower" not in limits:
+        return np.zeros((0, 2))
+    ends = np.stack([limits["lower"].values, limits["upper"].values], axis=1)
+    if "observed_lower" in limits:
+        seen = np.stack([limits["observed_lower"].values, limits["observed_upper"].values], axis=1)
+        ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True) & (not in_steps), ends, seen)
+    return ends
+
+
+def limit_texts(limits: xr.Dataset) -> list[str]:
+    """Return each limit as text, with how it is known where that is in steps only."""
+    known = np.isfinite(limits["lower"].values + limits["upper"].values) if "lower" in limits else []
+    return [
+        f"{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}{'' if settled else ' (in steps)'}"
+        for name, (lower, upper), settled in zip(
+            limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
+        )
+        if np.isfinite(lower + upper)
+    ]
+
+
 def boundaries(limits: xr.Dataset) -> list[Boundary]:
     """Return the limits in ascending order; brackets that overlap or touch are one."""
-    if "lower" not in limits:
-        return []
-    ends = np.sort(np.stack([limits["lower"].values, limits["upper"].values]), axis=0).T
+    ends = np.sort(brackets(limits), axis=1)
     merged: list[Boundary] = []
     for lower, upper in sorted(ends[np.isfinite(ends).all(axis=1)].tolist()):
         if merged and lower <= merged[-1].upper:

@@ -14,7 +14,7 @@ from separatrix.case import describe_case, resolved_case, version_text
 from separatrix.labels import axis_label, count_text, plain
 from separatrix.layout import compose
 from separatrix.open import table
-from separatrix.regions import Boundary, Region, boundaries, regions
+from separatrix.regions import Boundary, Region, boundaries, limit_texts, regions
 
 _UP, _DOWN = 0, 1
 _NOT_RUN = 0
@@ -227,13 +227,5 @@ def _caption(result: xr.Dataset, name: str) -> list[str]:
 
 
 def _limits_caption(result: xr.Dataset) -> list[str]:
-    limits = table(result, "limits")
-    if not limits.sizes.get("limit", 0):
-        return []
-    columns = (limits[key].values for key in ("name", "lower", "upper"))
-    texts = [
-        f"{str(text).replace('_', ' ')} {lower:.6g} to {upper:.6g}"
-        for text, lower, upper in zip(*columns, strict=True)
-        if np.isfinite(lower + upper)
-    ]
+    texts = limit_texts(table(result, "limits"))
     return ["brackets: " + ", ".join(texts)] if texts else []

@@ -6,13 +6,13 @@ module info_driver
   use attractors, only: kind_chaotic, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t, fail
   use event_words, only: word_text
-  use journal, only: json_text
+  use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
   use map_verify, only: probe_file
   use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
-  use text, only: join, to_text
+  use text, only: interval_text, join, to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -338,12 +338,15 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: names(:)
+    character(len=*), parameter :: group = '/limits/', columns(4) = [character(len=14) :: 'lower', 'upper', 'observed_lower', &
+      'observed_upper']
+    character(len=:), allocatable :: names(:), line
     real(wp), allocatable :: ends(:, :)
-    integer :: i
+    integer :: i, k, last
     if (.not. reader%has('/limits/name')) return
+    last = merge(4, 2, reader%has('/limits/observed_upper'))
     call reader%read_strings('/limits/name', names, error)
-    if (.not. allocated(error)) call reader%read_columns(['/limits/lower', '/limits/upper'], ends, error)
+    if (.not. allocated(error)) call reader%read_columns(group//columns(:last), ends, error)
     if (allocated(error)) return
     if (size(ends, 1) /= size(names)) then
       call fail(error, exit_io, "the columns of '/limits' in '"//reader%path//"' differ in length")
@@ -353,10 +356,16 @@ contains
     if (.not. json) body = body//new_line('a')//'  limits:'
     do i = 1, size(names)
       if (json) then
-        body = body//trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))//', "lower": '// &
-          to_text(ends(i, 1))//', "upper": '//to_text(ends(i, 2))//'}'
+        line = trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))
+        do k = 1, last
+          line = line//', "'//trim(columns(k))//'": '//json_number(ends(i, k))
+        end do
+        body = body//line//'}'
       else
-        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(ends(i, 1), 6)//' .. '//to_text(ends(i, 2), 6)
+        line = 'not known'
+        if (abs(ends(i, 1)) <= huge(1.0_wp)) line = interval_text(ends(i, :2), ' .. ')
+        if (last == 4) line = line//'; in steps '//interval_text(ends(i, 3:), ' .. ')
+        body = body//new_line('a')//'    '//trim(names(i))//': '//line
       end if
     end do
     if (json) body = body//']'

@@ -14,7 +14,7 @@ module journal
   implicit none
   private
 
-  public :: json_text, duration_text
+  public :: json_text, json_number, duration_text
 
   real(wp), parameter :: terminal_interval = 0.5_wp, first_interval = 10, longest_interval = 300
 
@@ -50,6 +50,14 @@ module journal
   end type journal_t
 
 contains
+
+  !> A number in JSON, null where there is none.
+  pure function json_number(value) result(text)
+    real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
+    text = 'null'
+    if (abs(value) <= huge(value)) text = to_text(value)
+  end function json_number
 
   !> Starts the clock.
   subroutine open_journal(self, active, json, quiet)

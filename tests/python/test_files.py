@@ -210,13 +210,20 @@ def test_made_up_files_have_the_codes_of_real_ones(results):
 def test_the_sweep_has_the_limits_it_prints(separatrix, tmp_path, results):
     outcome = succeed(separatrix, *KINDS["sweep"], "-o", tmp_path / "o.h5", folder=results["map"].parent)
     with h5py.File(results["sweep"]) as file:
-        limits = list(zip(file["limits/name"], file["limits/lower"], file["limits/upper"], strict=True))
+        columns = ("name", "observed_lower", "observed_upper", "settled", "lower", "upper")
+        limits = list(zip(*(file[f"limits/{column}"] for column in columns), strict=True))
         assert file.attrs["barrier_upper"] == 1.1
         assert "barrier_lower" not in file.attrs
         ratio, impacts = file["drive_ratio"][()], file["impacts_per_period"][()]
     assert len(limits) == outcome.out.count("run up") + outcome.out.count("run down")
-    for name, lower, upper in limits:
+    for name, lower, upper, settled, *bracket in limits:
         assert 0 < upper - lower <= 1e-3
+        if settled.decode().strip() == "bracketed":
+            assert 0 < bracket[1] - bracket[0] <= 1e-3
+        else:
+            # on the way down the motions with impacts are chaotic before they stop
+            assert name.decode().strip() == "impacts_stop_down"
+            assert np.isnan(bracket).all()
         direction = 0 if name.decode().endswith("up") else 1
         below = impacts[direction][ratio < lower][-1] > 0
         above = impacts[direction][ratio > upper][0] > 0
