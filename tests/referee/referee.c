@@ -15,6 +15,7 @@
 #include "events.h"
 
 enum { LONGEST = 512 };
+static const double CHAOS = 1e-3; /* a larger Lyapunov exponent per drive period */
 
 /* What a motion did over its cycle, or over the last periods if it has none. */
 typedef struct {
@@ -142,9 +143,33 @@ static int return_time(const machine *m, real (*ring)[2], long n, int longest, d
   return 0;
 }
 
+/* Follows a motion up to `most` drive periods for a cycle of up to `longest`; its period, or 0. `n` counts
+ * them. */
+static int find_cycle(body *b, real (*ring)[2], long *n, long least, long most, int longest,
+                      double tolerance) {
+  const machine *m = b->law;
+  while (*n < most && !b->failed) {
+    for (int k = 0; k < 32; k++, (*n)++) {
+      if (m->pendulum != 0)
+        b->x = R(remainder)(b->x, 2 * (real)M_PI);
+      ring[*n % (2 * LONGEST)][0] = b->x;
+      ring[*n % (2 * LONGEST)][1] = b->v;
+      one_period(b);
+    }
+    const int within = *n < 2 * longest + 16 ? (int)(*n - 16) / 2 : longest;
+    if (*n < least || within < 1)
+      continue;
+    const int period = return_time(m, ring, *n, within, tolerance);
+    /* a slow or decaying motion may come near itself after other periods than its own, for a while */
+    if (period > 0 && return_time(m, ring, *n, within, 1e4 * tolerance) == period)
+      return period;
+  }
+  return 0;
+}
+
 /* Where the motion from a start ends up: flown for `least` drive periods, and then until its section points
  * come back within `tolerance` of their size, for at most `most`. Where they do not, Lyapunov exponents over
- * `more`. */
+ * `more` periods; where these show no chaos, ten times as long a search. */
 void referee_outcome(const machine *m, double x, double v, int longest, long least, long most, long more,
                      double tolerance, outcome *o) {
   static _Thread_local real ring[2 * LONGEST][2];
@@ -153,27 +178,18 @@ void referee_outcome(const machine *m, double x, double v, int longest, long lea
   if (longest > LONGEST)
     longest = LONGEST;
   long n = 0;
-  while (n < most && !b.failed) {
-    for (int k = 0; k < 32; k++, n++) {
-      if (m->pendulum != 0)
-        b.x = R(remainder)(b.x, 2 * (real)M_PI);
-      ring[n % (2 * LONGEST)][0] = b.x;
-      ring[n % (2 * LONGEST)][1] = b.v;
-      one_period(&b);
-    }
-    const int within = n < 2 * longest + 16 ? (int)(n - 16) / 2 : longest;
-    if (n < least || within < 1)
-      continue;
-    o->period = return_time(m, ring, n, within, tolerance);
-    /* a decaying oscillation may come near itself after other periods than its own, for a while */
-    if (o->period > 0 && return_time(m, ring, n, within, 1e4 * tolerance) == o->period)
-      break;
+  int period = find_cycle(&b, ring, &n, least, most, longest, tolerance);
+  if (period == 0) {
+    body other = b;
+    measure_exponents(&other, o, more);
+    if (!(o->exponent[0] > CHAOS))
+      period = find_cycle(&b, ring, &n, least, 10 * most, longest, tolerance);
   }
   o->settled = n;
-  if (o->period > 0)
+  if (period > 0) {
+    o->period = period;
     measure_cycle(&b, o);
-  else
-    measure_exponents(&b, o, more);
+  }
   o->failed = b.failed;
 }
 

@@ -58,9 +58,9 @@ class _Outcome(ctypes.Structure):
 class Effort:
     """How long a motion is followed, in drive periods: `exponents` is how long they are averaged."""
 
-    longest: int = 128
+    longest: int = 512
     least: int = 64
-    most: int = 6000
+    most: int = 4000
     exponents: int = 2000
     tolerance: float = 1e-10
 
