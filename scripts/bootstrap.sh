@@ -62,10 +62,7 @@ find_python() {
 # What .venv depends on; it is made again if the interpreter is gone or broken.
 wanted() {
   .venv/bin/python --version
-  cat requirements.txt requirements-dev.txt
-  if [[ -f postprocess/pyproject.toml ]]; then
-    cat postprocess/pyproject.toml
-  fi
+  cat requirements.txt requirements-dev.txt pyproject.toml
 }
 
 make_venv() {
@@ -82,9 +79,8 @@ make_venv() {
   echo "bootstrap: installing the Python packages into .venv"
   local install=(.venv/bin/python -m pip install --quiet --disable-pip-version-check)
   "${install[@]}" -r requirements.txt -r requirements-dev.txt
-  if [[ -f postprocess/pyproject.toml ]]; then
-    "${install[@]}" -e postprocess
-  fi
+  # The Python package alone: the program is that of build/.
+  "${install[@]}" -e . -C wheel.cmake=false
   wanted > "$stamp"
 }
 

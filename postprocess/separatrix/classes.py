@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names and colours of the classes of a coded field: regimes, attractors, periods, event words."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -52,6 +53,13 @@ def classes(result: xr.Dataset, field: str, counts: dict[int, int]) -> list[Clas
             for code, place in zip(coded, places, strict=True)
         ]
     return nothing + _most_frequent(result, field, coded, counts)
+
+
+def recoloured(entries: list[Class], colours: Sequence[str]) -> list[Class]:
+    """Return the classes with other colours, in their order, for as many as are given."""
+    coded = [entry for entry in entries if entry.codes != (0,)]
+    new = dict(zip((entry.codes for entry in coded), colours, strict=False))
+    return [replace(entry, colour=new.get(entry.codes, entry.colour)) for entry in entries]
 
 
 def class_index(image: np.ndarray, entries: list[Class]) -> np.ndarray:

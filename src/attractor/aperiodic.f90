@@ -126,7 +126,11 @@ contains
               found%points(:, 2) >= catalogue(k)%points(:, 1))) then
         ! What is not known does not widen what is.
         if (found%kind == kind_not_known .and. catalogue(k)%kind == kind_chaotic) return
-        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) catalogue(k) = found
+        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) then
+          catalogue(k)%kind = kind_chaotic
+          catalogue(k)%features = found%features
+          catalogue(k)%multiplier = found%multiplier
+        end if
         catalogue(k)%points(:, 1) = min(catalogue(k)%points(:, 1), found%points(:, 1))
         catalogue(k)%points(:, 2) = max(catalogue(k)%points(:, 2), found%points(:, 2))
         catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))

@@ -8,8 +8,9 @@ module discover
   use attractors, only: attractor_t, find_box, find_capture, kind_rest, longest_period, make_points, most_coordinates, &
     regime_non_impact
   use contact_law, only: contact_t
-  use cycle, only: is_linear, map_point, refine_cycle
+  use cycle, only: map_point, refine_cycle
   use exact_return, only: exact_cycle, returns_t, watch_returns
+  use free_motion, only: is_linear
   use kinds, only: int64, wp
   use matrices, only: solve
   use motion, only: motion_t

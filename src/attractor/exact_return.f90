@@ -6,7 +6,7 @@
 !> period. Near such a cycle the numbers of impacts differ from start to start, so that `refine_cycle` cannot verify it.
 module exact_return
   use attractors, only: attractor_t, longest_exact_period, make_points, most_coordinates
-  use cycle, only: differentiate, direction, directions, rings, scale_of
+  use cycle, only: derivative, direction, directions, rings, scale_of
   use kinds, only: int64, wp
   use matrices, only: eigenvalues
   use motion, only: motion_t
@@ -96,7 +96,7 @@ contains
     attractor%features%word = cycle_word(moving, first, attractor%period)
     attractor%section = section_state(moving, attractor%points(:, 1))
     if (tally%chatters == 0) then
-      call differentiate(moving, attractor%points(:n, 1), attractor%period, attractor%scale(:n), jacobian, found)
+      call derivative(moving, attractor%points(:n, 1), attractor%period, attractor%scale(:n), jacobian, found)
       if (.not. found) return
       attractor%multipliers(:n) = eigenvalues(jacobian)
       attractor%multiplier = abs(attractor%multipliers(1))

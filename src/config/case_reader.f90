@@ -20,6 +20,9 @@ module case_reader
   implicit none
   private
 
+  !> Most starts of a second look for attractors.
+  integer, parameter :: most_starts = 1000000
+
   public :: load_case, load_case_text
 
 contains
@@ -86,6 +89,7 @@ contains
       call take_real(source, 'run.duration', more_than(0.0_wp, 's'), run%duration)
       run%window = run%duration/4
       call take_real(source, 'run.window', more_than(0.0_wp, 's'), run%window)
+      call take_choice(source, 'run.average', ['whole_periods', 'window       '], run%average)
       call take_choice(source, 'run.stop', ['captured', 'duration'], run%stop)
       call take_real(source, 'run.extension', at_least(1.0_wp, '1'), run%extension)
       call take_real(source, 'run.domain', more_than(0.0_wp, 'm'), run%domain)
@@ -115,6 +119,7 @@ contains
       call take_integer(source, 'attractors.sample', 1, attractors%sample)
       call take_integer(source, 'attractors.seed', 0, attractors%seed)
       call take_integer(source, 'attractors.max_period', 1, attractors%max_period, highest=longest_period)
+      call take_integer(source, 'attractors.second_look', 0, attractors%second_look, highest=most_starts)
     end associate
   end subroutine read_attractors
 

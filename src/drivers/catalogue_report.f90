@@ -6,11 +6,15 @@ module catalogue_report
   use attractors, only: attractor_t, kind_chaotic, kind_not_known, regime_names
   use basin, only: catalogue_t
   use kinds, only: wp
+  use statistics, only: share_upper_limit
   use text, only: to_text
   implicit none
   private
 
-  public :: attractor_text, not_known_text
+  public :: attractor_text, not_known_text, missed_text
+
+  !> Confidence of the bound on what the sample has missed.
+  real(wp), parameter :: confidence = 0.95_wp
 
 contains
 
@@ -55,5 +59,19 @@ contains
       ' slices, are not known to be periodic, nor do neighbouring motions drift apart: perhaps long transients. A longer '// &
       'run.duration or run.extension (now '//to_text(extension, 3)//') tells'
   end function not_known_text
+
+  !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where
+  !> there is no catalogue. The bound is that of independent starts.
+  function missed_text(catalogues, sample) result(line)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer, intent(in) :: sample
+    character(len=:), allocatable :: line
+    line = ''
+    if (size(catalogues) == 0) return
+    line = 'an attractor that was not found attracts less than '//to_text(100*share_upper_limit(0, sample, confidence), 3)// &
+      ' % of the starts'
+    if (size(catalogues) > 1) line = line//' of its slice'
+    line = line//', with '//to_text(100*confidence, 2)//' % confidence: none of '//to_text(sample)//' sampled starts led to another'
+  end function missed_text
 
 end module catalogue_report

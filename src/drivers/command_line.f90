@@ -39,6 +39,8 @@ module command_line
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
     logical :: force = .false., resume = .false., json = .false., quiet = .false., search_only = .false.
     real(wp) :: time_limit = 0
+    !> Seconds between lines of progress; 0 = as the journal thinks fit.
+    real(wp) :: progress = 0
     integer :: ranks_per_node = 0
     !> `verify`: points rerun, and the seed that chooses them.
     integer :: sample = 200, seed = 1
@@ -189,7 +191,7 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--time-limit', '--ranks-per-node', '--sample', '--seed', '--max-changes')
+          '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -223,6 +225,8 @@ contains
       call read_shard(value, command, error)
     case ('--time-limit')
       call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%time_limit, error)
+    case ('--progress')
+      call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%progress, error)
     case ('--ranks-per-node')
       call read_integer(name, value, 1, command%ranks_per_node, error)
     case ('--sample')
@@ -381,6 +385,7 @@ contains
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &
+      '  --progress S       progress every S seconds (default: in a log after 10 s, then ever less often)'//nl// &
       '  --json             log as JSON lines'//nl// &
       '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'//nl// &
       '  -q, --quiet        errors only'//nl// &

@@ -70,7 +70,7 @@ contains
     else
       call start_team(session%team)
     end if
-    call session%journal%open(session%team%is_root(), command%json, command%quiet)
+    call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     call session%stop_if(error)
     ! A trajectory keeps nothing when it is stopped, so signals end it as usual.

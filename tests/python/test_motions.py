@@ -84,7 +84,8 @@ def test_a_direction_that_was_not_run_is_nan(one_way, way, ran):
 @pytest.mark.parametrize(("way", "text"), [("up", "run-up"), ("down", "run-down")])
 def test_only_the_run_that_was_made_is_drawn(one_way, way, text):
     style = pytest.importorskip("separatrix.style")
-    from separatrix import open_result, sweep
+    from separatrix import open_result
+    from separatrix.figures import sweep
 
     with style.context(), open_result(one_way / f"{way}.h5") as result:
         for figure in sweep.figures(result, "title").values():
@@ -260,7 +261,8 @@ def test_a_pipe_is_not_replaced(separatrix, tmp_path, command):
 
 def test_the_figures_of_a_plane_say_where_its_motions_start(results):
     style = pytest.importorskip("separatrix.style")
-    from separatrix import basin, open_result
+    from separatrix import open_result
+    from separatrix.figures import basin
 
     captions = {}
     for kind in ("map", "stack", "plane"):
