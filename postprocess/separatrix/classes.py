@@ -121,7 +121,15 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
         period = _aperiodic_text(catalogue, mine)
     else:
         period = ("period " if len(periods) == 1 else "periods ") + ", ".join(str(p) for p in periods)
-    return f"attractor {identity}: {' or '.join(regimes)}, {period}"
+    return f"attractor {identity}: {' or '.join(regimes)}, {period}{_rotation_text(catalogue, mine)}"
+
+
+def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return ', -1 turns per period' for a cycle of an angle that goes round; '' where it does not, or not always so."""
+    if "rotation_number" not in catalogue:
+        return ""
+    turns = np.unique(catalogue["rotation_number"].values[mine])
+    return f", {turns[0]:+.4g} turns per drive period" if turns.size == 1 and abs(turns[0]) > 0 else ""
 
 
 def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:

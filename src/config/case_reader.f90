@@ -4,6 +4,7 @@
 !> From a case file (docs/case-file.md) to a case. Every problem of a file is reported at once, a
 !> line each: `FILE:LINE: key 'friction.damping': found ..., allowed ...`.
 module case_reader
+  use angle_units, only: unit_of
   use attractors, only: longest_period
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
@@ -15,6 +16,7 @@ module case_reader
   use kinds, only: wp
   use law_reader, only: read_laws
   use law_table, only: largest_angle
+  use restoring_law, only: position_is_angle
   use refinement, only: largest_block, largest_step, most_probes
   use toml_bindings, only: read_text_file
   implicit none
@@ -74,8 +76,10 @@ contains
     logical :: found
     call enter_table(source, 'start', found)
     associate (start => the_case%start)
-      call take_real(source, 'start.x0', any_number('m'), start%x0)
-      call take_real(source, 'start.v0', any_number('m/s'), start%v0)
+      associate (is_angle => position_is_angle(the_case%laws))
+        call take_real(source, 'start.x0', any_number(unit_of('m', is_angle)), start%x0)
+        call take_real(source, 'start.v0', any_number(unit_of('m/s', is_angle)), start%v0)
+      end associate
       call take_real(source, 'start.crank_angle', between(-largest_angle, largest_angle, 'rad'), start%crank_angle)
     end associate
   end subroutine read_start

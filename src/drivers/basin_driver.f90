@@ -24,6 +24,7 @@ module basin_driver
   use refinement_report, only: add_refinement, report_refinement
   use refined_tile, only: layers_of, pilot_share
   use pair, only: is_pair
+  use restoring_law, only: position_is_angle
   use session, only: describe_file, identity_of, open_session, session_t
   use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
@@ -211,7 +212,8 @@ contains
     call session%journal%line('missed', missed_text(work%catalogues, session%the_case%attractors%sample))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
-      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k)))
+      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k), &
+                                                          position_is_angle(session%the_case%laws)))
     end do
   end subroutine report_catalogue
 

@@ -13,6 +13,7 @@ module info_driver
   use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
   use text, only: interval_text, join, to_text
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -257,7 +258,7 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: table(:, :), entry_kinds(:)
+    real(wp), allocatable :: table(:, :), entry_kinds(:), rotations(:)
     character(len=:), allocatable :: line
     integer :: i, k
     integer(int64) :: kind
@@ -267,7 +268,14 @@ contains
     if (.not. allocated(error)) then
       if (reader%has('/catalogue/kind')) call reader%read_values('/catalogue/kind', entry_kinds, error)
     end if
+    ! Of an angle.
+    if (.not. allocated(error)) then
+      if (reader%has('/catalogue/rotation_number')) call reader%read_values('/catalogue/rotation_number', rotations, error)
+    end if
     if (allocated(error)) return
+    if (allocated(rotations)) then
+      if (size(rotations) /= size(table, 1)) deallocate (rotations)
+    end if
     if (allocated(entry_kinds)) then
       if (size(entry_kinds) /= size(table, 1)) deallocate (entry_kinds)
     end if
@@ -291,6 +299,12 @@ contains
           line = line//to_text(whole(table(i, k)))
         end select
       end do
+      if (allocated(rotations)) then
+        if (json) line = line//', "rotation_number": '
+        if (json .and. ieee_is_nan(rotations(i))) line = line//'null'
+        if (json .and. .not. ieee_is_nan(rotations(i))) line = line//to_text(rotations(i))
+        if (.not. json .and. abs(rotations(i)) > 0) line = line//', rotation_number '//to_text(rotations(i), 4)
+      end if
       if (allocated(entry_kinds)) then
         kind = whole(entry_kinds(i))
         if (kind >= 1 .and. kind <= last_kind) then

@@ -26,7 +26,7 @@ module sweep_chain
   !> Numbers kept of a hold before its samples: regime, reason, period, word, impacts per period, mean
   !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
   !> not a number there.
-  integer, parameter :: hold_numbers = 10, hold_codes = 4
+  integer, parameter :: hold_numbers = 11, hold_codes = 4
   integer, parameter, public :: hold_reason = 2
   !> Most limits that are kept of one chain, and numbers kept of each.
   integer, parameter :: most_limits = 64, limit_numbers = 7
@@ -147,7 +147,7 @@ contains
     real(wp) :: numbers(hold_numbers)
     associate (f => held%features)
       numbers = [real(f%regime, wp), real(held%reason, wp), real(held%settled%period, wp), real(f%word, wp), &
-                 f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max]
+                 f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, f%rotation]
     end associate
   end function numbers_of
 

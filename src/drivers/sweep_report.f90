@@ -12,6 +12,7 @@ module sweep_report
   use law_table, only: effect_family
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int64, type_string
   use pair, only: is_pair
+  use restoring_law, only: position_is_angle
   use session, only: session_t
   use status, only: reason_names, reason_time_over
   use sweep_chain, only: chains_t, hold_reason, limit_t
@@ -48,6 +49,9 @@ contains
     call add('x_max', type_float64, 'm', 'largest position', 8)
     call add('x_min', type_float64, 'm', 'smallest position', 9)
     call add('v_max', type_float64, 'm/s', 'largest velocity towards the upper barrier', 10)
+    if (position_is_angle(session%the_case%laws)) then
+      call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 11)
+    end if
     call schema%add_variable('strobe_x', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
       units='m', long_name='position at crank angle 0', data=reshape(chains%samples(1, :, :, :), &
       [size(chains%samples)/2]))

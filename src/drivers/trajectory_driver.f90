@@ -3,6 +3,7 @@
 
 !> `separatrix trajectory`: one motion, its time history and every event.
 module trajectory_driver
+  use angle_units, only: unit_of
   use attractors, only: attractor_t, features_t, kind_cycle, regime_names
   use case_check, only: require_start
   use case_setup, only: grid_of, output_path, span_of
@@ -21,6 +22,7 @@ module trajectory_driver
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
   use record_writer, only: write_record
+  use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
   use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_settled, reason_time_over
@@ -172,6 +174,10 @@ contains
       call schema%add_attribute('', 'impacts', nint(f%impacts_per_period*span%window/moving%machine%period))
       call schema%add_attribute('', 'impacts_per_period', f%impacts_per_period)
       call schema%add_attribute('', 'mean_impact_speed', f%mean_impact_speed)
+      if (moving%machine%turn > 0) then
+        call schema%add_attribute('', 'turn', moving%machine%turn)
+        call schema%add_attribute('', 'rotation_number', f%rotation)
+      end if
       call schema%add_attribute('', 'regime', trim(regime_names(f%regime)))
       call schema%add_attribute('', 'reason', reason_name(outcome%reason))
     end associate
@@ -298,16 +304,17 @@ contains
     type(outcome_t), intent(in) :: outcome
     type(attractor_t), intent(in) :: cycle
     type(log_t), intent(in) :: log
-    associate (f => outcome%window, journal => session%journal)
+    associate (f => outcome%window, journal => session%journal, is_angle => position_is_angle(session%the_case%laws))
       if (outcome%reason /= reason_time_over) then
         call journal%line('end', 'given up before the end: '//explained(outcome%reason)//'; '//to_text(log%events)// &
           ' events recorded until then')
         return
       end if
       call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
-        ' m, v_max '//to_text(f%v_max, 6)//' m/s, '//to_text(f%impacts_per_period, 5)// &
-        ' impacts per period at '//to_text(f%mean_impact_speed, 6)//' m/s ('// &
-        taken_over(moving, span, cycle)//')', '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
+        ' '//unit_of('m', is_angle)//', v_max '//to_text(f%v_max, 6)//' '//unit_of('m/s', is_angle)//', '// &
+        to_text(f%impacts_per_period, 5)//' impacts per period at '//to_text(f%mean_impact_speed, 6)//' '// &
+        unit_of('m/s', is_angle)//' ('//taken_over(moving, span, cycle)//')', &
+        '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
         to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
       call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, drive period '// &

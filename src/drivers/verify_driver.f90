@@ -4,6 +4,7 @@
 !> `separatrix verify`: checksums, invariants, and a random sample of the points run again: in double precision,
 !> which must give what the file holds, and in quadruple precision, which tells how far it can be trusted.
 module verify_driver
+  use angle_units, only: unit_of
   use attractors, only: regime_names
   use axis, only: axis_t
   use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
@@ -25,6 +26,7 @@ module verify_driver
   use random, only: uniform
   use reference, only: run_reference
   use refinement, only: origin_contradicted
+  use restoring_law, only: position_is_angle
   use second_look, only: recall_second_look
   use serial_team, only: serial_team_t
   use span_check, only: check_periods
@@ -50,6 +52,8 @@ module verify_driver
     !> Every point was run again.
     logical :: whole = .false.
     real(wp) :: x_deviation = 0, v_deviation = 0
+    !> The positions are angles.
+    logical :: is_angle = .false.
     character(len=:), allocatable :: first_difference
   end type audit_t
 
@@ -80,6 +84,7 @@ contains
                                                     the_case, error)
     if (.not. allocated(error)) call check_invariants(reader, kind, points, error)
     if (.not. allocated(error)) then
+      audit%is_angle = position_is_angle(the_case%laws)
       select case (kind)
       case ('basin')
         call audit_map(reader, journal, the_case, the_case%axes, '', command%sample, command%seed, audit, error)
@@ -406,7 +411,8 @@ contains
       trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
-      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s'
+      to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
+      unit_of('m/s', audit%is_angle)
     if (.not. audit%whole) write (output_unit, '(a)') &
       '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &
       ' % of the labels would change'

@@ -6,6 +6,7 @@
 !> other periods than that of the cycle it ends on.
 module settling
   use attractors, only: features_t, most_coordinates, regime_impact, regime_non_impact
+  use circle, only: point_near
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
@@ -135,7 +136,9 @@ contains
     misses = 0
     do p = 1, last/2
       do i = min(last/2, last - 2*p + 1), last - p
-        misses(p) = max(misses(p), norm2((points(:n, i + p) - points(:n, i))/sizes(:n)))
+        associate (later => point_near(points(:n, i + p), points(:n, i), moving%machine%turn))
+          misses(p) = max(misses(p), norm2((later - points(:n, i))/sizes(:n)))
+        end associate
       end do
     end do
   end function misses_of

@@ -93,6 +93,7 @@ contains
     features%x_max = none
     features%x_min = none
     features%v_max = none
+    features%rotation = none
   end function no_features
 
 end module sweep

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes module `assertions`: pFUnit's assertions for the kinds and ranks, up to 2, that it takes and no others.
+"""Writes module `assertions`: pFUnit's assertions for the kinds and ranks (up to 2) that it takes.
 
 write_assertions.py OUTPUT.f90
 """

@@ -189,7 +189,11 @@ def start_pieces(result: xr.Dataset) -> list[str]:
     start = resolved_case(result).get("start")
     if not isinstance(start, dict):
         return []
-    pieces = _values(start, _START, "", set(result.dims))
+    symbols = _START
+    restoring = resolved_case(result).get("restoring")
+    if isinstance(restoring, dict) and restoring.get("law") == "pendulum":
+        symbols = {key: (symbol, unit.replace("m", "rad")) for key, (symbol, unit) in _START.items()}
+    pieces = _values(start, symbols, "", set(result.dims))
     if start.get("crank_angle") and "crank_angle" not in result.dims:
         pieces += _values(start, {"crank_angle": (r"$\varphi_0$", "rad")}, "", set())
     return [", ".join(pieces)] if pieces else []

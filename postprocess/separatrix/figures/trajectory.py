@@ -15,7 +15,7 @@ from separatrix import style
 from separatrix.figures import contact, energy, pair
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
 from separatrix.figures.look import DEFAULT, Look
-from separatrix.labels import axis_label, flag_text, plain
+from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
 
@@ -98,6 +98,8 @@ def phase_portrait(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figu
     if not np.ptp(result["x"].values[result["time"].values >= start]) > 0:
         start, window_text = float(result["time"].values[0]), "from the start to rest"
     position, velocity, jumps = steady_path(result, start)
+    if "turn" in result.attrs:
+        position, velocity = on_circle(position, velocity, float(result.attrs["turn"]))
     ax.plot(position, velocity, color=style.MOTION, linewidth=0.8)
     for x, before, after in jumps[-_MOST_MARKERS:]:
         ax.plot([x, x], [before, after], color=style.IMPACT, linewidth=0.8)
@@ -132,6 +134,13 @@ def steady_path(result: xr.Dataset, start: float) -> tuple[np.ndarray, np.ndarra
     path_x = np.insert(position[steady], slots, np.stack([event_x, gap, event_x], axis=1).ravel())
     path_v = np.insert(velocity[steady], slots, np.stack([before, gap, after], axis=1).ravel())
     return path_x, path_v, list(zip(event_x, before, after, strict=True))
+
+
+def on_circle(position: np.ndarray, velocity: np.ndarray, turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return a path of an angle within half a turn of zero, broken by a NaN where it leaves one side."""
+    turns = np.floor(position / turn + 0.5)
+    seams = np.flatnonzero(np.diff(turns) != 0) + 1
+    return np.insert(position - turn * turns, seams, np.nan), np.insert(velocity, seams, np.nan)
 
 
 def _at_instants(time: np.ndarray, instants: np.ndarray) -> np.ndarray:
@@ -197,12 +206,14 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
     attributes = result.attrs
     pieces = caption_pieces(result, look, describe_case(result))
     pieces += [_start_text(result), f"steady motion: {_regime_text(attributes['regime'])}"]
-    pieces.append(f"amplitude {attributes['amplitude']:.4g} m")
-    pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} m/s")
+    pieces.append(f"amplitude {attributes['amplitude']:.4g} {unit(result['x'])}")
+    pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} {unit(result['v'])}")
+    if attributes.get("rotation_number"):
+        pieces.append(f"{attributes['rotation_number']:.4g} turns per drive period")
     if attributes["impacts_per_period"] > 0:
         pieces.append(
             f"impacts per drive period {attributes['impacts_per_period']:.4g}, their mean speed"
-            f" {attributes['mean_impact_speed']:.4g} m/s"
+            f" {attributes['mean_impact_speed']:.4g} {unit(result['v'])}"
         )
     return [*pieces, plain(version_text(result))]
 
@@ -211,7 +222,7 @@ def _start_text(result: xr.Dataset) -> str:
     # the first sample is the start but for rounding
     start = resolved_case(result).get("start", {})
     x, v = (float(start.get(f"{name}0", result[name].values[0])) for name in ("x", "v"))
-    return f"$x_0$ = {x:g} m, $v_0$ = {v:g} m/s"
+    return f"$x_0$ = {x:g} {unit(result['x'])}, $v_0$ = {v:g} {unit(result['v'])}"
 
 
 def _regime_text(regime: object) -> str:
