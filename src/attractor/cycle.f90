@@ -5,6 +5,7 @@
 !> neighbourhood that provably (by sampling its rings) contracts into it with the same events.
 module cycle
   use attractors, only: attractor_t, longest_period, make_points, metric_numbers, most_coordinates, squared_distance
+  use circle, only: point_near
   use constants, only: two_pi
   use elementary, only: sine_cosine
   use free_motion, only: free_multipliers, is_linear
@@ -69,6 +70,7 @@ contains
     call map_point(moving, guess, period, image, tally, found)
     if (.not. found) return
     attractor%coordinates = n
+    attractor%turn = moving%machine%turn
     attractor%period = period
     attractor%scale = scale_of(moving, tally)
     point = guess
@@ -86,6 +88,8 @@ contains
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
     call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true.)
+    ! Rounding may put the point and its image on different sides of the seam.
+    if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
     attractor%features = features_over(moving, tally, real(attractor%period, wp))
     if (attractor%period > 1) attractor%features%word = &
       cycle_word(moving, strobe_at(moving, attractor%points(:n, 1)), attractor%period)
@@ -128,7 +132,7 @@ contains
     do i = 1, most_newton
       call map_point(moving, point, period, image, tally, converged)
       if (.not. converged) return
-      miss = (image - point)/scale
+      miss = (point_near(image, point, moving%machine%turn) - point)/scale
       if (norm2(miss) <= 64*epsilon(1.0_wp)) return
       if (i > 4 .and. norm2(miss) < 1e-11_wp .and. norm2(miss) >= best) return
       best = min(best, norm2(miss))
@@ -201,6 +205,7 @@ contains
       if (.not. ok) return
       call map_point(moving, behind, period, image_behind, tally, ok)
       if (.not. ok) return
+      image_ahead = point_near(image_ahead, image_behind, moving%machine%turn)
       jacobian(:, k) = (image_ahead - image_behind)/scale/((ahead(k) - behind(k))/scale(k))
     end do
   end subroutine differentiate
@@ -216,11 +221,11 @@ contains
     type(tally_t) :: tally
     integer :: i, n
     n = size(point)
-    cycle_points(:, 1) = point
+    cycle_points(:, 1) = point_near(point, 0*point, attractor%turn)
     do i = 2, attractor%period
       call map_point(moving, cycle_points(:, i - 1), 1, image, tally, ok)
       if (.not. ok) return
-      if (norm2((image - point)/attractor%scale(:n)) < 1e-8_wp) then
+      if (norm2((point_near(image, point, attractor%turn) - point)/attractor%scale(:n)) < 1e-8_wp) then
         attractor%period = i - 1
         exit
       end if

@@ -7,7 +7,7 @@ module trajectory
   use attractors, only: attractor_t, features_t, find_box, find_capture
   use kinds, only: int64, wp
   use motion, only: advance, motion_t
-  use motion_state, only: log_t, reset_tally, tally_t
+  use motion_state, only: log_t, place_of, reset_tally, tally_t
   use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, rest_lasts, section_point, &
     start_strobe, strobe_t
   use status, only: reason_settled, reason_time_over
@@ -251,7 +251,7 @@ contains
   pure subroutine note_state(course, outcome)
     type(course_t), intent(in) :: course
     type(outcome_t), intent(inout) :: outcome
-    outcome%x = course%state%x
+    outcome%x = place_of(course%state)
     outcome%v = course%state%v
     outcome%impacts = course%impacts + course%tally%impacts
     outcome%last_impact_speed = latest_impact_speed(course)

@@ -4,17 +4,19 @@
 !> From a case file (docs/case-file.md) to a case. Every problem of a file is reported at once, a
 !> line each: `FILE:LINE: key 'friction.damping': found ..., allowed ...`.
 module case_reader
+  use angle_units, only: unit_of
   use attractors, only: longest_period
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
   use case_echo, only: echo_case
-  use case_source, only: case_source_t, enter_table, has_problems, open_source, problems_of, report_unknown
+  use case_source, only: case_source_t, enter_table, open_source, problems_of, report_unknown
   use case_type, only: case_t
   use case_values, only: any_number, at_least, between, more_than, take_choice, take_integer, take_real, take_text
   use errors, only: error_t
   use kinds, only: wp
   use law_reader, only: read_laws
   use law_table, only: largest_angle
+  use restoring_law, only: position_is_angle
   use refinement, only: largest_block, largest_step, most_probes
   use toml_bindings, only: read_text_file
   implicit none
@@ -28,26 +30,30 @@ module case_reader
 contains
 
   !> Reads the file `path`, puts the overrides ('key.path=value' in TOML syntax, blank-padded) on top
-  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it.
-  subroutine load_case(path, overrides, the_case, error)
+  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it. With `wants_sweep` false a table [sweep] that
+  !> lacks what a sweep needs is left out.
+  subroutine load_case(path, overrides, the_case, error, wants_sweep)
     character(len=*), intent(in) :: path, overrides(:)
     type(case_t), intent(out) :: the_case
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: wants_sweep
     character(len=:), allocatable :: text
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call load_case_text(text, path, overrides, the_case, error)
+    call load_case_text(text, path, overrides, the_case, error, wants_sweep)
   end subroutine load_case
 
   !> The same for a text that is already in memory; `name` stands for the file in messages.
-  subroutine load_case_text(text, name, overrides, the_case, error)
+  subroutine load_case_text(text, name, overrides, the_case, error, wants_sweep)
     character(len=*), intent(in) :: text, name, overrides(:)
     type(case_t), intent(out) :: the_case
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: wants_sweep
     type(case_source_t) :: source
     the_case%path = name
     the_case%raw_text = text
     the_case%title = ''
+    if (present(wants_sweep)) the_case%sweep%wanted = wants_sweep
     call open_source(source, text, name, overrides, error)
     if (allocated(error)) return
     call take_text(source, 'title', the_case%title)
@@ -62,7 +68,7 @@ contains
     call read_trajectory(source, the_case)
     call read_record(source, the_case)
     call report_unknown(source)
-    if (.not. has_problems(source)) call check_case(source, the_case)
+    call check_case(source, the_case)
     call problems_of(source, error)
     if (allocated(error)) return
     the_case%resolved_text = echo_case(the_case)
@@ -74,8 +80,10 @@ contains
     logical :: found
     call enter_table(source, 'start', found)
     associate (start => the_case%start)
-      call take_real(source, 'start.x0', any_number('m'), start%x0)
-      call take_real(source, 'start.v0', any_number('m/s'), start%v0)
+      associate (is_angle => position_is_angle(the_case%laws))
+        call take_real(source, 'start.x0', any_number(unit_of('m', is_angle)), start%x0)
+        call take_real(source, 'start.v0', any_number(unit_of('m/s', is_angle)), start%v0)
+      end associate
       call take_real(source, 'start.crank_angle', between(-largest_angle, largest_angle, 'rad'), start%crank_angle)
     end associate
   end subroutine read_start

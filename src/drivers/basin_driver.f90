@@ -24,6 +24,7 @@ module basin_driver
   use refinement_report, only: add_refinement, report_refinement
   use refined_tile, only: layers_of, pilot_share
   use pair, only: is_pair
+  use restoring_law, only: position_is_angle
   use session, only: describe_file, identity_of, open_session, session_t
   use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
@@ -66,7 +67,7 @@ contains
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
     end if
-    path = output_path(command%output, command%path)
+    path = output_path(command%output, command%path, command%name)
     if (command%shard > 0) path = shard_path(path, command%shard, command%shard_count)
     if (.not. command%dry_run) call session%begin(path, tiled=.true.)
     if (command%dry_run .and. work%grid%slices > most_dry_slices) then
@@ -211,7 +212,8 @@ contains
     call session%journal%line('missed', missed_text(work%catalogues, session%the_case%attractors%sample))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
-      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k)))
+      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k), &
+                                                          position_is_angle(session%the_case%laws)))
     end do
   end subroutine report_catalogue
 

@@ -3,7 +3,8 @@
 
 !> What is said of the attractors of a map.
 module catalogue_report
-  use attractors, only: attractor_t, kind_chaotic, kind_not_known, regime_names
+  use angle_units, only: unit_of
+  use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_not_known, regime_names
   use basin, only: catalogue_t
   use kinds, only: wp
   use statistics, only: share_upper_limit
@@ -19,8 +20,9 @@ module catalogue_report
 contains
 
   !> An attractor in a line.
-  function attractor_text(attractor) result(line)
+  function attractor_text(attractor, is_angle) result(line)
     type(attractor_t), intent(in) :: attractor
+    logical, intent(in) :: is_angle
     character(len=:), allocatable :: line
     line = '  '//to_text(attractor%id)//': '//trim(regime_names(attractor%features%regime))
     select case (attractor%kind)
@@ -31,8 +33,11 @@ contains
     case default
       line = line//', period '//to_text(attractor%period)
     end select
-    line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' m, '// &
+    line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
            to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
+    if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) then
+      line = line//', rotation number '//to_text(attractor%features%rotation, 4)
+    end if
     if (attractor%kind == kind_chaotic .or. attractor%kind == kind_not_known) then
       line = line//', neighbours drift apart by '//to_text(attractor%multiplier, 4)//' a period'
     else

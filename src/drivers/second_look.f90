@@ -21,6 +21,7 @@ module second_look
   use match, only: carry_labels, number_new
   use motion, only: motion_t
   use random, only: uniform
+  use restoring_law, only: position_is_angle
   use session, only: session_t
   use status, only: reason_time_over
   use stop_check, only: check_stop
@@ -145,7 +146,8 @@ contains
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
       associate (attractor => work%catalogues(1)%attractors(k))
-        if (attractor%id > highest) call session%journal%line('attractor', attractor_text(attractor))
+        if (attractor%id > highest) call session%journal%line('attractor', attractor_text(attractor, &
+          position_is_angle(session%the_case%laws)))
       end associate
     end do
   end subroutine look_again

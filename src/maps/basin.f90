@@ -21,7 +21,7 @@ module basin
   implicit none
   private
 
-  public :: open_slice, points_at_a_time, search_starts, label_slices, basin_points, outcome_values
+  public :: open_slice, open_journey, points_at_a_time, search_starts, label_slices, basin_points, outcome_values
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13

@@ -169,7 +169,7 @@ def test_a_map_agrees_with_points_where_no_axis_is_a_start(separatrix, tmp_path,
     options += [f"friction.kinetic_coefficient={float(point['friction_kinetic_coefficient'])!r}"]
     options = [word for option in [*options, "run.duration=120"] for word in ("--set", option)]
     succeed(separatrix, "trajectory", "case.toml", *options, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert float(point["amplitude"]) == pytest.approx(file.attrs["amplitude"], rel=2e-6)
         assert float(point["v_max"]) == pytest.approx(file.attrs["v_max"], rel=2e-6)
 
@@ -213,13 +213,20 @@ def test_made_up_files_have_the_codes_of_real_ones(results):
 def test_the_sweep_has_the_limits_it_prints(separatrix, tmp_path, results):
     outcome = succeed(separatrix, *KINDS["sweep"], "-o", tmp_path / "o.h5", folder=results["map"].parent)
     with h5py.File(results["sweep"]) as file:
-        limits = list(zip(file["limits/name"], file["limits/lower"], file["limits/upper"], strict=True))
+        columns = ("name", "observed_lower", "observed_upper", "settled", "lower", "upper")
+        limits = list(zip(*(file[f"limits/{column}"] for column in columns), strict=True))
         assert file.attrs["barrier_upper"] == 1.1
         assert "barrier_lower" not in file.attrs
         ratio, impacts = file["drive_ratio"][()], file["impacts_per_period"][()]
     assert len(limits) == outcome.out.count("run up") + outcome.out.count("run down")
-    for name, lower, upper in limits:
+    for name, lower, upper, settled, *bracket in limits:
         assert 0 < upper - lower <= 1e-3
+        if settled.decode().strip() == "bracketed":
+            assert 0 < bracket[1] - bracket[0] <= 1e-3
+        else:
+            # on the way down the motions with impacts are chaotic before they stop
+            assert name.decode().strip() == "impacts_stop_down"
+            assert np.isnan(bracket).all()
         direction = 0 if name.decode().endswith("up") else 1
         below = impacts[direction][ratio < lower][-1] > 0
         above = impacts[direction][ratio > upper][0] > 0
@@ -290,14 +297,14 @@ def test_verify_names_a_dataset_with_a_damaged_chunk(separatrix, tmp_path):
     write_case(tmp_path)
     shape = ["--set", "axis[1].count=300", "--set", "axis[2].count=301"]
     succeed(separatrix, "basin", "case.toml", *shape, folder=tmp_path)
-    path = tmp_path / "case.h5"
+    path = tmp_path / "case.basin.h5"
     with h5py.File(path) as file:
         assert file["x_min"].compression == "gzip"
         chunk = file["x_min"].id.get_chunk_info(0)
     content = bytearray(path.read_bytes())
     content[chunk.byte_offset + chunk.size // 2] ^= 1
     path.write_bytes(content)
-    outcome = run(separatrix, "verify", "case.h5", folder=tmp_path)
+    outcome = run(separatrix, "verify", "case.basin.h5", folder=tmp_path)
     assert (outcome.code, outcome.out) == (74, "")
     assert "/x_min" in outcome.err
 

@@ -3,6 +3,7 @@
 """Motions, sweeps and labels of real runs: what the case asks for is what the files hold."""
 
 import os
+import tomllib
 from pathlib import Path
 
 import h5py
@@ -33,7 +34,7 @@ def test_the_drive_begins_at_the_crank_angle_of_the_start(separatrix, tmp_path, 
     write_case(tmp_path)
     start = options(f'start.crank_angle="{angle} deg"')
     succeed(separatrix, "trajectory", "case.toml", *start, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         time, drive = file["time"][()], file["drive"][()]
         period = file.attrs["drive_period"]
     expected = foot(np.radians(angle) + 2 * np.pi * time / period)
@@ -46,13 +47,13 @@ def test_a_body_that_never_moves_has_no_events(separatrix, tmp_path):
     write_case(tmp_path)
     held = options("friction.kinetic_coefficient=50")
     succeed(separatrix, "trajectory", "case.toml", *held, "--csv", "events.csv", folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         for name in ("event_kind", "event_time", "event_x", "event_v_before", "event_v_after"):
             assert file[name].shape == (0,)
         assert (file["x"][()] == 0.4).all()
         assert (file["v"][()] == 0.0).all()
     assert (tmp_path / "events.csv").read_text().count("\n") == 1
-    succeed(separatrix, "verify", "case.h5", folder=tmp_path)
+    succeed(separatrix, "verify", "case.trajectory.h5", folder=tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +84,8 @@ def test_a_direction_that_was_not_run_is_nan(one_way, way, ran):
 @pytest.mark.parametrize(("way", "text"), [("up", "run-up"), ("down", "run-down")])
 def test_only_the_run_that_was_made_is_drawn(one_way, way, text):
     style = pytest.importorskip("separatrix.style")
-    from separatrix import open_result, sweep
+    from separatrix import open_result
+    from separatrix.figures import sweep
 
     with style.context(), open_result(one_way / f"{way}.h5") as result:
         for figure in sweep.figures(result, "title").values():
@@ -109,12 +111,61 @@ def test_limits_have_the_unit_of_the_swept_parameter(separatrix, tmp_path, one_w
     swept = "sweep={parameter='contact.upper', from=0.7, to=1.5, count=5, starts=[0, 0]}"
     succeed(separatrix, "sweep", "case.toml", *options(swept), folder=tmp_path)
     for path, name, unit in (
-        (tmp_path / "case.h5", "contact_upper", "m"),
+        (tmp_path / "case.sweep.h5", "contact_upper", "m"),
         (one_way / "both.h5", "drive_ratio", "1"),
     ):
         with h5py.File(path) as file:
-            for item in (name, "limits/lower", "limits/upper"):
+            for item in (
+                name,
+                "limits/lower",
+                "limits/upper",
+                "limits/observed_lower",
+                "limits/observed_upper",
+            ):
                 assert file[item].attrs["units"] == unit, item
+
+
+def grazing_ratios(case):
+    """Drive ratios at which the motion of a linear case without impact just reaches the wall."""
+    drive, stiffness = case["drive"], float(case["restoring"]["stiffness"].split()[0])
+    damping = float(case["friction"]["damping"].split()[0])
+    number = np.arange(1, 1 + len(drive["cosine"]))
+    angle = np.radians(float(drive["angle"].split()[0]))
+    series = (np.array(drive["cosine"]) - 1j * np.array(drive["sine"])) * np.exp(1j * number * angle)
+    phase = np.exp(1j * number * np.linspace(0, 2 * np.pi, 20001)[:, np.newaxis])
+
+    def gap(ratio):
+        omega = number * ratio * np.sqrt(stiffness)
+        answer = series * stiffness / (stiffness - omega**2 + 1j * damping * omega)
+        return 0.4 + 0.31055 + (phase @ answer).real.max() - 1.1
+
+    roots = []
+    for low, high in ((0.8, 0.95), (1.05, 1.2)):
+        rises = gap(low) < 0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if (gap(middle) < 0) == rises else (low, middle)
+        roots.append(low)
+    return roots
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-7])
+def test_limits_are_where_the_settled_motion_touches_the_wall(separatrix, source_dir, tmp_path, tolerance):
+    path = source_dir / "examples" / "sweep_viscous.toml"
+    few = options("sweep.starts=[0, 0]", f"sweep.limit_tolerance={tolerance}")
+    said = succeed(separatrix, "sweep", path, *few, "-o", "out.h5", folder=tmp_path).out
+    up, down = grazing_ratios(tomllib.loads(path.read_text()))
+    assert (up, down) == pytest.approx((0.870901, 1.114313), abs=1e-6)
+    with h5py.File(tmp_path / "out.h5") as file:
+        rows = zip(file["limits/name"], file["limits/lower"], file["limits/upper"], strict=True)
+        found = {name.decode().strip(): (lower, upper) for name, lower, upper in rows}
+    for name, place in (("impacts_start_up", up), ("impacts_start_down", down)):
+        lower, upper = found[name]
+        assert lower <= place <= upper
+        assert upper - lower <= 1.01 * tolerance
+    if tolerance < 1e-6:
+        # as many digits as they are worth
+        assert "0.8709006" in said
 
 
 @pytest.mark.parametrize("command", ["basin", "sweep"])
@@ -140,11 +191,11 @@ def test_another_list_of_the_same_length_cannot_go_on(separatrix, tmp_path):
     write_case(tmp_path)
     command = write_lists(tmp_path)
     assert run(separatrix, *command, "--time-limit", "0.001", folder=tmp_path).code == 75
-    before = (tmp_path / "case.h5.part").read_bytes()
+    before = (tmp_path / "case.points.h5.part").read_bytes()
     other = [*command[:-1], "b.csv", "--resume"]
     outcome = run(separatrix, *other, folder=tmp_path)
     assert (outcome.code, len(outcome.messages)) == (76, 1)
-    assert (tmp_path / "case.h5.part").read_bytes() == before
+    assert (tmp_path / "case.points.h5.part").read_bytes() == before
     succeed(separatrix, *command, "--resume", folder=tmp_path)
 
 
@@ -154,7 +205,7 @@ def test_a_table_that_exists_is_not_replaced_without_force_not_even_by_a_resumed
     assert run(separatrix, *command, "--time-limit", "0.001", folder=tmp_path).code == 75
     (tmp_path / "out.csv").write_text("something dear")
     for more in ([], ["--resume"]):
-        outcome = run(separatrix, *command, *more, "-o", "case.h5", folder=tmp_path)
+        outcome = run(separatrix, *command, *more, "-o", "case.points.h5", folder=tmp_path)
         assert outcome.code == 73
         assert (tmp_path / "out.csv").read_text() == "something dear"
     succeed(separatrix, *command, "--force", folder=tmp_path)
@@ -172,7 +223,7 @@ TWO_PARAMETERS = (
 def test_a_branch_has_one_label_over_two_parameters(separatrix, tmp_path):
     write_case(tmp_path)
     succeed(separatrix, "basin", "case.toml", *options(TWO_PARAMETERS), folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.basin.h5") as file:
         catalogue = {name: file[f"catalogue/{name}"][()] for name in ("slice", "attractor", "regime")}
         period = file["catalogue/period"][()]
     assert set(catalogue["slice"]) == set(range(9))
@@ -189,7 +240,7 @@ def test_every_labelled_point_has_the_regime_of_its_attractor(separatrix, tmp_pa
     write_case(tmp_path)
     elastic = options(*COARSE, 'friction={law="none"}', "contact.restitution=1.0", "run.duration=20")
     succeed(separatrix, "basin", "case.toml", *elastic, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.basin.h5") as file:
         label, regime = file["attractor"][()], file["regime"][()]
         of_label = dict(zip(file["catalogue/attractor"][()], file["catalogue/regime"][()], strict=True))
     for place in zip(*np.nonzero(label), strict=True):
@@ -210,7 +261,8 @@ def test_a_pipe_is_not_replaced(separatrix, tmp_path, command):
 
 def test_the_figures_of_a_plane_say_where_its_motions_start(results):
     style = pytest.importorskip("separatrix.style")
-    from separatrix import basin, open_result
+    from separatrix import open_result
+    from separatrix.figures import basin
 
     captions = {}
     for kind in ("map", "stack", "plane"):
