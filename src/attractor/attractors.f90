@@ -26,7 +26,7 @@ module attractors
   character(len=*), parameter, public :: kind_names(last_kind) = [character(len=9) :: 'cycle', 'rest', 'chaotic', 'not_known']
 
   !> Longest period in drive periods that is looked for near a return of the motion, and of one that returns to the bit.
-  integer, parameter, public :: longest_period = 64, longest_exact_period = 4096
+  integer, parameter, public :: longest_period = 64, longest_exact_period = 1024
 
   !> Most coordinates of a point on the section: x and v of one body, up to five of two.
   integer, parameter, public :: most_coordinates = 5
