@@ -331,5 +331,17 @@ def test_damaged_files_are_a_message(results: dict[str, Path], tmp_path: Path) -
                 assert "\n" not in str(error)
         desk.close()
     assert refused >= 4
+    whole_map, _ = synthetic(tmp_path, results, (700, 531))
+    with h5py.File(whole_map) as file:
+        offset = file["attractor"].id.get_chunk_info_by_coord((256, 256)).byte_offset
+    with whole_map.open("r+b") as handle:
+        handle.seek(offset)
+        handle.write(b"\0" * 100)
+    desk = Desk([whole_map])
+    texts = {key: str(value) for key, value in GOOD["tile"].items()}
+    assert unpack(desk.answer("tile", texts))[1]["first"].shape == (256, 256)
+    for change in ({"row": "1", "column": "1"}, {"level": "2"}):
+        with pytest.raises(SeparatrixError, match="cannot be read"):
+            desk.answer("tile", texts | change)
     with pytest.raises(SeparatrixError, match="no such file"):
         Desk([tmp_path / "nothing.h5"])

@@ -33,7 +33,7 @@ def _serve(options: argparse.Namespace) -> int:
     from separatrix.view.protocol import Desk
     from separatrix.view.server import Server, UnixServer
 
-    if options.keep is not None and not options.keep.is_dir():
+    if not options.keep.is_dir():
         raise SeparatrixError(f"--keep: {options.keep} is no folder", USAGE)
     desk = Desk(options.files, options.keep)
     try:
@@ -81,7 +81,7 @@ def _parser() -> Parser:
     )
     parser.add_argument("--no-browser", dest="browser", action="store_false", help="only print the address")
     parser.add_argument(
-        "--keep", type=Path, metavar="FOLDER", help="where views may be kept; default: nowhere"
+        "--keep", type=Path, default=Path(), metavar="FOLDER", help="where views are kept; default: here"
     )
     parser.add_argument(
         "--idle", type=float, default=0.0, metavar="MINUTES", help="end after so long without a request"

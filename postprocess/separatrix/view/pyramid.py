@@ -8,7 +8,10 @@ cell of a variable of classes has its two commonest classes and their shares; of
 the numbers in it, of the grazing margin the smallest.
 """
 
+import os
 import threading
+import zlib
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -19,7 +22,7 @@ __all__ = ["TILE", "Plane"]
 TILE = 256
 _BLOCK_LEVEL = 8  # a block is one tile of points, one cell of this level
 _MOST_CELLS = 16_000_000  # of the finest level in memory
-_FIRST_BLOCKS = 400  # of the first pass
+_FIRST_BLOCKS = 150  # of the first pass
 _SMALL = 4_000_000  # points of a plane that is made before its first tile
 _MOST_CLASSES = 65534
 _COUNTED = 24  # classes told apart in a block
@@ -37,7 +40,7 @@ class Plane:
         self.data = source.dataset(variable)
         self.shape = (source.shape[up], source.shape[across])
         self.words: dict[int, int] | None = {} if self.data.dtype.itemsize == 8 and self.classes else None
-        self.top = _BLOCK_LEVEL
+        self.top = 0
         while max(self.shape) >> self.top > TILE:
             self.top += 1
         self.first = 1
@@ -87,16 +90,33 @@ class Plane:
 
     def read(self, rows: slice, columns: slice) -> np.ndarray:
         """Return values of the plane, class numbers where it has classes."""
-        index = list(self.at)
-        index[self.up], index[self.across] = rows, columns
-        values = self.data[tuple(index)]
+        values = self._chunk(rows, columns)
+        if values is None:
+            index = list(self.at)
+            index[self.up], index[self.across] = rows, columns
+            values = self.data[tuple(index)]
         if self.across < self.up:
             values = values.T
         if self.words is not None:
             return self._numbers(values)
         if self.classes:
-            return np.clip(values, 0, _MOST_CLASSES).astype(np.int32)
+            return np.clip(values, 0, _MOST_CLASSES).astype(np.int32, copy=False)
         return values.astype(np.float32, copy=False)
+
+    def _chunk(self, rows: slice, columns: slice) -> np.ndarray | None:
+        """Return values that are one chunk of the file, unpacked so that several threads can; else None."""
+        data, place = self.data, (rows.start, columns.start)
+        if self.across < self.up:
+            place = place[::-1]
+        whole = rows.stop - rows.start == columns.stop - columns.start == TILE
+        whole = whole and rows.start % TILE == columns.start % TILE == 0 and data.chunks == (TILE, TILE)
+        if not whole or data.compression != "gzip" or data.shuffle or data.fletcher32:
+            return None
+        mask, packed = data.id.read_direct_chunk(place)
+        try:
+            return None if mask else np.frombuffer(zlib.decompress(packed), data.dtype).reshape(TILE, TILE)
+        except zlib.error as error:
+            raise OSError(f"a chunk is damaged: {error}") from error
 
     def class_names(self) -> dict[int, str]:
         """Return the names of classes that are not plain numbers."""
@@ -134,23 +154,28 @@ class Plane:
             stride *= 2
         before = 0
         try:
-            while stride and not self._ended:
-                for i in range(0, counts[0], stride):
-                    for j in range(0, counts[1], stride):
-                        if before and i % before == 0 and j % before == 0:
-                            continue
-                        if self._ended:
-                            return
-                        self._fill(i, j, stride)
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                while stride and not self._ended:
+                    places = [
+                        (i, j, stride)
+                        for i in range(0, counts[0], stride)
+                        for j in range(0, counts[1], stride)
+                        if not (before and i % before == 0 and j % before == 0)
+                    ]
+                    for _ in pool.map(self._fill, places):
                         self.done_blocks += 1
-                self._seen.set()
-                before, stride = stride, stride // 2
+                    self._seen.set()
+                    before, stride = stride, stride // 2
         except Exception as error:
             self.error = error
         finally:
             self._seen.set()
 
-    def _fill(self, i: int, j: int, stride: int) -> None:
+    def _fill(self, place: tuple[int, int, int]) -> None:
+        """Fill the cells of a block, and until they are known those of its neighbours up to a stride."""
+        if self._ended:
+            return
+        i, j, stride = place
         rows = slice(i * TILE, min((i + 1) * TILE, self.shape[0]))
         columns = slice(j * TILE, min((j + 1) * TILE, self.shape[1]))
         made = self._reduce(self.read(rows, columns), _BLOCK_LEVEL)
@@ -180,10 +205,14 @@ class Plane:
                 made[level]["first"][:] = lowest
                 made[level]["share"][:] = 255
             return made
-        found, sizes = np.unique(values, return_counts=True)
-        found = found[np.argsort(-sizes, kind="stable")][:_COUNTED]
-        counts = np.stack([_sums(values == one, begin) for one in found])
-        total = _sums(np.ones(values.shape, bool), begin)
+        sizes = np.bincount(values.ravel("K") - lowest)
+        found = np.argsort(-sizes, kind="stable")[: min(_COUNTED, np.count_nonzero(sizes))] + lowest
+        total = _sizes(values.shape, begin)
+        if len(found) == 2:
+            one = _sums(values == found[0], begin)
+            counts = np.stack([one, total - one])
+        else:
+            counts = np.stack([_sums(values == one, begin) for one in found])
         for level in range(begin, last + 1):
             if level > begin:
                 counts, total = _halved(counts), _halved(total)
@@ -264,6 +293,11 @@ def _sums(values: np.ndarray, level: int) -> np.ndarray:
         edges = np.arange(0, values.shape[axis], 1 << level)
         values = np.add.reduceat(values, edges, axis, dtype=kind)
     return values
+
+
+def _sizes(shape: tuple[int, int], level: int) -> np.ndarray:
+    """Return the numbers of points in cells."""
+    return np.outer(*(np.minimum(1 << level, n - np.arange(0, n, 1 << level)) for n in shape))
 
 
 def _halved(values: np.ndarray) -> np.ndarray:

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // The viewer: files, controls, the map and what belongs to it.
+import { Address, restored } from "./address.js";
 import { fill, h, number, quantity, save, words } from "./dom.js";
-import { attractorTable, classLegend, describeAttractor, scaleLegend } from "./legend.js";
+import { attractorTable, classLegend, describeAttractor, scaleLegend, wordClass } from "./legend.js";
 import { Inspector } from "./inspector.js";
 import { LiveLayer } from "./live.js";
 import { marksOf } from "./marks.js";
@@ -36,6 +37,7 @@ class Viewer {
     this.with = {};
     this.inspector = new Inspector(this);
     this.starter = new Starter(this);
+    this.address = new Address(this);
   }
 
   fail(error) {
@@ -51,24 +53,8 @@ class Viewer {
     this.panel = new MotionPanel(this.described, this.transport.live ? (what) => this.starter.download(what) : null);
     this.build();
     for (const [index, file] of files.entries()) if (file.kind !== "basin") await this.addSeries(file, index);
-    if (this.maps.length) this.openMap(this.restored());
+    if (this.maps.length) this.openMap(restored());
     for (const sweep of this.sweeps || []) sweep.mark(this.valueOf(sweep.key));
-  }
-
-  /** What the address says about the view. */
-  restored() {
-    const known = new URLSearchParams(location.hash.slice(1));
-    return { file: Number(known.get("file")) || 0, variable: known.get("variable"), at: known.get("at"), view: known.get("view") };
-  }
-
-  remember() {
-    if (!this.transport.live || this.transport.model || !this.map.view) return;
-    clearTimeout(this.remembering);
-    this.remembering = setTimeout(() => {
-      const v = this.map.view, text = [v.a0, v.a1, v.b0, v.b1].join(",");
-      const known = new URLSearchParams({ file: this.maps.indexOf(this.file), variable: this.variable.name, at: this.at.join(","), view: text });
-      history.replaceState(null, "", `#${known}`);
-    }, 400);
   }
 
   build() {
@@ -91,7 +77,7 @@ class Viewer {
     this.map = new MapView(this.canvas, {
       hover: (place, keyed) => this.inspector.hover(place, keyed), pick: (place) => this.starter.pick(place), moved: () => this.moved(),
     });
-    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => fill(this.told, text));
+    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => { fill(this.told, text); this.inspector.again(); });
     this.map.live = this.live;
   }
 
@@ -105,9 +91,10 @@ class Viewer {
       } else if (file.kind === "points") {
         this.right.append(new PointsPanel(file, answer).element);
       } else {
-        this.right.prepend(this.panel.element);
-        this.panel.download = null;
-        this.panel.show(asMotion(file, answer), file.machine, `${file.title || file.name}: ${words(file.attributes.regime)}, ended as ${words(file.attributes.reason)}`);
+        const panel = this.maps.length ? new MotionPanel(this.described, null) : this.panel;
+        panel.download = null;
+        this.right.append(panel.element);
+        panel.show(asMotion(file, answer), file.machine, `${file.title || file.name}: ${words(file.attributes.regime)}, ended as ${words(file.attributes.reason)}`);
       }
     } catch (error) {
       this.fail(error);
@@ -302,10 +289,10 @@ class Viewer {
     this.shaded = Boolean(shade);
     const options = variable.classes ? {} : rangeOf(overview);
     map.painter = new Painter({ classes: variable.classes, offset, hidden: this.hiddenNow, mix: this.checks.mix.checked, shade, ...options });
-    map.classOf = variable.name === "event_word" ? (word) => this.wordClass(word) : null;
+    map.classOf = variable.name === "event_word" ? (word) => wordClass(this.names, word) : null;
     if (variable.name === "attractor") fill(this.legend);
     else if (variable.classes) {
-      const values = [...new Set(overview)].sort((a, b) => a - b);
+      const values = map.tiles.classesSeen();
       const names = variable.name === "period" ? Object.fromEntries(values.map((v) => [v, v ? `period ${v}` : "not periodic"])) : this.names;
       fill(this.legend, classLegend({ values, names, offset, hidden: this.hiddenNow, toggle: (value, alone) => this.toggle(value, alone, values) }));
     } else if (overview.length) fill(this.legend, scaleLegend(map.painter, words(variable.name), variable.unit));
@@ -315,17 +302,6 @@ class Viewer {
   settling(values) {
     const { range } = rangeOf(values);
     return values.length && range[0] > 0 ? [range[0], Math.max(range[1], 1.01 * range[0])] : null;
-  }
-
-  /** The class of an event word that was computed now. */
-  wordClass(word) {
-    let text = "";
-    for (let rest = word; rest > 0; rest = Math.floor(rest / 8)) text += ["", "R", "L", "S", "C", "D", "+", "."][rest % 8];
-    const found = Object.entries(this.names).find(([, name]) => name === (text || "none"));
-    if (found) return Number(found[0]);
-    const next = Object.keys(this.names).length;
-    this.names[next] = text || "none";
-    return next;
   }
 
   toggle(value, alone, all) {
@@ -391,7 +367,7 @@ class Viewer {
   /** The view has changed. */
   moved() {
     if (!this.file || !this.map.view) return;
-    this.remember();
+    this.address.remember();
     this.inspector.again();
     const changed = Object.keys(this.with).length > 0;
     const v = this.map.view, { axes } = this.map;

@@ -17,8 +17,8 @@ export function describeAttractor(one, regimes) {
 export function attractorTable({ entries, total, unlabelled, hidden, regimes, toggle, fromFile }) {
   const rows = entries.map((one) => row(one, total, hidden, regimes, toggle));
   if (unlabelled > 0) rows.push(row({ attractor: 0, count: unlabelled, none: true }, total, hidden, regimes, toggle));
-  const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], ["amplitude (m)", "number"], ["impacts/period", "number"], ["multiplier", "number"]];
-  const head = h("tr", {}, ...columns.map(([text, kind]) => h("th", { class: kind, scope: "col" }, text || h("span", { class: "sr" }, "shown"))));
+  const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], ["amplitude (m)", "number"], ["impacts", "number"], ["multiplier", "number"]];
+  const head = h("tr", {}, ...columns.map(([text, kind]) => h("th", { class: kind, scope: "col", title: text === "impacts" ? "impacts per drive period" : null }, text || h("span", { class: "sr" }, "shown"))));
   const chaotic = entries.some((one) => one.period === 0);
   return [
     h("table", {}, h("thead", {}, head), h("tbody", {}, ...rows)),
@@ -53,6 +53,17 @@ export function classLegend({ values, names, offset, hidden, toggle }) {
   });
   const more = values.length > shown.length ? h("span", { class: "note" }, `and ${values.length - shown.length} more`) : null;
   return h("div", { class: "legend", role: "group", "aria-label": "Legend" }, ...buttons, more);
+}
+
+/** The class of an event word that was computed now: that of the file, or a new one in `names`. */
+export function wordClass(names, word) {
+  let text = "";
+  for (let rest = word; rest > 0; rest = Math.floor(rest / 8)) text += ["", "R", "L", "S", "C", "D", "+", "."][rest % 8];
+  const found = Object.entries(names).find(([, name]) => name === (text || "none"));
+  if (found) return Number(found[0]);
+  const next = Object.keys(names).length;
+  names[next] = text || "none";
+  return next;
 }
 
 /** The scale of a variable of numbers. */

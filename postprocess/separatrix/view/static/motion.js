@@ -50,13 +50,17 @@ export class MotionPanel {
     this.downloads.hidden = !this.download || quiet;
     const { arrays } = answer;
     this.line = this.merge(arrays);
+    // Of stops that the driving body carries, the motion relative to it is shown.
+    this.relative = Boolean(answer.summary.two_bodies && arrays.driver_v && String((machine.body || {}).law).includes("backlash"));
+    this.plane = this.relative ? relativeTo(arrays) : arrays;
+    this.loop = this.relative ? this.merge(this.plane) : this.line;
     if (!quiet) this.listEvents();
     fill(this.summary, text);
     if (!this.chosen && !quiet) this.range.value = "first";
     this.setPart(quiet);
     // The foot is drawn so far off that the body never comes to it.
     this.apart = answer.summary.two_bodies ? 0 : arrays.x.reduce((most, x, i) => Math.max(most, arrays.driver[i] - x), 0);
-    const limits = [answer.summary.barrier_upper, answer.summary.barrier_lower].filter((b) => Number.isFinite(b) && b !== null);
+    const limits = finite([answer.summary.barrier_upper, answer.summary.barrier_lower]);
     const [low, high] = extent(arrays.x, arrays.driver.map((x) => x - this.apart));
     this.reach = answer.summary.two_bodies ? [low, high] : extent([low, high], limits);
     this.draw();
@@ -95,7 +99,9 @@ export class MotionPanel {
     this.part = part;
     this.from = lowest(time, part[0]);
     this.to = lowest(time, part[1] + 1e-12 * end) || time.length;
-    this.drawn = [lowest(this.line.time, part[0]), lowest(this.line.time, part[1] + 1e-12 * end)];
+    const between = ({ time: times }) => [lowest(times, part[0]), lowest(times, part[1] + 1e-12 * end)];
+    this.drawn = between(this.line);
+    this.looped = between(this.loop);
     if (!quiet) this.setTime(part[0]);
     this.draw();
   }
@@ -147,7 +153,7 @@ export class MotionPanel {
     if (!this.motion || this.pending) return;
     this.pending = requestAnimationFrame(() => {
       this.pending = null;
-      if (!this.element.isConnected) return;
+      if (!this.element.isConnected || !this.motion) return;
       this.drawHistory();
       this.drawPhase();
       this.drawMachine();
@@ -189,19 +195,20 @@ export class MotionPanel {
   fixedBarriers() {
     const { summary } = this.motion;
     if (summary.two_bodies && String((this.machine.body || {}).law).includes("backlash")) return [];
-    return [summary.barrier_upper, summary.barrier_lower].filter((one) => one !== null && Number.isFinite(one));
+    return finite([summary.barrier_upper, summary.barrier_lower]);
   }
 
   drawPhase() {
     const [context, width, height] = prepare(this.canvases.phase);
-    const { arrays } = this.motion;
+    const arrays = this.plane, { summary } = this.motion;
     const part = (values) => values.subarray(this.from, this.to);
-    const barriers = this.fixedBarriers();
-    const plot = new Plot(context, width, height, extent(part(arrays.x), barriers), extent(part(arrays.v)), [this.unitText(), "velocity v (m/s)"]);
+    const barriers = this.relative ? finite([summary.barrier_upper, summary.barrier_lower]) : this.fixedBarriers();
+    const labels = this.relative ? ["relative position (m)", "relative velocity (m/s)"] : [this.unitText(), "velocity v (m/s)"];
+    const plot = new Plot(context, width, height, extent(part(arrays.x), barriers), extent(part(arrays.v)), labels);
     plot.clip(() => {
       context.strokeStyle = LINE;
       context.lineWidth = 1.1;
-      plot.path(this.line.x, this.line.v, ...this.drawn);
+      plot.path(this.loop.x, this.loop.v, ...this.looped);
       context.strokeStyle = IMPACT;
       context.setLineDash([3, 3]);
       for (let k = 0; k < arrays.event_kind.length; k++) {
@@ -250,6 +257,19 @@ export class MotionPanel {
     const text = await this.download(what);
     if (text !== null) save(text, { samples: "motion.csv", events: "events.csv", case: "case.toml" }[what], what === "case" ? "application/toml" : "text/csv");
   }
+}
+
+function finite(values) {
+  return values.filter((one) => one !== null && Number.isFinite(one));
+}
+
+/** The motion of the driven body relative to the driving one; how fast that is after an impact is not in the events. */
+function relativeTo(arrays) {
+  const less = (values, others) => values.map((value, i) => value - others[i]);
+  return {
+    ...arrays, x: less(arrays.x, arrays.driver), v: less(arrays.v, arrays.driver_v), event_x: less(arrays.event_x, arrays.event_driver_x),
+    event_v_before: less(arrays.event_v_before, arrays.event_driver_v), event_v_after: arrays.event_v_after.map(() => NaN),
+  };
 }
 
 /** The first index whose time is not before `value`. */

@@ -58,8 +58,10 @@ export class Starter {
     this.points = Array.from(section).slice(-64).map((i) => [arrays.x[i], arrays.v[i]]);
     const end = arrays.time[arrays.time.length - 1];
     const text = [`From x₀ = ${quantity(start[0], "m", 9)}, v₀ = ${quantity(start[1], "m/s", 9)}${start[2] ? `, φ₀ = ${quantity(start[2], "rad", 6)}` : ""}`];
+    const parameters = Object.entries(answer.parameters || {}).filter(([path]) => path in this.viewer.with || this.viewer.file.axes.some((axis) => axis.path === path));
+    if (parameters.length) text.push(`, ${parameters.map(([path, value]) => `${path} = ${number(value, 8)}`).join(", ")}`);
     if (!quiet && this.viewer.transport.live) {
-      text.push(` to x = ${number(summary.x, 17)} m, v = ${number(summary.v, 17)} m/s after ${number(end, 6)} s: ${summary.impacts} impacts, ${words(this.viewer.described.regimes[summary.regime])}, ${words(this.viewer.described.reasons[summary.reason])}; the numbers of “separatrix points”.`);
+      text.push(` to x = ${number(summary.x, 17)} m, v = ${number(summary.v, 17)} m/s after ${number(end, 6)} s: ${summary.impacts} ${summary.impacts === 1 ? "impact" : "impacts"}, ${words(this.viewer.described.regimes[summary.regime])}, ${words(this.viewer.described.reasons[summary.reason])}; the numbers of “separatrix points”.`);
     } else if (!this.viewer.transport.live) text.push(": the stored motion nearest to the click.");
     this.viewer.panel.show(answer, this.viewer.file.machine, text.join(""), quiet);
     this.viewer.mark();
@@ -100,7 +102,7 @@ export class Starter {
 /** A trajectory file as the answer to a request for a motion. */
 export function asMotion(file, { arrays }) {
   const motion = { x: arrays.x, v: arrays.v, time: arrays.time, mode: arrays.mode, driver: arrays.drive || arrays.driver_x, driver_v: arrays.driver_v };
-  for (const name of ["kind", "time", "x", "v_before", "v_after"]) motion[`event_${name}`] = arrays[`event_${name}`] || new Float64Array(0);
+  for (const name of ["kind", "time", "x", "v_before", "v_after", "driver_x", "driver_v"]) motion[`event_${name}`] = arrays[`event_${name}`] || new Float64Array(0);
   const { attributes } = file;
   const bound = (name) => (attributes[name] === undefined ? null : attributes[name]);
   const summary = { drive_period: attributes.drive_period, barrier_upper: bound("barrier_upper"), barrier_lower: bound("barrier_lower"), two_bodies: Boolean(arrays.driver_x) };

@@ -11,7 +11,7 @@ export class Tiles {
   /** `plane` are the parameters of a plane without the variable; `changed` is called when there is more to draw. */
   constructor(transport, plane, variable, points, changed, failed) {
     Object.assign(this, { transport, plane, variable, points, changed, failed });
-    this.top = 8;
+    this.top = 0;
     while (Math.max(...points) / 2 ** this.top > TILE) this.top++;
     this.cache = new Map();
     this.queue = [];
@@ -143,6 +143,13 @@ export class Tiles {
   overview() {
     const tile = this.has(this.top, 0, 0);
     return tile && tile.cells ? tile.cells.first : [];
+  }
+
+  /** Classes in the coarsest tile, the second of its cells too. */
+  classesSeen() {
+    const tile = this.has(this.top, 0, 0), found = new Set(this.overview());
+    if (tile && tile.cells && tile.cells.second) tile.cells.second.forEach((value, i) => tile.cells.rest[i] && found.add(value));
+    return [...found].sort((a, b) => a - b);
   }
 }
 
