@@ -130,10 +130,11 @@ def machine_of(case: dict, step: float = 0.8) -> Machine:
     elif contact["law"] != "none":
         raise ValueError(f"the referee has no contact law {contact['law']}")
     if drive["law"] == "measured_force":
-        # the last sample ends the period
-        machine.samples, machine.interval = len(drive["force"]), drive["interval"]
+        # the last sample ends the period, or a step back to the first one
+        forces = [*drive["force"], *(drive["force"][:1] if drive.get("periodic", 0) else [])]
+        machine.samples, machine.interval = len(forces), drive["interval"]
         machine.frequency = 2 * math.pi / ((machine.samples - 1) * machine.interval)
-        machine.kept = (ctypes.c_double * machine.samples)(*(force / mass for force in drive["force"]))
+        machine.kept = (ctypes.c_double * machine.samples)(*(force / mass for force in forces))
         machine.force = machine.kept
         return machine
     machine.frequency = drive["ratio"] * math.sqrt(spring)
