@@ -190,15 +190,16 @@ def compare_basin(court: Court, path: Path, case: dict, kinds: Counter) -> Verdi
     machine, starts, verdicts = referee.machine_of(case), grid_of(case), Verdicts()
     with h5py.File(court.run("basin", path)) as file:
         columns = [file[key][()].ravel() for key in ("attractor", "period", "impacts_per_period")]
-        entries = {key: file["catalogue"][key][()] for key in ("attractor", "kind", "point", "point_entry")}
-        turns = file["catalogue"]["rotation_number"][()] if "rotation_number" in file["catalogue"] else None
-    kind = dict(zip(entries["attractor"].tolist(), entries["kind"].tolist(), strict=True))
-    rotation = {} if turns is None else dict(zip(entries["attractor"].tolist(), turns.tolist(), strict=True))
-    owner = entries["attractor"][entries["point_entry"]]
+        catalogue = {key: item[()] for key, item in file["catalogue"].items()}
+    names = catalogue["attractor"].tolist()
+    kind = dict(zip(names, catalogue["kind"].tolist(), strict=True))
+    rotation = dict(zip(names, catalogue.get("rotation_number", np.array([])).tolist(), strict=False))
+    # a catalogue without cycles has no points
+    owner = catalogue["attractor"][catalogue["point_entry"]] if "point" in catalogue else None
     for k, outcome in enumerate(referee.outcomes(court.double, machine, starts, court.effort)):
         label, period = int(columns[0][k]), int(columns[1][k])
         claim = Claim(label, period, float(columns[2][k]), kind.get(label) == CHAOTIC, rotation.get(label))
-        points = entries["point"][owner == label] if label and period else None
+        points = catalogue["point"][owner == label] if label and period else None
         verdict = court.judge(machine, starts[k], outcome, claim, points)
         verdicts.add(verdict, start=starts[k].tolist(), ours=str(claim), referee=told(outcome))
         kinds[outcome.kind] += 1
