@@ -8,7 +8,7 @@ PARTS = ("basin", "points", "runs", "starts")
 # Disagreements that were looked into: (case, part) and why, with the evidence.
 EXPLAINED: dict[tuple[str, str], str] = {}
 CAUSES = {
-    "not known": "silence: no label, or a period beyond `max_period`",
+    "not known": "silence: the program does not say what it is",
     "rounding": "the referee ends elsewhere in extended precision or 1e-12 beside the start",
     "wrong": "**not explained**",
 }
