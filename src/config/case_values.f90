@@ -118,7 +118,7 @@ contains
     call know(source, path)
     at = find(source, path)
     if (at > 0 .or. .not. present(required)) return
-    if (required) call report(source, path, 'missing')
+    if (required) call report(source, path, 'missing', missing=.true.)
   end subroutine look_up
 
   !> One number with its unit.

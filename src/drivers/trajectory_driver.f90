@@ -66,7 +66,7 @@ contains
     if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
     if (.not. allocated(error) .and. len(command%record) > 0) call check_record(session%the_case, error)
     call session%stop_if(error)
-    path = output_path(command%output, command%path)
+    path = output_path(command%output, command%path, command%name)
     if (command%validate .or. command%dry_run) then
       call session%journal%line('valid', command%path//' is a valid case for trajectory: about '// &
         to_text(nint(span%duration/moving%machine%period*session%the_case%trajectory%samples_per_period))// &

@@ -10,10 +10,10 @@ from matplotlib.patches import Patch
 
 from separatrix import style
 from separatrix.figures.caption import describe_case, version_text
+from separatrix.figures.regions import brackets, limit_texts
 from separatrix.labels import axis_label, flag_text, plain
 from separatrix.layout import compose
 from separatrix.open import flag_names, table
-from separatrix.figures.regions import brackets, limit_texts
 
 _COLOURS = {0: style.RUN_UP, 1: style.RUN_DOWN}
 _NAMES = {0: "run-up", 1: "run-down"}
