@@ -31,8 +31,9 @@ int separatrix_model_read(const char *path, separatrix_model **model, char *mess
 int separatrix_model_from_text(const char *text, const char *directory, separatrix_model **model,
                                char *message, size_t message_size);
 
-/* The same with settings on top, each "key.path=value" with a TOML value, as `--set` of the program takes them;
- * `name` stands for the file in messages, and its folder is where files that the case names are looked for. */
+/* The same with settings on top, each "key.path=value" with a TOML value, as `--set` of the program takes
+ * them; `name` stands for the file in messages, and its folder is where files that the case names are looked
+ * for. */
 int separatrix_model_with(const char *text, const char *name, int setting_count, const char *const *settings,
                           separatrix_model **model, char *message, size_t message_size);
 
@@ -179,13 +180,12 @@ int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
  *     label, regime, period in drive periods (0: not periodic), event word; x [m] and v [m/s] on the section
  *     at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude
  *     [m], largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s],
- *     grazing margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be anywhere
- *     between stops, number of coordinates on the section, 1 if the machine has two bodies, kind (the codes of
- *     docs/file-format.md), real parts of its multipliers [5], imaginary parts [5], one for each coordinate
- *   point_capacity, point_count, points [point_capacity][5]
- *     room for points on the section, how many there are (those beyond the room are left out), and these: of
- *     one body x [m] and v [m/s]; of a motion that is not periodic the lower and the upper corner of their
- *     box */
+ *     grazing margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be
+ * anywhere between stops, number of coordinates on the section, 1 if the machine has two bodies, kind (the
+ * codes of docs/file-format.md), real parts of its multipliers [5], imaginary parts [5], one for each
+ * coordinate point_capacity, point_count, points [point_capacity][5] room for points on the section, how many
+ * there are (those beyond the room are left out), and these: of one body x [m] and v [m/s]; of a motion that
+ * is not periodic the lower and the upper corner of their box */
 int separatrix_catalogue_attractor(const separatrix_catalogue *catalogue, int index, double *numbers,
                                    int point_capacity, int *point_count, double *points, char *message,
                                    size_t message_size);
