@@ -173,7 +173,8 @@ class Model:
         directions in their space to differentiate along; None: each parameter by itself. `start` is (n, 3):
         x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are at
         `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
-        `tolerance` is that of the adaptive flight.
+        `tolerance` is that of the adaptive flight. With `derivatives` false none are computed: `jacobian` and
+        `velocity_jacobian` are None then, and `directions` is not looked at.
 
         `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
         takes the place of the measured force of the case; the crank angles of `start` are not looked at.
@@ -283,13 +284,14 @@ def _rows(function: str, count: int, *numbers: ctypes.Array) -> Iterator[list[st
 
 
 def library_path() -> Path:
-    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, in build/lib, beside the program."""
+    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, beside the program, in build/lib."""
     asked = os.environ.get("SEPARATRIX_LIBRARY")
     if asked:
         return Path(asked)
     program = shutil.which("separatrix")
-    folders = [NATIVE / "lib", SOURCE_TREE / "build" / "lib"]
+    folders = [NATIVE / "lib"]
     folders += [Path(program).resolve().parent.parent / "lib"] if program else []
+    folders.append(SOURCE_TREE / "build" / "lib")
     for folder in folders:
         path = folder / "libseparatrix.so"
         if path.is_file():

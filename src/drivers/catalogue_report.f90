@@ -35,8 +35,9 @@ contains
     end select
     line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
            to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
-    if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) &
+    if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) then
       line = line//', rotation number '//to_text(attractor%features%rotation, 4)
+    end if
     if (attractor%kind == kind_chaotic .or. attractor%kind == kind_not_known) then
       line = line//', neighbours drift apart by '//to_text(attractor%multiplier, 4)//' a period'
     else
