@@ -233,7 +233,8 @@ int separatrix_effect_confusion(int index, char *one, size_t one_size, char *oth
                                 char *reason, size_t reason_size, char *message, size_t message_size);
 
 /* The model with an effect added, `count` of whose parameters are given as keys[count] and values[count]; the
- * others take their defaults. Code 65 if that makes no valid case. To be freed like any other. */
+ * others take their defaults; items of a list are keys like "change[2]", in their order. Code 65 if that
+ * makes no valid case. To be freed like any other. */
 int separatrix_model_with_effect(const separatrix_model *model, const char *effect, int count,
                                  const char *const *keys, const double *values, separatrix_model **extended,
                                  char *message, size_t message_size);
