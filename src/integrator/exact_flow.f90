@@ -17,7 +17,7 @@ module exact_flow
   implicit none
   private
 
-  public :: prepare_flow, begin_segment, evaluate, secular_factor
+  public :: prepare_flow, begin_segment, evaluate, secular_factor, largest_damping_ratio
 
   !> Largest damping ratio for which dividing by the damped frequency is harmless.
   real(wp), parameter :: largest_damping_ratio = 0.9_wp

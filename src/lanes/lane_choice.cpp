@@ -5,6 +5,7 @@
 #include "lane_types.hpp"
 
 #include <cfenv>
+#include <cstddef>
 
 namespace {
 
@@ -42,6 +43,11 @@ int separatrix_lane_width(void) {
     return 4;
 #endif
   return 2;
+}
+
+void separatrix_lane_sizes(size_t *machine, size_t *batch) {
+  *machine = sizeof(lane_machine);
+  *batch = sizeof(lane_batch);
 }
 
 void separatrix_fly_lanes(int width, const lane_machine *machine, lane_batch *batch) {

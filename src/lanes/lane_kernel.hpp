@@ -13,6 +13,7 @@
 #define SEPARATRIX_LANE_KERNEL_HPP
 
 #include "lane_layer.hpp"
+#include "lane_modes.hpp"
 #include "lane_stops.hpp"
 
 namespace {
@@ -20,7 +21,7 @@ namespace {
 enum { most_rounds = 10, most_pieces = 8 };
 
 // Are the Bernstein coefficients c of degree 6, or those of both halves, positive within?
-inline mask all_positive(const vec (&c)[7]) {
+LANE_LEAF mask all_positive(const vec (&c)[7]) {
   mask plain = (c[1] > 0.0) & (c[2] > 0.0) & (c[3] > 0.0) & (c[4] > 0.0) & (c[5] > 0.0);
   vec d[7];
   mask halved = ~mask{};
@@ -36,8 +37,8 @@ inline mask all_positive(const vec (&c)[7]) {
 
 // Is w > 0 strictly between two times `span` apart? From w, w' and w'' at both and a bound on |w^(6)|: the
 // error of the quintic through them is at most bound s^3 (span - s)^3/720.
-inline mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, vec rate1, vec curl1,
-                             vec bound) {
+LANE_LEAF mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, vec rate1, vec curl1,
+                                vec bound) {
   vec step = 0.2 * span, bend = 0.05 * span * span, cube = span * span * span;
   vec b1 = w0 + step * rate0, b2 = w0 + 2 * step * rate0 + bend * curl0;
   vec b4 = w1 - step * rate1, b3 = w1 - 2 * step * rate1 + bend * curl1;
@@ -53,8 +54,8 @@ inline mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, vec
 }
 
 // A body set off: the free part of its motion. One within a Stribeck layer is left to the scalar code.
-template <bool damping, bool layer> inline void begin_flight(const lane_machine &m, lane_group &g) {
-  if (layer)
+template <bool damping, bool layer, class machine> inline void begin_flight(const machine &m, lane_group &g) {
+  if constexpr (layer)
     put(g.status, (g.status == lane_fresh) & (g.direction * g.v < m.layer.edge), lane_left);
   mask fresh = g.status == lane_fresh;
   if (!any(fresh))
@@ -64,6 +65,8 @@ template <bool damping, bool layer> inline void begin_flight(const lane_machine 
   put(g.z_im, fresh, 0);
   kinematics k = evaluate<damping>(m, g, g.time - g.start);
   vec y = g.x - k.x, v = g.v - k.v;
+  if constexpr (machine::modal)
+    y = (g.x - m.origin) - k.x;
   vec a = -m.natural * m.natural * y - 2 * m.decay * v;
   put(g.z_re, fresh, v + m.decay * y);
   put(g.z_im, fresh, m.damped * y);
@@ -77,8 +80,8 @@ template <bool damping, bool layer> inline void begin_flight(const lane_machine 
 }
 
 // Keeps the event that is `step` after the evaluated point, where `accept`.
-template <bool damping, bool layer>
-inline void keep_event(const lane_machine &m, const kinematics &k, mask accept, mask hit, vec span, vec step,
+template <bool damping, bool layer, class machine>
+inline void keep_event(const machine &m, const kinematics &k, mask accept, mask hit, vec span, vec step,
                        lane_group &g) {
   vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, re = k.re, im = k.im;
   turn_on<damping, 3>(m, step, re, im);
@@ -97,18 +100,28 @@ inline void keep_event(const lane_machine &m, const kinematics &k, mask accept, 
 
 // Finds the ends of the flights of `seek`: a turning point, or the barrier if that lies before it. Returns
 // the lanes whose search failed.
-template <bool damping, bool layer>
-inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
+template <bool damping, bool layer, class machine>
+inline mask find_events(const machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
   vec s = pick(upward, g.up_span, g.down_span), low = layer ? g.skip : vec{}, high = 1e300;
   mask hit = pick(upward, g.up_hits, g.down_hits) > 0.5;
+  if constexpr (machine::modal) {
+    hit = pick(m.guess > 0.0, m.leads_to == 0.0, hit);
+    s = pick(m.guess > 0.0, m.guess, s);
+  }
   for (int round = 0; round < most_rounds; round++) {
     kinematics k = evaluate<damping>(m, g, s);
     vec w = g.direction * k.v, rate = g.direction * k.a, curl = g.direction * k.j, snap = g.direction * k.s;
-    vec gap = g.direction * (barrier - k.x);
+    vec gap = g.direction * (barrier - k.x), gap1 = -w, gap2 = -rate, gap3 = -curl;
+    if constexpr (machine::modal) {
+      gap -= m.lead * w;
+      gap1 -= m.lead * rate;
+      gap2 -= m.lead * curl;
+      gap3 -= m.lead * snap;
+    }
     // Past the turning point, short of the barrier: the body turns first.
     hit = hit & ((w > 0.0) | (gap <= 0.0));
-    vec f = pick(hit, gap, w), f1 = pick(hit, -w, rate), f2 = pick(hit, -rate, curl),
-        f3 = pick(hit, -curl, snap);
+    vec f = pick(hit, gap, w), f1 = pick(hit, gap1, rate), f2 = pick(hit, gap2, curl),
+        f3 = pick(hit, gap3, snap);
     put(low, f > 0.0, s);
     high = pick(f > 0.0, high, s);
     // Householder's step of fourth order.
@@ -139,10 +152,12 @@ inline mask find_events(const lane_machine &m, mask seek, mask upward, vec barri
 
 // Is each of so many equal pieces of the flights proven to have no event on the way? With a layer: from its
 // edge to its edge, the speed staying above.
-template <bool damping, bool layer>
-inline mask prove_pieces(const lane_machine &m, int pieces, vec bound, const lane_group &g) {
+template <bool damping, bool layer, class machine>
+inline mask prove_pieces(const machine &m, int pieces, vec bound, const lane_group &g) {
   vec h = (1.0 / pieces) * (layer ? g.reach - g.skip : g.span), d = g.direction;
-  const double level = layer ? m.layer.level : 0;
+  double level = 0;
+  if constexpr (layer)
+    level = m.layer.level;
   vec w = d * g.start_v - level, rate = d * g.start_a, curl = d * g.start_j;
   mask proven = ~mask{};
   for (int i = 1; i < pieces; i++) {
@@ -159,13 +174,40 @@ inline mask prove_pieces(const lane_machine &m, int pieces, vec bound, const lan
   return proven & positive_between(h, w, rate, curl, end_w, d * g.end_a, d * g.end_j, bound);
 }
 
+// Of flights `asked` out of a barrier that may not pull: does it push on the whole way? The others are let
+// pass.
+inline mask prove_pushing(const lane_modes &f, mask asked, vec bound, const lane_group &g) {
+  mask proven = ~asked;
+  vec d = g.direction, sixth = f.sixth_periodic + f.sixth_free * free_size(g) + f.lead * bound;
+  for (int pieces = 1; pieces <= most_pieces && any(~proven); pieces *= 2) {
+    vec h = (1.0 / pieces) * g.span, gap = {}, rate = {}, curl = {};
+    mask positive = ~mask{};
+    for (int i = 0; i <= pieces; i++) {
+      kinematics k = evaluate<true>(f, g, i * h);
+      vec next = d * (f.barrier - k.x - f.lead * k.v), next_rate = -d * (k.v + f.lead * k.a),
+          next_curl = -d * (k.a + f.lead * k.j);
+      if (i == pieces)
+        put(next, g.hits > 0.5, 0);
+      if (i > 0)
+        positive = positive & positive_between(h, gap, rate, curl, next, next_rate, next_curl, sixth);
+      gap = next;
+      rate = next_rate;
+      curl = next_curl;
+    }
+    proven = proven | positive;
+  }
+  return proven;
+}
+
 // Of the flights `found` just now: which are proven to have no event on the way?
-template <bool damping, bool layer>
-inline mask prove(const lane_machine &m, mask found, const lane_group &g) {
+template <bool damping, bool layer, class machine>
+inline mask prove(const machine &m, mask found, const lane_group &g) {
   vec bound = derivative_bound(m, g);
   mask proven = prove_pieces<damping, layer>(m, 1, bound, g);
   for (int pieces = 2; pieces <= most_pieces && any(found & ~proven); pieces *= 2)
     proven = proven | prove_pieces<damping, layer>(m, pieces, bound, g);
+  if constexpr (machine::modal)
+    proven = proven & prove_pushing(m, found & proven & (m.lead > 0.0), bound, g);
   return proven;
 }
 
@@ -176,7 +218,10 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   mask hit = g.hits > 0.5;
   vec w = g.direction * g.end_v, gap = g.direction * (barrier - g.end_x);
   vec push = -g.direction * g.end_a - m.kinetic;
-  mask plain = pick(hit, m.restitution * w > m.slow, push > m.break_away) & (magnitude(g.end_x) < m.domain);
+  vec restitution = m.restitution;
+  if (m.restitution_law != constant_restitution && any(due & hit))
+    restitution = restitution_at(m, w);
+  mask plain = pick(hit, restitution * w > m.slow, push > m.break_away) & (magnitude(g.end_x) < m.domain);
   turning turn;
   bool turns = layer && any(due & ~hit);
   if (turns) {
@@ -186,7 +231,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   }
   mask rare = due & ~plain;
   due = due & plain;
-  vec v = pick(hit, -m.restitution * g.end_v, 0);
+  vec v = pick(hit, -restitution * g.end_v, 0);
   vec v_jump = pick(hit, v - g.end_v, 0);
   vec y_jump = (-2 * m.offset) * g.direction, a_jump = (2 * m.kinetic) * g.direction;
   if (damping)
@@ -232,8 +277,8 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
 
 // Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that
 // failed.
-template <bool damping, bool layer>
-inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
+template <bool damping, bool layer, class machine>
+inline mask look_ahead(const machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
   mask left = {};
   for (int attempt = 0; attempt < (layer ? 2 : 1) && any(seek); attempt++) {
     if (attempt > 0) {
@@ -243,7 +288,7 @@ inline mask look_ahead(const lane_machine &m, mask seek, mask upward, vec barrie
     }
     left = find_events<damping, layer>(m, seek, upward, barrier, g);
     mask found = seek & ~left;
-    if (layer)
+    if constexpr (layer)
       left = left | find_edge(m, found, g);
     left = left | (found & ~prove<damping, layer>(m, found, g));
     seek = left;
@@ -307,17 +352,52 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   store<true>(g, first, batch);
 }
 
+// The same where the equation changes with the mode: a flight begins anew after every event.
+void fly_through_modes(const lane_machine &m, int first, lane_batch &batch) {
+  lane_group g;
+  lane_modes f(m);
+  load<true>(batch, first, g);
+  f.enter((g.status == lane_fresh) | (g.status == lane_flying), g);
+  begin_flight<true, false>(f, g);
+  mask flying = g.status == lane_flying, sent = flying;
+  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+    flying = sent;
+    while (any(flying)) {
+      mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
+      if (any(seek))
+        left = look_ahead<true, false>(f, seek, upward, f.barrier, g);
+      left = left | (flying & (g.flights >= g.budget));
+      flying = flying & ~left & (g.start + g.span < g.until);
+      if (any(flying)) {
+        left = left | take_mode_events(f, flying, g);
+        f.enter(g.status == lane_fresh, g);
+        begin_flight<true, false>(f, g);
+      }
+      put(g.status, left, lane_left);
+      flying = flying & ~left;
+    }
+    take_stops<true>(f, g.status == lane_flying, batch, g);
+  }
+  store<true>(g, first, batch);
+}
+
+void fly_group(const lane_machine &m, int first, lane_batch &batch) {
+  if (m.several_modes > 0)
+    fly_through_modes(m, first, batch);
+  else if (m.layer.excess > 0)
+    fly_through_layers(m, first, batch);
+  else if (m.decay > 0)
+    fly<true>(m, first, batch);
+  else
+    fly<false>(m, first, batch);
+}
+
 } // namespace
 
 #define SEPARATRIX_LANE_KERNEL(name)                                                                         \
   extern "C" void name(const lane_machine *m, lane_batch *batch) {                                           \
     for (int first = 0; first < lanes; first += vec_size)                                                    \
-      if (m->layer.excess > 0)                                                                               \
-        fly_through_layers(*m, first, *batch);                                                               \
-      else if (m->decay > 0)                                                                                 \
-        fly<true>(*m, first, *batch);                                                                        \
-      else                                                                                                   \
-        fly<false>(*m, first, *batch);                                                                       \
+      fly_group(*m, first, *batch);                                                                          \
   }
 
 #endif

@@ -17,16 +17,16 @@ typedef lane_fields<vec> lane_group;
 
 enum {
   members = sizeof(lane_batch::fields) / sizeof(double[lanes]),
-  plain_members = offsetof(lane_fields<double[lanes]>, skip) / sizeof(double[lanes])
+  plain_members = offsetof(lane_fields<double[lanes]>, place) / sizeof(double[lanes])
 };
 
-template <bool layer> inline void load(const lane_batch &batch, int first, lane_group &g) {
-  for (int i = 0; i < (layer ? members : plain_members); i++)
+template <bool all> inline void load(const lane_batch &batch, int first, lane_group &g) {
+  for (int i = 0; i < (all ? members : plain_members); i++)
     memcpy((vec *)&g + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
 }
 
-template <bool layer> inline void store(const lane_group &g, int first, lane_batch &batch) {
-  for (int i = 0; i < (layer ? members : plain_members); i++)
+template <bool all> inline void store(const lane_group &g, int first, lane_batch &batch) {
+  for (int i = 0; i < (all ? members : plain_members); i++)
     memcpy((double *)&batch.fields + i * lanes + first, (const vec *)&g + i, sizeof(vec));
 }
 
@@ -35,7 +35,8 @@ struct kinematics {
   vec x, v, a, j, s, re, im;
 };
 
-template <bool damping> inline kinematics evaluate(const lane_machine &m, const lane_group &g, vec elapsed) {
+template <bool damping, class machine>
+inline kinematics evaluate(const machine &m, const lane_group &g, vec elapsed) {
   kinematics k;
   vec turn_s, turn_c, sine, cosine;
   sine_cosine(elapsed * m.damped, turn_s, turn_c);
@@ -47,7 +48,7 @@ template <bool damping> inline kinematics evaluate(const lane_machine &m, const 
   }
   k.re = turn_c * g.z_re - turn_s * g.z_im;
   k.im = turn_s * g.z_re + turn_c * g.z_im;
-  const double stiffness = m.natural * m.natural, drag = 2 * m.decay;
+  const auto stiffness = m.natural * m.natural, drag = 2 * m.decay;
   vec y = k.im * (1 / m.damped);
   k.v = damping ? k.re - m.decay * y : k.re;
   k.a = damping ? -stiffness * y - drag * k.v : -stiffness * y;
@@ -66,12 +67,16 @@ template <bool damping> inline kinematics evaluate(const lane_machine &m, const 
     s = s * cosine + c * sine;
     c = next;
   }
-  k.x = (m.rest - g.direction * m.offset) + y;
+  if constexpr (machine::modal)
+    k.x = m.rest + y;
+  else
+    k.x = (m.rest - g.direction * m.offset) + y;
   return k;
 }
 
 // exp(lambda step) (re + i im) for a step short enough for so many terms.
-template <bool damping, int terms> inline void turn_on(const lane_machine &m, vec step, vec &re, vec &im) {
+template <bool damping, int terms, class machine>
+inline void turn_on(const machine &m, vec step, vec &re, vec &im) {
   vec a = re, b = im;
   for (int n = terms; n >= 1; n--) {
     vec part = (1.0 / n) * step;
@@ -83,12 +88,15 @@ template <bool damping, int terms> inline void turn_on(const lane_machine &m, ve
   im = b;
 }
 
-// Bound on the seventh derivative of the position.
-inline vec derivative_bound(const lane_machine &m, const lane_group &g) {
+// At least |Z|, at most 8 % more.
+inline vec free_size(const lane_group &g) {
   vec re = magnitude(g.z_re), im = magnitude(g.z_im);
-  // At least |Z|, at most 8 % more.
-  vec size = re + im - 0.5857864376269049 * pick(re < im, re, im);
-  return m.bound_periodic + m.bound_free * size;
+  return re + im - 0.5857864376269049 * pick(re < im, re, im);
+}
+
+// Bound on the seventh derivative of the position.
+template <class machine> inline vec derivative_bound(const machine &m, const lane_group &g) {
+  return m.bound_periodic + m.bound_free * free_size(g);
 }
 
 // Derivatives 4 to 6 of the position at the end of the flight, without damping.

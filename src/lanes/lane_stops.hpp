@@ -23,11 +23,13 @@ inline vec captors(const lane_batch &batch, vec x, vec v) {
 
 // Lanes `there`, where they are to stop. At the end of a period the clock starts anew, and those that need
 // not stop pass.
-template <bool damping>
-inline void take_stops(const lane_machine &m, mask there, const lane_batch &batch, lane_group &g) {
+template <bool damping, class machine>
+inline void take_stops(const machine &m, mask there, const lane_batch &batch, lane_group &g) {
   if (!any(there))
     return;
   kinematics k = evaluate<damping>(m, g, g.until - g.start);
+  if constexpr (machine::modal)
+    k.x += m.origin;
   mask section = there & (g.until >= m.period);
   vec captor = captors(batch, k.x, k.v);
   mask passing =

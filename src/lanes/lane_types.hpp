@@ -5,7 +5,7 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64 };
+enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64, lane_modes_count = 6 };
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
 struct lane_layer {
@@ -24,14 +24,31 @@ struct lane_layer {
   double first_from_edge[layer_nodes], second_from_edge[layer_nodes];
 };
 
+// A mode of slip of a machine that has several: number 2 place + (0 up, 1 down), place 0 = free, 1 = pressed
+// on the upper and 2 on the lower barrier. Positions are relative to `origin` [m].
+struct lane_mode {
+  double natural, damped, decay, origin, rest;
+  // Where the flight ends unless it turns before, and the place that follows there; -1 = an impact. With a
+  // `lead` [s] the end is where that time ahead the position would reach the barrier at the present speed.
+  double barrier, leads_to, lead;
+  // Duration at which the search for the end begins (0: that of the last flight), and as for the machine.
+  double guess, close, stride;
+  // Bounds on the seventh and the sixth derivative of the position.
+  double bound_periodic, bound_free, sixth_periodic, sixth_free;
+  double cosine[most_harmonics], sine[most_harmonics];
+};
+
 // The machine, per unit of mass where forces are meant, SI.
 struct lane_machine {
+  enum { modal = 0 };
   double natural, damped, decay, drive_frequency, period;
   // Equilibrium without friction, and how far sliding friction moves it [m].
   double rest, offset;
   // Sliding and break-away friction per mass [m/s^2].
   double kinetic, break_away;
   double upper, lower, restitution;
+  // How the restitution depends on the impact speed, and the two numbers of that law.
+  double restitution_law, coefficients[2];
   // Rebounds up to this speed [m/s] may belong to a chatter sequence: left to the scalar code.
   double slow;
   // |x| up to which a flight is kept [m].
@@ -45,7 +62,15 @@ struct lane_machine {
   int harmonics;
   double cosine[most_harmonics], sine[most_harmonics];
   lane_layer layer;
+  // More than one linear equation: 1. Dry friction is in proportion to 1 + friction_slope x; bound on the
+  // rate of the drive's force [m/s^3].
+  double several_modes, friction_slope, force_rate;
+  lane_mode mode[lane_modes_count];
 };
+
+// Laws of restitution, by the numbers of `contact_law.f90`.
+const double constant_restitution = 0, linear_restitution = 1, power_restitution = 2,
+             viscoelastic_restitution = 3;
 
 // What a lane is doing.
 const double lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4;
@@ -72,7 +97,10 @@ template <class T> struct lane_fields {
   // code; whether it stops where it is captured. Time since the start of the trajectory, the attractor that
   // has captured it (0 = none), and since when (-1 = not).
   T sections, budget, leaves, elapsed, captor, settled;
-  // From here on with a Stribeck layer only. The time since the start of the flight at which the body leaves
+  // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
+  // lower barrier (2).
+  T place;
+  // The time since the start of the flight at which the body leaves
   // the layer (`start_v`, ... are those then), and at which it enters it again or hits, with its motion.
   // Fourth derivative at the end of the flight.
   T skip, reach, reach_v, reach_a, reach_j, end_s;

@@ -9,6 +9,9 @@
 #include <cstdint>
 #include <cstring>
 
+// The compiler stops inlining by itself where there is much to inline.
+#define LANE_LEAF inline __attribute__((always_inline))
+
 namespace {
 
 #if defined(__AVX512F__)
@@ -87,7 +90,7 @@ inline vec magnitude(vec a) {
 // Adding it rounds to the nearest integer, which then stands in the last bits.
 const double to_integer = 6755399441055744.0;
 
-inline void sine_cosine(reg angle, reg &sine, reg &cosine) {
+LANE_LEAF void sine_cosine(reg angle, reg &sine, reg &cosine) {
   reg shifted = angle * 6.36619772367581382433e-01 + to_integer;
   reg quarters = shifted - to_integer;
   reg_mask quadrant = (reg_mask)shifted;
@@ -113,13 +116,13 @@ inline void sine_cosine(reg angle, reg &sine, reg &cosine) {
   cosine = (reg)((reg_mask)c ^ (((quadrant + 1) & 2) << 62));
 }
 
-inline void sine_cosine(vec angle, vec &sine, vec &cosine) {
+LANE_LEAF void sine_cosine(vec angle, vec &sine, vec &cosine) {
   sine_cosine(angle.low, sine.low, cosine.low);
   sine_cosine(angle.high, sine.high, cosine.high);
 }
 
 // e**x for -700 <= x <= 700; below that e**-700.
-inline reg exponential(reg x) {
+LANE_LEAF reg exponential(reg x) {
   x = x < -700.0 ? all(-700.0) : x;
   reg shifted = x * 1.44269504088896338700e+00 + to_integer, twos = shifted - to_integer;
   reg r = (x - twos * 6.93147180369123816490e-01) - twos * 1.90821492927058770002e-10;
@@ -132,7 +135,31 @@ inline reg exponential(reg x) {
   return y * (reg)(((reg_mask)shifted - (reg_mask)all(to_integer) + 1023) << 52);
 }
 
-inline vec exponential(vec x) { return {exponential(x.low), exponential(x.high)}; }
+LANE_LEAF vec exponential(vec x) { return {exponential(x.low), exponential(x.high)}; }
+
+// Natural logarithm of normal x > 0.
+inline reg logarithm(reg x) {
+  const int64_t of_half = 0x3FE0000000000000, of_fraction = 0x000FFFFFFFFFFFFF;
+  reg_mask bits = (reg_mask)x;
+  reg twos = (reg)((reg_mask)all(to_integer) + ((bits >> 52) - 1022)) - to_integer;
+  reg f = (reg)((bits & of_fraction) | of_half);
+  reg_mask small = f < 0.70710678118654752440;
+  f = small ? 2.0 * f : f;
+  twos = small ? twos - 1.0 : twos;
+  f = f - 1.0;
+  reg s = f / (2.0 + f), z = s * s;
+  reg r = z * (6.666666666666735130e-01 +
+               z * (3.999999999940941908e-01 +
+                    z * (2.857142874366239149e-01 +
+                         z * (2.222219843214978396e-01 +
+                              z * (1.818357216161805012e-01 +
+                                   z * (1.531383769920937332e-01 + z * 1.479819860510658591e-01))))));
+  reg half_square = 0.5 * f * f;
+  return twos * 6.93147180369123816490e-01 -
+         ((half_square - (s * (half_square + r) + twos * 1.90821492927058770002e-10)) - f);
+}
+
+inline vec logarithm(vec x) { return {logarithm(x.low), logarithm(x.high)}; }
 
 } // namespace
 

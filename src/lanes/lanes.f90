@@ -5,25 +5,31 @@
 !> stops at its time, or is left to the event loop of module `motion` where something rare is due. What comes out of a lane does
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
-  use contact_law, only: contact_constant
   use elementary, only: exponential, logarithm
-  use exact_flow, only: flow_t
+  use contact_law, only: contact_kelvin_voigt
+  use effect_law, only: constant_force
+  use exact_flow, only: flow_t, largest_damping_ratio
   use kinds, only: wp
   use layer_transit, only: gauss
   use motion, only: motion_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
+  use motion_state, only: flight_adaptive, mode_slip_minus, mode_slip_plus, state_t, tally_t
+  use oscillator, only: oscillator_t
   use rest, only: chatter_speed
-  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_size_t, c_sizeof
   implicit none
   private
 
-  public :: widest_lanes, prepare_lanes, add_region, occupy_lane, lane_state, take_counts, fly_lanes
+  public :: widest_lanes, lane_sizes, prepare_lanes, add_region, occupy_lane, lane_state, take_counts, fly_lanes
 
   integer, parameter, public :: lane_count = 16
   integer, parameter :: most_harmonics = 64, points = 10, most_regions = 64
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
+
+  real(wp), parameter :: half_pi = acos(-1.0_wp)/2
+  !> Over so many radians of the fastest part Taylor's remainder after four terms is below rounding.
+  real(wp), parameter :: taylor_span = 2.5e-4_wp
 
   !> A harmonic is too near resonance for the periodic response if that grows to more than this multiple of the forcing.
   real(wp), parameter :: largest_amplification = 500
@@ -42,15 +48,25 @@ module lanes
     real(c_double), dimension(points) :: first_from_rest = 0, second_from_rest = 0, first_from_edge = 0, second_from_edge = 0
   end type layer_t
 
+  !> Mirrors `lane_mode` of lane_types.hpp.
+  type, bind(c) :: mode_t
+    real(c_double) :: natural = 0, damped = 0, decay = 0, origin = 0, rest = 0
+    real(c_double) :: barrier = 0, leads_to = 0, lead = 0, guess = 0, close = 0, stride = 0
+    real(c_double) :: bound_periodic = 0, bound_free = 0, sixth_periodic = 0, sixth_free = 0
+    real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
+  end type mode_t
+
   !> Mirrors `lane_machine` of lane_types.hpp.
   type, bind(c) :: machine_t
     real(c_double) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, period = 0
     real(c_double) :: rest = 0, offset = 0, kinetic = 0, break_away = 0
-    real(c_double) :: upper = 0, lower = 0, restitution = 0, slow = 0, domain = 0
+    real(c_double) :: upper = 0, lower = 0, restitution = 0, restitution_law = 0, coefficients(2) = 0, slow = 0, domain = 0
     real(c_double) :: bound_periodic = 0, bound_free = 0, close = 0, stride = 0
     integer(c_int) :: harmonics = 0
     real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
     type(layer_t) :: layer
+    real(c_double) :: several_modes = 0, friction_slope = 0, force_rate = 0
+    type(mode_t) :: mode(0:5)
   end type machine_t
 
   !> Mirrors `lane_region` of lane_types.hpp.
@@ -65,7 +81,7 @@ module lanes
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
       flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
-      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, skip = 0, reach = 0, reach_v = 0, &
+      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, skip = 0, reach = 0, reach_v = 0, &
       reach_a = 0, reach_j = 0, end_s = 0
     integer(c_int) :: regions = 0, complete = 1
     type(region_t) :: region(most_regions)
@@ -90,6 +106,12 @@ module lanes
       integer(c_int) :: width
     end function separatrix_lane_width
 
+    !> Bytes of lane_machine and lane_batch as C++ has them.
+    pure subroutine separatrix_lane_sizes(machine, batch) bind(c)
+      import :: c_size_t
+      integer(c_size_t), intent(out) :: machine, batch
+    end subroutine separatrix_lane_sizes
+
     pure subroutine separatrix_fly_lanes(width, machine, batch) bind(c)
       import :: c_int, lane_batch_t, machine_t
       integer(c_int), value :: width
@@ -105,42 +127,166 @@ contains
     widest_lanes = separatrix_lane_width()
   end function widest_lanes
 
-  !> Lanes for one body with a closed form, no Stribeck layer, no harmonic at resonance, and rigid barriers of constant
-  !> restitution, if its options ask for lanes.
+  !> Whether both sides of the boundary to C++ agree on the sizes of what they share.
+  logical function lane_sizes()
+    integer(c_size_t) :: machine, batch
+    type(machine_t) :: here
+    type(lane_batch_t) :: there
+    call separatrix_lane_sizes(machine, batch)
+    lane_sizes = machine == c_sizeof(here) .and. batch == c_sizeof(there)
+  end function lane_sizes
+
+  !> Lanes for one body whose equation is linear in every mode of slip, or has a thin Stribeck layer, no harmonic at resonance,
+  !> if its options ask for lanes.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
-    real(wp) :: fastest
     flow%width = moving%options%lane_width
-    flow%available = flow%width > 0 .and. moving%exact .and. moving%flow%harmonics <= most_harmonics
-    flow%available = flow%available .and. .not. allocated(moving%pair) .and. .not. moving%machine%contact%soft .and. &
-      moving%machine%contact%kind == contact_constant
+    if (flow%width <= 0 .or. allocated(moving%pair)) return
+    if (moving%exact .and. .not. moving%machine%contact%soft) then
+      call prepare_plain(moving, flow)
+    else
+      call prepare_modes(moving, flow)
+    end if
+  end subroutine prepare_lanes
+
+  !> What does not depend on the mode.
+  pure subroutine set_common(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(inout) :: flow
+    associate (m => flow%machine, law => moving%machine)
+      m%drive_frequency = law%drive_frequency
+      m%period = law%period
+      m%kinetic = law%friction%kinetic/law%mass
+      ! A tie is left to the event loop.
+      m%break_away = (law%friction%break_away + 1e-12_wp*law%force_scale)/law%mass
+      m%restitution = law%contact%restitution
+      m%restitution_law = law%contact%kind
+      m%coefficients = law%contact%coefficients
+      m%slow = chatter_speed(law)
+      m%domain = moving%options%domain
+      m%harmonics = size(law%drive%cosine)
+    end associate
+  end subroutine set_common
+
+  !> One equation for all slips but for the sign of the friction.
+  pure subroutine prepare_plain(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(inout) :: flow
+    real(wp) :: fastest
+    flow%available = moving%flow%harmonics <= most_harmonics
     if (.not. flow%available) return
+    call set_common(moving, flow)
     associate (from => moving%flow, m => flow%machine, law => moving%machine)
       m%natural = from%natural
       m%damped = from%damped
       m%decay = from%decay
-      m%drive_frequency = from%drive_frequency
-      m%period = law%period
       m%rest = from%equilibrium(0)
       m%offset = from%equilibrium(0) - from%equilibrium(1)
-      m%kinetic = law%friction%kinetic/law%mass
-      ! A tie is left to the event loop.
-      m%break_away = (law%friction%break_away + 1e-12_wp*law%force_scale)/law%mass
       m%upper = law%contact%upper
       m%lower = law%contact%lower
-      m%restitution = law%contact%restitution
-      m%slow = chatter_speed(law)
-      m%domain = moving%options%domain
       m%bound_free = from%natural**7/from%damped
       fastest = max(from%natural, from%harmonics*from%drive_frequency)
-      ! Taylor's remainder after four terms is below rounding.
-      m%close = 2.5e-4_wp/fastest
+      m%close = taylor_span/fastest
       m%stride = 0.15_wp*law%period
+      call set_response(m, from%natural, from%decay, from%f_cos, from%f_sin, m%cosine, m%sine, m%bound_periodic, flow%available)
     end associate
-    call set_response(moving%flow, flow)
     if (moving%layer > 0) call set_layer(moving, flow)
-  end subroutine prepare_lanes
+  end subroutine prepare_plain
+
+  !> One equation for each mode of slip: a barrier that is a spring with a damper, friction that depends on the direction or
+  !> linearly on the place.
+  pure subroutine prepare_modes(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(inout) :: flow
+    integer :: place, direction
+    associate (law => moving%machine, m => flow%machine)
+      flow%available = has_linear_modes(law) .and. moving%options%flight /= flight_adaptive
+      if (.not. flow%available) return
+      call set_common(moving, flow)
+      m%several_modes = 1
+      m%natural = law%natural_frequency
+      m%decay = law%friction%damping/(2*law%mass)
+      m%upper = min(law%contact%upper, law%contact%soft_upper)
+      m%lower = max(law%contact%lower, law%contact%soft_lower)
+      m%friction_slope = law%effects%friction_slope
+      m%force_rate = law%natural_frequency**2*law%foot_speed_bound
+      do place = 0, 2
+        if (place > 0 .and. .not. law%contact%soft) cycle
+        if (abs(surface_of(law, place)) >= huge(1.0_wp)) cycle
+        do direction = -1, 1, 2
+          call set_mode(law, place, direction, m, m%mode(2*place + (1 - direction)/2), flow%available)
+        end do
+      end do
+    end associate
+  end subroutine prepare_modes
+
+  !> Whether the force on a slipping body is linear in place and speed, in every mode.
+  pure logical function has_linear_modes(law) result(linear)
+    type(oscillator_t), intent(in) :: law
+    associate (effects => law%effects)
+      linear = law%restoring%is_linear .and. law%restoring%stiffness > 0 .and. .not. law%drive%interval > 0 .and. &
+        law%friction%layer_speed <= 0 .and. size(law%drive%cosine) <= most_harmonics
+      linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic, effects%dahl_stiffness]) > 0)
+      linear = linear .and. .not. (abs(effects%friction_slope) > 0 .and. abs(effects%asymmetric_coulomb) > 0)
+      if (law%contact%soft) linear = linear .and. law%contact%kind == contact_kelvin_voigt
+    end associate
+  end function has_linear_modes
+
+  !> The surface [m] that a body in `place` presses on (0: none, and zero), as in lane_types.hpp.
+  pure real(wp) function surface_of(law, place)
+    type(oscillator_t), intent(in) :: law
+    integer, intent(in) :: place
+    surface_of = 0
+    if (place == 1) surface_of = law%contact%soft_upper
+    if (place == 2) surface_of = law%contact%soft_lower
+  end function surface_of
+
+  !> The mode of a slip in `direction` +1 or -1 in `place`. `available` becomes false where it has no closed form for lanes.
+  pure subroutine set_mode(law, place, direction, m, mode, available)
+    type(oscillator_t), intent(in) :: law
+    integer, intent(in) :: place, direction
+    type(machine_t), intent(in) :: m
+    type(mode_t), intent(inout) :: mode
+    logical, intent(inout) :: available
+    real(wp) :: stiffness, damping, force, pressing, fastest
+    logical :: leaving
+    mode%origin = surface_of(law, place)
+    pressing = merge(1, 0, place > 0)
+    associate (dry => direction*law%friction%kinetic, effects => law%effects)
+      stiffness = law%restoring%stiffness + pressing*law%contact%stiffness + dry*effects%friction_slope
+      damping = law%friction%damping + pressing*law%contact%damping + direction*effects%asymmetric_viscous
+      force = law%restoring%stiffness*(law%restoring%free_length + law%drive%mean - mode%origin) - &
+        dry*(1 + effects%friction_slope*mode%origin)
+      if (effects%present) force = force + constant_force(effects)
+    end associate
+    mode%decay = damping/(2*law%mass)
+    available = available .and. stiffness > 0
+    if (.not. available) return
+    mode%natural = sqrt(stiffness/law%mass)
+    ! A negative damping would let the free part grow beyond its bounds.
+    available = mode%decay >= 0 .and. mode%decay <= largest_damping_ratio*mode%natural
+    if (.not. available) return
+    mode%rest = force/stiffness
+    mode%damped = sqrt((mode%natural - mode%decay)*(mode%natural + mode%decay))
+    leaving = (place == 1 .and. direction < 0) .or. (place == 2 .and. direction > 0)
+    mode%barrier = merge(m%upper, m%lower, direction > 0)
+    mode%leads_to = merge((3 - direction)/2, -1, law%contact%soft)
+    if (place > 0) then
+      mode%barrier = merge(0.0_wp, direction*huge(1.0_wp), leaving)
+      mode%leads_to = 0
+      mode%guess = half_pi/mode%damped
+      if (leaving .and. .not. law%contact%tension) mode%lead = law%contact%damping/law%contact%stiffness
+    end if
+    fastest = max(mode%natural, m%harmonics*m%drive_frequency)
+    mode%close = taylor_span/fastest
+    mode%stride = min(0.15_wp*m%period, 1/mode%natural)
+    mode%bound_free = mode%natural**7/mode%damped
+    mode%sixth_free = mode%natural**6/mode%damped
+    call set_response(m, mode%natural, mode%decay, law%restoring%stiffness/law%mass*law%drive%cosine, &
+                      law%restoring%stiffness/law%mass*law%drive%sine, mode%cosine, mode%sine, mode%bound_periodic, available, &
+                      mode%sixth_periodic)
+  end subroutine set_mode
 
   !> Nodes for the passage through a Stribeck layer, exponent 1 or 2: Gauss's in q = exp(-u/length), u = w/v_s.
   pure subroutine set_layer(moving, flow)
@@ -185,28 +331,29 @@ contains
     end associate
   end subroutine set_layer
 
-  !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin; not available at resonance.
-  pure subroutine set_response(from, flow)
-    type(flow_t), intent(in) :: from
-    type(lane_flow_t), intent(inout) :: flow
+  !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin with bounds on its seventh and sixth derivative; not
+  !> available at resonance.
+  pure subroutine set_response(m, natural, decay, f_cos, f_sin, cosine, sine, seventh, available, sixth)
+    type(machine_t), intent(in) :: m
+    real(wp), intent(in) :: natural, decay, f_cos(:), f_sin(:)
+    real(wp), intent(inout) :: cosine(:), sine(:), seventh
+    logical, intent(inout) :: available
+    real(wp), intent(inout), optional :: sixth
     real(wp) :: w, stiff, drag, size_squared
     integer :: n
-    flow%machine%harmonics = from%harmonics
-    do n = 1, from%harmonics
-      w = n*from%drive_frequency
-      stiff = (from%natural - w)*(from%natural + w)
-      drag = 2*from%decay*w
+    do n = 1, m%harmonics
+      w = n*m%drive_frequency
+      stiff = (natural - w)*(natural + w)
+      drag = 2*decay*w
       size_squared = stiff**2 + drag**2
-      if (size_squared*largest_amplification**2 < from%natural**4) then
-        flow%available = .false.
+      if (size_squared*largest_amplification**2 < natural**4) then
+        available = .false.
         return
       end if
-      associate (cosine => (stiff*from%f_cos(n) - drag*from%f_sin(n))/size_squared, &
-                 sine => (stiff*from%f_sin(n) + drag*from%f_cos(n))/size_squared)
-        flow%machine%cosine(n) = cosine
-        flow%machine%sine(n) = sine
-        flow%machine%bound_periodic = flow%machine%bound_periodic + sqrt(cosine**2 + sine**2)*w**7
-      end associate
+      cosine(n) = (stiff*f_cos(n) - drag*f_sin(n))/size_squared
+      sine(n) = (stiff*f_sin(n) + drag*f_cos(n))/size_squared
+      seventh = seventh + sqrt(cosine(n)**2 + sine(n)**2)*w**7
+      if (present(sixth)) sixth = sixth + sqrt(cosine(n)**2 + sine(n)**2)*w**6
     end do
   end subroutine set_response
 
@@ -238,12 +385,33 @@ contains
     batch%x(lane) = state%x
     batch%v(lane) = state%v
     batch%direction(lane) = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
+    if (flow%machine%several_modes > 0) call find_place(flow%machine, lane, batch)
     if (.not. new) return
     batch%up_span(lane) = 0.4_wp*flow%machine%period
     batch%down_span(lane) = 0.4_wp*flow%machine%period
     batch%up_hits(lane) = 0
     batch%down_hits(lane) = 0
   end subroutine occupy_lane
+
+  !> Free, or pressed on which barrier. A lane is left where the barrier would have to pull, and where friction has changed sign.
+  pure subroutine find_place(m, lane, batch)
+    type(machine_t), intent(in) :: m
+    integer, intent(in) :: lane
+    type(lane_batch_t), intent(inout) :: batch
+    integer :: place
+    associate (x => batch%x(lane), v => batch%v(lane), up => batch%direction(lane) > 0)
+      place = 0
+      if (m%mode(0)%leads_to >= 0) then
+        if (x > m%upper .or. (up .and. x >= m%upper)) place = 1
+        if (x < m%lower .or. (.not. up .and. x <= m%lower)) place = 2
+      end if
+      batch%place(lane) = place
+      if (m%friction_slope*x <= -1) batch%status(lane) = lane_left
+      if (place == 0 .or. (up .eqv. place == 1)) return
+      ! On the way out: modes 3 and 4.
+      if (merge(x - m%upper, m%lower - x, place == 1) < m%mode(2 + place)%lead*abs(v)) batch%status(lane) = lane_left
+    end associate
+  end subroutine find_place
 
   !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop. Not a function: the
   !> copy of its result, just written, would stall every stop.
