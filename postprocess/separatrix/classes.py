@@ -88,10 +88,14 @@ def _text(result: xr.Dataset, field: str, code: int) -> str:
     if field == "attractor":
         return _attractor_text(result, code) if code else "no attractor"
     if field == "period":
-        return f"period {code}" if code else "not periodic"
+        return f"period {code}" if code else "no period known"
     if field == "event_word":
-        return f"word {decode_word(code)}" if code else "no events"
+        return _word_text(decode_word(code)) if code else "no cycle known"
     return flag_text(flag_names(result[field]).get(code, str(code)))
+
+
+def _word_text(word: str) -> str:
+    return f"word {word}" if word.strip(".") else "no events"
 
 
 def _attractor_text(result: xr.Dataset, identity: int) -> str:
@@ -106,7 +110,16 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
     regimes = [flag_text(names.get(int(r), str(r))) for r in np.unique(catalogue["regime"].values[mine])]
     periods = [int(p) for p in np.unique(catalogue["period"].values[mine])]
     if periods == [0]:
-        period = "not periodic"
+        period = _aperiodic_text(catalogue, mine)
     else:
         period = ("period " if len(periods) == 1 else "periods ") + ", ".join(str(p) for p in periods)
     return f"attractor {identity}: {' or '.join(regimes)}, {period}"
+
+
+def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return what is known of entries without a period; older files do not tell."""
+    if "kind" not in catalogue:
+        return "not periodic"
+    names = flag_names(catalogue["kind"])
+    kinds = {names.get(int(kind), "") for kind in np.unique(catalogue["kind"].values[mine])}
+    return "chaotic" if kinds == {"chaotic"} else "not known to be periodic"

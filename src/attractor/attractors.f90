@@ -8,7 +8,7 @@ module attractors
   implicit none
   private
 
-  public :: regime_of, find_capture, find_box, squared_distance, pack_attractor, unpack_attractor
+  public :: regime_of, make_points, find_capture, find_box, squared_distance, pack_attractor, packed_length, unpack_attractor
 
   !> Regimes of a motion; stuck are two bodies that move as one.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
@@ -18,19 +18,24 @@ module attractors
     'non_impact', 'impact', 'sticking', 'mixed', 'chattering', 'at_rest', &
     'stuck']
 
-  !> Longest period in drive periods that is looked for.
-  integer, parameter, public :: longest_period = 64
+  !> What an entry of a catalogue is: a cycle; the positions of rest; a motion that is not periodic, for neighbouring motions
+  !> drift apart; one that is neither known to be periodic nor seen to be anything else, perhaps a long transient.
+  integer, parameter, public :: kind_cycle = 1, kind_rest = 2, kind_chaotic = 3, kind_not_known = 4, last_kind = 4
+  character(len=*), parameter, public :: kind_names(last_kind) = [character(len=9) :: 'cycle', 'rest', 'chaotic', 'not_known']
+
+  !> Longest period in drive periods that is looked for near a return of the motion, and of one that returns to the bit.
+  integer, parameter, public :: longest_period = 64, longest_exact_period = 4096
 
   !> Most coordinates of a point on the section: x and v of one body, up to five of two.
   integer, parameter, public :: most_coordinates = 5
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 
-  integer, parameter :: packed_scalars = 20 + most_coordinates
+  integer, parameter :: packed_scalars = 22 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
   !> Share of its size by which a box of section points is widened on each side.
   real(wp), parameter :: box_margin = 0.05_wp
-  !> Length of a packed attractor.
-  integer, parameter, public :: packed_size = packed_scalars + (most_coordinates + metric_numbers)*longest_period
+  !> Fewest numbers of a packed attractor.
+  integer, parameter, public :: least_packed = packed_scalars
 
   !> What a motion looks like over one of its periods, or over the statistics window.
   type, public :: features_t
@@ -48,8 +53,11 @@ module attractors
     integer :: id = 0
     integer :: period = 0
     logical :: rests = .false.
+    integer :: kind = kind_cycle
     type(features_t) :: features
-    !> Largest modulus of the multipliers.
+    !> Multipliers of a cycle, and the largest of their moduli; of what is not periodic the mean factor in a drive period by which
+    !> neighbouring motions drift apart.
+    complex(wp) :: multipliers(most_coordinates) = 0
     real(wp) :: multiplier = 0
     !> State at the first section point, for the reader: x, v, and those of the driving body of two.
     real(wp) :: section(4) = 0
@@ -59,15 +67,23 @@ module attractors
     !> after the first.
     logical :: any_place = .false.
     !> Section points, canonical one first; for period 0 lower and upper corner of the box.
-    real(wp) :: points(most_coordinates, longest_period) = 0
+    real(wp), allocatable :: points(:, :)
     !> Scales of the coordinates, and for each point the metric in scaled coordinates in which the map contracts.
     real(wp) :: scale(most_coordinates) = 1
-    real(wp) :: metric(metric_numbers, longest_period) = 0
+    real(wp), allocatable :: metric(:, :)
     !> Radius in that metric within which contraction was verified.
     real(wp) :: capture_radius = 0
   end type attractor_t
 
 contains
+
+  !> Room for the section points of an attractor, all 0.
+  pure subroutine make_points(attractor, count)
+    type(attractor_t), intent(inout) :: attractor
+    integer, intent(in) :: count
+    if (allocated(attractor%points)) deallocate (attractor%points, attractor%metric)
+    allocate (attractor%points(most_coordinates, count), attractor%metric(metric_numbers, count), source=0.0_wp)
+  end subroutine make_points
 
   !> Features of what was counted over `periods` drive periods (not necessarily a whole number).
   pure function regime_of(tally, periods) result(features)
@@ -140,14 +156,14 @@ contains
     end do
   end function squared_distance
 
-  !> Index of the motion that is not periodic whose regime is `regime` and whose box of section points holds `point`, or
-  !> of two bodies that go on moving as one, or that has been reached at any place; 0 if none.
+  !> Index of the motion that is not periodic whose box of section points holds `point` and in which the events of `regime`
+  !> occur, first those of the same regime, or of two bodies that go on moving as one, or that has been reached at any place;
+  !> 0 if none.
   pure integer function find_box(catalogue, point, regime) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: regime
-    real(wp) :: margin(most_coordinates)
-    integer :: k, i, n
+    integer :: k, i
     found = 0
     do k = 1, size(catalogue)
       if (catalogue(k)%features%regime /= regime) cycle
@@ -157,48 +173,89 @@ contains
           if (squared_distance(catalogue(k), i, point(2:)) <= catalogue(k)%capture_radius**2) found = k
         end do
       end if
+      if (found == 0 .and. in_box(catalogue(k), point)) found = k
       if (found > 0) return
-      if (catalogue(k)%period /= 0 .or. catalogue(k)%rests) cycle
-      n = catalogue(k)%coordinates
-      margin = box_margin*(catalogue(k)%points(:, 2) - catalogue(k)%points(:, 1))
-      if (all(point(:n) >= catalogue(k)%points(:n, 1) - margin(:n) .and. &
-              point(:n) <= catalogue(k)%points(:n, 2) + margin(:n))) then
-        found = k
-        return
-      end if
+    end do
+    do k = 1, size(catalogue)
+      if (.not. occurs_in(regime, catalogue(k)%features%regime)) cycle
+      if (in_box(catalogue(k), point)) found = k
+      if (found > 0) return
     end do
   end function find_box
 
-  !> An attractor as plain numbers, to be sent between ranks.
+  !> Whether a point on the section lies in the box of a motion that is not periodic.
+  pure logical function in_box(attractor, point)
+    type(attractor_t), intent(in) :: attractor
+    real(wp), intent(in) :: point(:)
+    real(wp) :: margin(most_coordinates)
+    integer :: n
+    in_box = .false.
+    if (attractor%period /= 0 .or. attractor%rests) return
+    n = attractor%coordinates
+    margin = box_margin*(attractor%points(:, 2) - attractor%points(:, 1))
+    in_box = all(point(:n) >= attractor%points(:n, 1) - margin(:n) .and. point(:n) <= attractor%points(:n, 2) + margin(:n))
+  end function in_box
+
+  !> Whether a stretch of a motion of regime `whole` may be of regime `part`: without some of its events.
+  pure logical function occurs_in(part, whole)
+    integer, intent(in) :: part, whole
+    select case (whole)
+    case (regime_chattering)
+      occurs_in = any(part == [regime_non_impact, regime_impact, regime_sticking, regime_mixed])
+    case (regime_mixed)
+      occurs_in = any(part == [regime_non_impact, regime_impact, regime_sticking])
+    case (regime_impact, regime_sticking)
+      occurs_in = part == regime_non_impact
+    case default
+      occurs_in = .false.
+    end select
+  end function occurs_in
+
+  !> Numbers of an attractor that `pack_attractor` packs.
+  pure integer function packed_length(attractor)
+    type(attractor_t), intent(in) :: attractor
+    packed_length = packed_scalars
+    if (allocated(attractor%points)) packed_length = packed_length + packed_per_point*size(attractor%points, 2)
+  end function packed_length
+
+  !> An attractor as plain numbers, to be sent between ranks; the first tells how many.
   pure function pack_attractor(attractor) result(packed)
     type(attractor_t), intent(in) :: attractor
-    real(wp) :: packed(packed_size)
+    real(wp) :: packed(packed_length(attractor))
     associate (f => attractor%features)
-      packed = [real(attractor%id, wp), real(attractor%period, wp), real(attractor%coordinates, wp), &
-        merge(1.0_wp, 0.0_wp, attractor%rests), real(f%regime, wp), real(f%word, wp), &
+      packed(:packed_scalars) = [real(size(packed), wp), real(attractor%id, wp), real(attractor%period, wp), &
+        real(attractor%coordinates, wp), merge(1.0_wp, 0.0_wp, attractor%rests), real(f%regime, wp), real(f%word, wp), &
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
         f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
-        merge(1.0_wp, 0.0_wp, attractor%any_place), attractor%scale, &
-        reshape(attractor%points, [size(attractor%points)]), reshape(attractor%metric, [size(attractor%metric)])]
+        merge(1.0_wp, 0.0_wp, attractor%any_place), real(attractor%kind, wp), attractor%scale, &
+        real(attractor%multipliers), aimag(attractor%multipliers)]
     end associate
+    if (allocated(attractor%points)) packed(packed_scalars + 1:) = &
+      [reshape(attractor%points, [size(attractor%points)]), reshape(attractor%metric, [size(attractor%metric)])]
   end function pack_attractor
 
   !> The inverse of `pack_attractor`.
   pure function unpack_attractor(packed) result(attractor)
-    real(wp), intent(in) :: packed(packed_size)
+    real(wp), intent(in) :: packed(:)
     type(attractor_t) :: attractor
-    integer :: metric
-    attractor%id = nint(packed(1))
-    attractor%period = nint(packed(2))
-    attractor%coordinates = nint(packed(3))
-    attractor%rests = packed(4) > 0
-    attractor%features = features_t(nint(packed(5)), nint(packed(6), int64), packed(7), packed(8), packed(9), packed(10), &
-                                    packed(11), packed(12), packed(13))
-    attractor%multiplier = packed(14)
-    attractor%capture_radius = packed(15)
-    attractor%section = packed(16:19)
-    attractor%any_place = packed(20) > 0
-    attractor%scale = packed(21:packed_scalars)
+    integer :: count, metric
+    attractor%id = nint(packed(2))
+    attractor%period = nint(packed(3))
+    attractor%coordinates = nint(packed(4))
+    attractor%rests = packed(5) > 0
+    attractor%features = features_t(nint(packed(6)), nint(packed(7), int64), packed(8), packed(9), packed(10), packed(11), &
+                                    packed(12), packed(13), packed(14))
+    attractor%multiplier = packed(15)
+    attractor%capture_radius = packed(16)
+    attractor%section = packed(17:20)
+    attractor%any_place = packed(21) > 0
+    attractor%kind = nint(packed(22))
+    attractor%scale = packed(23:22 + most_coordinates)
+    attractor%multipliers = cmplx(packed(23 + most_coordinates:22 + 2*most_coordinates), &
+                                  packed(23 + 2*most_coordinates:packed_scalars), wp)
+    count = (size(packed) - packed_scalars)/packed_per_point
+    if (count == 0) return
+    call make_points(attractor, count)
     metric = packed_scalars + size(attractor%points)
     attractor%points = reshape(packed(packed_scalars + 1:metric), shape(attractor%points))
     attractor%metric = reshape(packed(metric + 1:), shape(attractor%metric))

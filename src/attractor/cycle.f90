@@ -4,21 +4,23 @@
 !> A cycle of the stroboscopic map: Newton's method to its fixed point, its multipliers, and the
 !> neighbourhood that provably (by sampling its rings) contracts into it with the same events.
 module cycle
-  use attractors, only: attractor_t, longest_period, metric_numbers, most_coordinates, squared_distance
+  use attractors, only: attractor_t, longest_period, make_points, metric_numbers, most_coordinates, squared_distance
   use constants, only: two_pi
-  use elementary, only: sine_cosine
+  use elementary, only: exponential, sine_cosine
   use kinds, only: wp
-  use matrices, only: cholesky, solve, spectral_radius
+  use matrices, only: cholesky, eigenvalues, solve, spectral_radius
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, reset_tally, tally_t
-  use strobe, only: advance_strobe_period, features_over, scales_of, section_point, strobe_at, strobe_t
+  use strobe, only: advance_strobe_period, cycle_word, features_over, scales_of, section_point, strobe_at, strobe_t
   implicit none
   private
 
-  public :: map_point, refine_cycle
+  public :: map_point, refine_cycle, scale_of, differentiate, direction, is_linear, free_multipliers
 
-  integer, parameter :: most_newton = 20, most_halvings = 30, directions = 24
-  real(wp), parameter :: rings(4) = [1.0_wp, 0.6_wp, 0.3_wp, 0.1_wp]
+  integer, parameter :: most_newton = 20, most_halvings = 30
+  !> Directions and radii of the starts by which a neighbourhood is tested.
+  integer, parameter, public :: directions = 24
+  real(wp), parameter, public :: rings(4) = [1.0_wp, 0.6_wp, 0.3_wp, 0.1_wp]
 
 contains
 
@@ -74,14 +76,40 @@ contains
       call differentiate(moving, attractor%points(:n, i), attractor%period, attractor%scale(:n), jacobian, found)
       if (.not. found) return
       if (i == 1) attractor%multiplier = spectral_radius(jacobian)
+      if (i == 1) attractor%multipliers(:n) = eigenvalues(jacobian)
       found = attractor%multiplier < 1 - 1e-7_wp
       if (.not. found) return
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
     call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true.)
     attractor%features = features_over(moving, tally, real(attractor%period, wp))
+    if (attractor%period > 1) attractor%features%word = &
+      cycle_word(moving, strobe_at(moving, attractor%points(:n, 1)), attractor%period)
+    if (is_linear(moving) .and. tally%impacts == 0) then
+      attractor%multipliers(:2) = free_multipliers(moving, attractor%period)
+      attractor%multiplier = abs(attractor%multipliers(1))
+    end if
     call verify_neighbourhood(moving, attractor, found)
   end subroutine refine_cycle
+
+  !> Whether the motion of one body between its barriers is that of a linear, damped oscillator with a closed form: then it has
+  !> one motion without impact, which attracts.
+  pure logical function is_linear(moving)
+    type(motion_t), intent(in) :: moving
+    is_linear = moving%exact .and. .not. allocated(moving%pair) .and. moving%layer <= 0 .and. moving%flow%decay > 0 .and. &
+                .not. moving%machine%friction%kinetic > 0 .and. .not. moving%machine%friction%break_away > 0
+  end function is_linear
+
+  !> Multipliers of a motion of such an oscillator over some drive periods: exp((-g +- i w_d) t).
+  pure function free_multipliers(moving, periods) result(multipliers)
+    type(motion_t), intent(in) :: moving
+    integer, intent(in) :: periods
+    complex(wp) :: multipliers(2)
+    real(wp) :: time, sine, cosine
+    time = periods*moving%machine%period
+    call sine_cosine(moving%flow%damped*time, sine, cosine)
+    multipliers = exponential(-moving%flow%decay*time)*cmplx(cosine, abs(sine)*[1.0_wp, -1.0_wp], wp)
+  end function free_multipliers
 
   !> Scales of the coordinates, from half the range of the position.
   pure function scale_of(moving, tally) result(scale)
@@ -185,6 +213,7 @@ contains
     end do
     ok = .true.
     i = minloc(cycle_points(1, :attractor%period), 1)
+    call make_points(attractor, attractor%period)
     attractor%points(:n, :attractor%period) = cshift(cycle_points(:, :attractor%period), i - 1, 2)
   end subroutine order_points
 

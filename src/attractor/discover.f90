@@ -4,13 +4,18 @@
 !> Builds the catalogue of attractors of one machine from a sample of starts. Serial and in a fixed order; frozen
 !> before any trajectory of a map is labelled.
 module discover
-  use attractors, only: attractor_t, features_t, find_box, find_capture, longest_period, most_coordinates
-  use cycle, only: refine_cycle
+  use aperiodic, only: add_aperiodic, watch_long
+  use attractors, only: attractor_t, find_box, find_capture, kind_rest, longest_period, make_points, most_coordinates, &
+    regime_non_impact
+  use contact_law, only: contact_t
+  use cycle, only: is_linear, map_point, refine_cycle
+  use exact_return, only: exact_cycle, returns_t, watch_returns
   use kinds, only: int64, wp
+  use matrices, only: solve
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, features_over, has_section, rest_lasts, scales_of, section_point, &
-    section_state, start_strobe, strobe_t, without_stops
+  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, has_section, rest_lasts, scales_of, &
+    section_point, section_state, start_strobe, strobe_t, without_stops
   use trajectory, only: span_t
   implicit none
   private
@@ -19,13 +24,20 @@ module discover
 
   !> Relative distance at which a section point counts as a return to an earlier one.
   real(wp), parameter :: return_tolerance = 0.05_wp
-  !> Drive periods over which the box of a motion that is not periodic is taken.
-  integer, parameter :: box_periods = 512
+
+  !> What a stretch of a motion showed: its regime and half range [m], whether it was captured, given up, or came back exactly.
+  type :: stretch_t
+    integer :: regime = 0
+    real(wp) :: amplitude = 0
+    logical :: known = .false., ok = .true.
+    type(returns_t) :: returns
+  end type stretch_t
 
 contains
 
   !> Adds to `catalogue` what `starts` (rows x [m], v [m/s], crank angle [rad]) lead to and it does not yet hold.
-  !> Cycles up to `max_period` drive periods are looked for after one, two, four ... durations.
+  !> Cycles up to `max_period` drive periods are looked for after one, two, four ... durations, those that come back to the bit
+  !> whatever their period.
   pure subroutine discover_attractors(moving, span, starts, max_period, catalogue)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
@@ -34,31 +46,102 @@ contains
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     type(strobe_t) :: strobe
     type(attractor_t) :: found
+    type(stretch_t) :: stretch
     real(wp) :: patience
-    integer :: i, regime
-    logical :: known, ok
+    integer :: i
+    logical :: ok
     if (.not. allocated(catalogue)) allocate (catalogue(0))
     if (.not. has_section(moving)) return
     do i = 1, size(starts, 2)
       strobe = start_strobe(moving, starts(:, i))
       patience = span%duration
       do
-        call settle(moving, catalogue, patience, strobe, regime, known, ok)
-        if (known .or. .not. ok) exit
-        call recognise(moving, strobe, min(max_period, longest_period), found, ok)
+        call settle(moving, catalogue, patience, strobe, stretch)
+        if (stretch%known .or. .not. stretch%ok) exit
+        call identify(moving, strobe, stretch%returns, max_period, found, ok)
         if (ok) then
           if (.not. holds(catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
-        if (find_box(catalogue, section_point(moving, strobe), regime) > 0) exit
+        if (find_box(catalogue, section_point(moving, strobe), stretch%regime) > 0) exit
         if (2*patience > span%extension*span%duration) then
-          call add_aperiodic(moving, strobe, catalogue)
+          call look_longer(moving, max_period, stretch, strobe, catalogue)
           exit
         end if
         patience = 2*patience
       end do
     end do
   end subroutine discover_attractors
+
+  !> The end of patience: the motion without impact of a linear oscillator is known without it; any other is watched for a fixed
+  !> number of periods more, and if it has come to no cycle then, it is not periodic, or not known.
+  pure subroutine look_longer(moving, max_period, stretch, strobe, catalogue)
+    type(motion_t), intent(in) :: moving
+    integer, intent(in) :: max_period
+    type(stretch_t), intent(in) :: stretch
+    type(strobe_t), intent(inout) :: strobe
+    type(attractor_t), allocatable, intent(inout) :: catalogue(:)
+    type(attractor_t) :: found, cycle_found
+    type(returns_t) :: returns
+    logical :: known, ok
+    if (is_linear(moving) .and. stretch%regime == regime_non_impact) then
+      call motion_without_impact(moving, found, ok)
+      if (ok) then
+        if (.not. holds(catalogue, found)) catalogue = [catalogue, found]
+        return
+      end if
+    end if
+    call watch_long(moving, catalogue, stretch%amplitude, strobe, found, returns, known, ok)
+    if (known .or. .not. ok) return
+    call identify(moving, strobe, returns, max_period, cycle_found, ok)
+    if (ok) then
+      if (.not. holds(catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
+    else
+      call add_aperiodic(moving, found, catalogue)
+    end if
+  end subroutine look_longer
+
+  !> The one motion without impact of a linear damped oscillator, if it stays clear of the barriers: its map is linear, so that
+  !> the images of three points give it.
+  pure subroutine motion_without_impact(moving, found, ok)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(out) :: found
+    logical, intent(out) :: ok
+    type(motion_t) :: free
+    type(tally_t) :: tally
+    real(wp) :: origin(2), image(2), columns(2, 2), point(2), unit(2), scale(2)
+    integer :: k
+    free = moving
+    free%machine%contact = contact_t()
+    scale = [1.0_wp, moving%machine%drive_frequency]
+    call map_point(free, [0.0_wp, 0.0_wp], 1, origin, tally, ok)
+    do k = 1, 2
+      unit = 0
+      unit(k) = scale(k)
+      if (ok) call map_point(free, unit, 1, image, tally, ok)
+      columns(:, k) = -(image - origin)/scale(k)
+      columns(k, k) = columns(k, k) + 1
+    end do
+    if (ok) call solve(columns, origin, point, ok)
+    if (ok) call map_point(free, point, 1, image, tally, ok)
+    if (ok) ok = tally%x_max < moving%machine%contact%upper .and. tally%x_min > moving%machine%contact%lower
+    if (ok) call refine_cycle(moving, point, 1, found, ok)
+    if (ok) found%section = section_state(moving, found%points(:, 1))
+  end subroutine motion_without_impact
+
+  !> The attractor at which a settled state is, if it is at rest or periodic.
+  pure subroutine identify(moving, strobe, returns, max_period, found, ok)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    type(returns_t), intent(in) :: returns
+    integer, intent(in) :: max_period
+    type(attractor_t), intent(out) :: found
+    logical, intent(out) :: ok
+    ok = .false.
+    if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, strobe, returns%period, found, ok)
+    if (.not. ok) call recognise(moving, strobe, min(max_period, longest_period), found, ok)
+    if (.not. ok .and. returns%period > 0) call exact_cycle(moving, strobe, returns%period, found, ok)
+  end subroutine identify
 
   !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
   pure logical function holds(catalogue, found)
@@ -70,34 +153,33 @@ contains
     end if
   end function holds
 
-  !> Runs for `patience` [s] unless captured before; `regime` is that of the run.
-  pure subroutine settle(moving, catalogue, patience, strobe, regime, known, ok)
+  !> Runs for `patience` [s] unless captured before, or back at a state from which a completed chatter has led to it again.
+  pure subroutine settle(moving, catalogue, patience, strobe, stretch)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: patience
     type(strobe_t), intent(inout) :: strobe
-    integer, intent(out) :: regime
-    logical, intent(out) :: known, ok
+    type(stretch_t), intent(out) :: stretch
     type(tally_t) :: tally
-    type(features_t) :: features
     integer(int64) :: slips
     integer :: i, reason
     logical :: whole
-    known = .false.
-    ok = .true.
-    regime = 0
     call reset_tally(tally, strobe%state, allocated(moving%pair))
     do i = 1, max(1, ceiling(patience/moving%machine%period))
       slips = tally%slips
       whole = .not. strobe%state%time > 0 .and. rest_lasts(moving)
       call advance_strobe_period(moving, strobe, tally, reason)
-      ok = reason == 0
-      if (.not. ok) return
-      known = find_capture(catalogue, section_point(moving, strobe), .not. whole .or. tally%slips > slips) > 0
-      if (known) return
+      stretch%ok = reason == 0
+      if (.not. stretch%ok) return
+      stretch%known = find_capture(catalogue, section_point(moving, strobe), .not. whole .or. tally%slips > slips) > 0
+      if (stretch%known) return
+      call watch_returns(moving, strobe, tally%chatters, stretch%returns)
+      if (stretch%returns%period > 0 .and. stretch%returns%chattered) exit
     end do
-    features = features_over(moving, tally, 1.0_wp)
-    regime = features%regime
+    associate (features => features_over(moving, tally, 1.0_wp))
+      stretch%regime = features%regime
+      stretch%amplitude = features%amplitude
+    end associate
   end subroutine settle
 
   !> The attractor at which a settled state is, if it is at rest or periodic.
@@ -124,11 +206,14 @@ contains
     n = coordinates_of(moving)
     if (tally%slips == 0) then
       found%rests = .true.
+      found%kind = kind_rest
       found%period = 1
+      call make_points(found, 1)
       found%points(:, 1) = points(:, 0)
       found%coordinates = n
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0
+      found%features%word = cycle_word(moving, strobe, 1)
       found%section = section_state(moving, points(:, 0))
       return
     end if
@@ -164,45 +249,6 @@ contains
     end do
     returns = .true.
   end function returns
-
-  !> A motion that is not periodic: the box of its section points and its features over many periods. One of the
-  !> same regime whose box meets it is widened instead.
-  pure subroutine add_aperiodic(moving, strobe, catalogue)
-    type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
-    type(attractor_t), allocatable, intent(inout) :: catalogue(:)
-    type(attractor_t) :: found
-    type(strobe_t) :: later
-    type(tally_t) :: tally
-    integer :: i, k, reason
-    later = strobe
-    tally%wants_v_max = .true.
-    call reset_tally(tally, later%state, allocated(moving%pair))
-    found%coordinates = coordinates_of(moving)
-    found%points(:, 1) = section_point(moving, later)
-    found%points(:, 2) = found%points(:, 1)
-    do i = 1, box_periods
-      call advance_strobe_period(moving, later, tally, reason)
-      if (reason /= 0) return
-      found%points(:, 1) = min(found%points(:, 1), section_point(moving, later))
-      found%points(:, 2) = max(found%points(:, 2), section_point(moving, later))
-    end do
-    found%features = features_over(moving, tally, real(box_periods, wp))
-    found%features%word = 0
-    found%multiplier = 1
-    do k = 1, size(catalogue)
-      if (catalogue(k)%period /= 0 .or. catalogue(k)%features%regime /= found%features%regime) cycle
-      if (all(found%points(:, 1) <= catalogue(k)%points(:, 2) .and. &
-              found%points(:, 2) >= catalogue(k)%points(:, 1))) then
-        catalogue(k)%points(:, 1) = min(catalogue(k)%points(:, 1), found%points(:, 1))
-        catalogue(k)%points(:, 2) = max(catalogue(k)%points(:, 2), found%points(:, 2))
-        catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
-        return
-      end if
-    end do
-    found%section = section_state(moving, found%points(:, 1))
-    catalogue = [catalogue, found]
-  end subroutine add_aperiodic
 
   !> Orders a catalogue by regime, period and position and numbers it from 1.
   pure subroutine sort_attractors(catalogue)

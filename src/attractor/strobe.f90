@@ -9,9 +9,10 @@ module strobe
   use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck
   use contact_law, only: contact_t
   use energy, only: energy_of_body, record_with_book
-  use kinds, only: wp
+  use event_words, only: canonical_word
+  use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: log_t, record_sample, state_t, tally_t
+  use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion
   use pair_flight, only: body_state, driver_of, energy_of
   use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
@@ -20,7 +21,7 @@ module strobe
   private
 
   public :: strobe_t, coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, section_state, &
-    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, rest_lasts, energy_now, record_end
+    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, cycle_word, rest_lasts, energy_now, record_end
 
   !> Coordinates of two bodies.
   integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5
@@ -247,6 +248,26 @@ contains
     features = regime_of(tally, periods)
     if (allocated(moving%pair) .and. features%regime == regime_at_rest) features%regime = regime_stuck
   end function features_over
+
+  !> Event word of the cycle of `periods` drive periods that a state on the section has reached, wherever on it that is.
+  pure integer(int64) function cycle_word(moving, strobe, periods) result(word)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    integer, intent(in) :: periods
+    integer(int64) :: words(periods)
+    type(strobe_t) :: later
+    type(tally_t) :: tally
+    integer :: i, reason
+    later = strobe
+    words = 0
+    do i = 1, periods
+      call reset_tally(tally, later%state, allocated(moving%pair))
+      call advance_strobe_period(moving, later, tally, reason)
+      if (reason /= 0) exit
+      words(i) = tally%word
+    end do
+    word = canonical_word(words)
+  end function cycle_word
 
   !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move
   !> as one in a way that is given.

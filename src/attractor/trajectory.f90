@@ -287,8 +287,12 @@ contains
     else
       outcome%reason = reason_time_over
       box = find_box(catalogue, section_point(moving, course), outcome%window%regime)
-      if (box > 0) outcome%attractor = catalogue(box)%id
       outcome%features = outcome%window
+      if (box > 0) then
+        outcome%attractor = catalogue(box)%id
+        ! The window happened to be without some of the events of a motion that is not periodic.
+        if (catalogue(box)%features%regime /= outcome%window%regime) outcome%features = catalogue(box)%features
+      end if
       outcome%features%word = 0
       outcome%features%grazing_margin = margin
     end if

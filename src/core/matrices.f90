@@ -7,7 +7,7 @@ module matrices
   implicit none
   private
 
-  public :: solve, cholesky, spectral_radius
+  public :: solve, cholesky, spectral_radius, eigenvalues
 
   !> Squarings by which |A^(2^k)|^(1/2^k) comes near the spectral radius.
   integer, parameter :: squarings = 20
@@ -89,5 +89,95 @@ contains
       end do
     end select
   end function spectral_radius
+
+  !> The eigenvalues, largest modulus first, of a conjugate pair the one with positive imaginary part first: in closed form up
+  !> to two rows, else the roots of the characteristic polynomial (Faddeev and LeVerrier) by the simultaneous iteration of
+  !> Weierstrass, which serves few rows.
+  pure function eigenvalues(a) result(values)
+    real(wp), intent(in) :: a(:, :)
+    complex(wp) :: values(size(a, 1)), moved
+    real(wp) :: half_trace, determinant, root
+    integer :: i, k
+    select case (size(a, 1))
+    case (1)
+      values = cmplx(a(1, 1), 0.0_wp, wp)
+    case (2)
+      half_trace = (a(1, 1) + a(2, 2))/2
+      determinant = a(1, 1)*a(2, 2) - a(1, 2)*a(2, 1)
+      root = ((a(1, 1) - a(2, 2))/2)**2 + a(1, 2)*a(2, 1)
+      if (root < 0) then
+        values = cmplx(half_trace, sqrt(-root)*[1.0_wp, -1.0_wp], wp)
+      else
+        ! The smaller one from the product: the difference would cancel.
+        values = cmplx(half_trace + sign(sqrt(root), half_trace), 0.0_wp, wp)
+        if (abs(values(1)) > 0) values(2) = cmplx(determinant/real(values(1)), 0.0_wp, wp)
+      end if
+    case default
+      values = roots(characteristic(a))
+    end select
+    do i = 2, size(values)
+      moved = values(i)
+      do k = i - 1, 1, -1
+        if (.not. precedes(moved, values(k))) exit
+        values(k + 1) = values(k)
+      end do
+      values(k + 1) = moved
+    end do
+  end function eigenvalues
+
+  pure logical function precedes(one, other)
+    complex(wp), intent(in) :: one, other
+    real(wp), parameter :: rounding = 1e-12_wp
+    if (abs(abs(one) - abs(other)) > rounding*abs(one)) then
+      precedes = abs(one) > abs(other)
+    else
+      precedes = aimag(one) > aimag(other)
+    end if
+  end function precedes
+
+  !> Coefficients of det(x - a), that of x^(n-1) first; the leading one is 1.
+  pure function characteristic(a) result(coefficients)
+    real(wp), intent(in) :: a(:, :)
+    real(wp) :: coefficients(size(a, 1)), m(size(a, 1), size(a, 1)), last
+    integer :: i, k
+    m = 0
+    last = 1
+    do k = 1, size(a, 1)
+      do i = 1, size(a, 1)
+        m(i, i) = m(i, i) + last
+      end do
+      m = matmul(a, m)
+      last = -sum([(m(i, i), i=1, size(a, 1))])/k
+      coefficients(k) = last
+    end do
+  end function characteristic
+
+  !> Roots of x^n + c(1) x^(n-1) + ... + c(n), all at once; real ones to rounding have no imaginary part.
+  pure function roots(c) result(z)
+    real(wp), intent(in) :: c(:)
+    complex(wp) :: z(size(c)), value, product_of_differences, step
+    real(wp) :: reach
+    integer, parameter :: most_rounds = 500
+    integer :: i, k, round
+    logical :: moving
+    reach = 1 + maxval(abs(c))
+    z = [(reach**0.5_wp*cmplx(0.4_wp, 0.9_wp, wp)**i, i=1, size(c))]
+    do round = 1, most_rounds
+      moving = .false.
+      do i = 1, size(c)
+        value = 1
+        do k = 1, size(c)
+          value = value*z(i) + c(k)
+        end do
+        product_of_differences = product(z(i) - pack(z, [(k /= i, k=1, size(c))]))
+        if (.not. abs(product_of_differences) > 0) cycle
+        step = value/product_of_differences
+        z(i) = z(i) - step
+        moving = moving .or. abs(step) > 4*epsilon(reach)*abs(z(i))
+      end do
+      if (.not. moving) exit
+    end do
+    where (abs(aimag(z)) <= 1e-9_wp*maxval(abs(z))) z = cmplx(real(z), 0.0_wp, wp)
+  end function roots
 
 end module matrices

@@ -9,6 +9,7 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
+  use catalogue_report, only: attractor_text, not_known_text
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use endings, only: report_reasons
@@ -308,13 +309,11 @@ contains
     if (len(session%command%catalogue) > 0) source = ' taken from '//session%command%catalogue
     call session%journal%line('catalogue', counted(last, 'attractor')//' in '//counted(size(work%catalogues), 'slice')// &
       source, '"attractors": '//to_text(last))
+    if (len(not_known_text(work%catalogues, work%span%extension)) > 0) call session%journal%line('warning', &
+      not_known_text(work%catalogues, work%span%extension))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
-      associate (a => work%catalogues(1)%attractors(k))
-        call session%journal%line('attractor', '  '//to_text(a%id)//': '//trim(regime_names(a%features%regime))// &
-          ', period '//to_text(a%period)//', amplitude '//to_text(a%features%amplitude, 5)//' m, '// &
-          to_text(a%features%impacts_per_period, 4)//' impacts per period, multiplier '//to_text(a%multiplier, 4))
-      end associate
+      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k)))
     end do
   end subroutine report_catalogue
 

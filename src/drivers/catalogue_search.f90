@@ -4,7 +4,7 @@
 !> Builds the catalogues of all slices of a grid on a team: slices are handed out to the ranks, for their costs differ,
 !> then all are known to all. The result does not depend on the number of ranks.
 module catalogue_search
-  use attractors, only: attractor_t, pack_attractor, packed_size, unpack_attractor
+  use attractors, only: attractor_t, least_packed, pack_attractor, packed_length, unpack_attractor
   use basin, only: catalogue_t, label_slices, open_slice, search_starts
   use case_type, only: attractors_t
   use discover, only: discover_attractors, sort_attractors
@@ -26,8 +26,8 @@ module catalogue_search
 
   public :: check_slices, search_catalogues, pack_catalogues, unpack_catalogues
 
-  !> Most attractors of all slices together: their numbers are counted by default integers, as MPI does.
-  integer, parameter :: most_attractors = (huge(1) - modulo(huge(1), packed_size + 2))/(packed_size + 2)
+  !> Most slices: the numbers of their attractors are counted by default integers, as MPI does.
+  integer, parameter :: most_slices = (huge(1) - modulo(huge(1), least_packed + 2))/(least_packed + 2)
 
 contains
 
@@ -35,17 +35,10 @@ contains
   pure subroutine check_slices(grid, error)
     type(grid_t), intent(in) :: grid
     type(error_t), allocatable, intent(out) :: error
-    if (any(grid%start_axis > 0)) call check_attractors(grid%slices, 'slices of starts', error)
+    if (any(grid%start_axis > 0) .and. grid%slices > most_slices) call fail(error, exit_bad_case, &
+      "key 'axis.count': found "//to_text(grid%slices)//' slices of starts over the parameters of the machine, allowed at most '// &
+      to_text(most_slices)//'; divide the map')
   end subroutine check_slices
-
-  pure subroutine check_attractors(number, things, error)
-    integer(int64), intent(in) :: number
-    character(len=*), intent(in) :: things
-    type(error_t), allocatable, intent(out) :: error
-    if (number > most_attractors) call fail(error, exit_bad_case, "key 'axis.count': found "//to_text(number)//' '//things// &
-      ' over the parameters of the machine, allowed at most '//to_text(most_attractors)//'; divide the map')
-  end subroutine check_attractors
-
 
   !> Catalogues of every slice, labelled along the slices; none if no start is an axis (then every point is its own
   !> slice). A second round offers each slice the attractors of its neighbours, so that none is missed
@@ -173,24 +166,34 @@ contains
     integer :: slice
     found = 0
     do slice = 1, size(catalogues)
-      if (searched(slice)) found = found + max(1, size(catalogues(slice)%attractors))
+      if (searched(slice)) found = found + packed_numbers(catalogues(slice)%attractors)
     end do
     call team%sum(found)
-    call check_attractors(found(1), 'attractors', error)
-    if (allocated(error)) return
+    if (found(1) > huge(1)) then
+      call fail(error, exit_bad_case, "key 'axis.count': the attractors of all slices together take "//to_text(found(1))// &
+        ' numbers, allowed at most '//to_text(huge(1))//'; divide the map')
+      return
+    end if
     call team%allgather(pack_catalogues(catalogues, searched), all_values)
     call unpack_catalogues(all_values, catalogues, error)
   end subroutine exchange
+
+  !> Numbers that `pack_catalogues` makes of a slice.
+  pure integer(int64) function packed_numbers(attractors)
+    type(attractor_t), intent(in) :: attractors(:)
+    integer :: i
+    packed_numbers = 2 + sum([(packed_length(attractors(i)), i=1, size(attractors))])
+  end function packed_numbers
 
   !> The catalogues of the slices that were `searched`, as numbers: slice, number of attractors, and these.
   pure function pack_catalogues(catalogues, searched) result(packed)
     type(catalogue_t), intent(in) :: catalogues(:)
     logical, intent(in) :: searched(:)
     real(wp), allocatable :: packed(:)
-    integer :: slice, i, position
+    integer :: slice, i, position, length
     position = 0
     do slice = 1, size(catalogues)
-      if (searched(slice)) position = position + 2 + packed_size*size(catalogues(slice)%attractors)
+      if (searched(slice)) position = position + int(packed_numbers(catalogues(slice)%attractors))
     end do
     allocate (packed(position))
     position = 0
@@ -199,8 +202,9 @@ contains
       packed(position + 1:position + 2) = [real(slice, wp), real(size(catalogues(slice)%attractors), wp)]
       position = position + 2
       do i = 1, size(catalogues(slice)%attractors)
-        packed(position + 1:position + packed_size) = pack_attractor(catalogues(slice)%attractors(i))
-        position = position + packed_size
+        length = packed_length(catalogues(slice)%attractors(i))
+        packed(position + 1:position + length) = pack_attractor(catalogues(slice)%attractors(i))
+        position = position + length
       end do
     end do
   end function pack_catalogues
@@ -211,28 +215,35 @@ contains
     real(wp), intent(in) :: packed(:)
     type(catalogue_t), intent(inout) :: catalogues(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: slice, i, position, count
+    integer :: slice, i, position, count, length
     logical :: whole
     position = 0
+    whole = .true.
     do while (position < size(packed))
       whole = position + 2 <= size(packed)
       if (whole) whole = all(ieee_is_finite(packed(position + 1:position + 2)))
       if (whole) whole = packed(position + 1) >= 1 .and. packed(position + 1) <= size(catalogues) .and. &
-        packed(position + 2) >= 0 .and. packed(position + 2) <= (size(packed) - position - 2)/packed_size
-      if (.not. whole) then
-        call fail(error, exit_io, 'the catalogue of the attractors is damaged')
-        return
-      end if
+        packed(position + 2) >= 0 .and. packed(position + 2) <= (size(packed) - position - 2)/least_packed
+      if (.not. whole) exit
       slice = nint(packed(position + 1))
       count = nint(packed(position + 2))
       position = position + 2
       if (allocated(catalogues(slice)%attractors)) deallocate (catalogues(slice)%attractors)
       allocate (catalogues(slice)%attractors(count))
       do i = 1, count
-        catalogues(slice)%attractors(i) = unpack_attractor(packed(position + 1:position + packed_size))
-        position = position + packed_size
+        whole = position < size(packed)
+        if (whole) whole = packed(position + 1) >= least_packed .and. packed(position + 1) <= size(packed) - position
+        if (.not. whole) exit
+        length = nint(packed(position + 1))
+        catalogues(slice)%attractors(i) = unpack_attractor(packed(position + 1:position + length))
+        position = position + length
       end do
+      if (.not. whole) exit
     end do
+    if (.not. whole) then
+      call fail(error, exit_io, 'the catalogue of the attractors is damaged')
+      return
+    end if
     do slice = 1, size(catalogues)
       if (allocated(catalogues(slice)%attractors)) cycle
       call fail(error, exit_io, 'the catalogue of slice '//to_text(slice - 1)//' is missing')

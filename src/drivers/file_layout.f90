@@ -3,7 +3,7 @@
 
 !> The variables of each kind of file, as docs/file-format.md lists them.
 module file_layout
-  use attractors, only: last_regime, attractor_t, regime_names
+  use attractors, only: attractor_t, kind_cycle, kind_names, last_kind, last_regime, regime_names
   use axis, only: axis_t
   use basin, only: catalogue_t
   use kinds, only: int64, wp
@@ -13,6 +13,7 @@ module file_layout
   use status, only: last_reason, reason_names
   use refinement, only: last_origin, origin_names
   use text, only: join, replace_all
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
@@ -189,6 +190,10 @@ contains
     call add('grazing_margin', type_float64, 'm', 'smallest distance to a barrier missed', &
              all_of_them%features%grazing_margin)
     call add('count', type_int64, '1', 'points of the map captured', real(counts, wp))
+    call schema%add_variable('kind', type_int8, ['entry'], units=coded_unit, group='catalogue', &
+      long_name='whether it is a cycle, rest, chaotic, or nothing of them is known', flag_values=[(i, i=1, last_kind)], &
+      flag_meanings=join(kind_names, ' '), data=real(all_of_them%kind, wp))
+    call add_cycles(schema, all_of_them)
 
   contains
 
@@ -201,6 +206,48 @@ contains
     end subroutine add
 
   end subroutine add_catalogue
+
+  !> All multipliers and all section points of the cycles of a catalogue.
+  subroutine add_cycles(schema, entries)
+    type(schema_t), intent(inout) :: schema
+    type(attractor_t), intent(in) :: entries(:)
+    real(wp), allocatable :: point(:), entry(:), multiplier(:, :, :)
+    real(wp) :: none
+    integer :: i, k, n, coordinates
+    none = ieee_value(1.0_wp, ieee_quiet_nan)
+    coordinates = maxval(entries%coordinates)
+    allocate (multiplier(2, coordinates, size(entries)), source=none)
+    allocate (point(0), entry(0))
+    do i = 1, size(entries)
+      if (entries(i)%kind /= kind_cycle) cycle
+      n = entries(i)%coordinates
+      multiplier(1, :n, i) = real(entries(i)%multipliers(:n))
+      multiplier(2, :n, i) = aimag(entries(i)%multipliers(:n))
+      entry = [entry, [(real(i - 1, wp), k=1, entries(i)%period)]]
+      do k = 1, entries(i)%period
+        point = [point, entries(i)%points(:n, k), spread(none, 1, coordinates - n)]
+      end do
+    end do
+    call schema%add_dimension('coordinate', int(coordinates, int64))
+    call add('multiplier_real', ['entry     ', 'coordinate'], '1', 'real parts of the multipliers', &
+             reshape(multiplier(1, :, :), [size(multiplier)/2]))
+    call add('multiplier_imaginary', ['entry     ', 'coordinate'], '1', 'imaginary parts of the multipliers', &
+             reshape(multiplier(2, :, :), [size(multiplier)/2]))
+    if (size(entry) == 0) return
+    call schema%add_dimension('cycle_point', size(entry, kind=int64))
+    call schema%add_variable('point_entry', type_int32, ['cycle_point'], units='1', group='catalogue', data=entry, &
+                             long_name='entry that has the section point, from 0; its points are in order of time')
+    call add('point', ['cycle_point', 'coordinate '], 'SI', 'section points of the cycles: of one body x and v', point)
+
+  contains
+
+    subroutine add(name, dimensions, units, long_name, data)
+      character(len=*), intent(in) :: name, dimensions(:), units, long_name
+      real(wp), intent(in) :: data(:)
+      call schema%add_variable(name, type_float64, dimensions, units=units, long_name=long_name, data=data, group='catalogue')
+    end subroutine add
+
+  end subroutine add_cycles
 
   !> The events of a trajectory: rows of `data` are time, x, v before, v after.
   subroutine add_events(schema, kinds_of_event, data)

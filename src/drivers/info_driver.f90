@@ -3,7 +3,7 @@
 
 !> `separatrix info`: what is in a file.
 module info_driver
-  use attractors, only: regime_names
+  use attractors, only: kind_chaotic, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t, fail
   use event_words, only: word_text
   use journal, only: json_text
@@ -257,12 +257,20 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: table(:, :)
+    real(wp), allocatable :: table(:, :), entry_kinds(:)
     character(len=:), allocatable :: line
     integer :: i, k
+    integer(int64) :: kind
     if (.not. reader%has('/catalogue/attractor')) return
     call reader%read_columns([('/catalogue/'//catalogue_columns(k), k=1, size(catalogue_columns))], table, error)
+    ! Older files do not have it.
+    if (.not. allocated(error)) then
+      if (reader%has('/catalogue/kind')) call reader%read_values('/catalogue/kind', entry_kinds, error)
+    end if
     if (allocated(error)) return
+    if (allocated(entry_kinds)) then
+      if (size(entry_kinds) /= size(table, 1)) deallocate (entry_kinds)
+    end if
     if (json) body = body//', "catalogue": ['
     if (.not. json) body = body//new_line('a')//'  catalogue (R, L: impact at upper, lower barrier; S: stick; '// &
       'C, D: chatter; . : end of a period):'
@@ -283,6 +291,14 @@ contains
           line = line//to_text(whole(table(i, k)))
         end select
       end do
+      if (allocated(entry_kinds)) then
+        kind = whole(entry_kinds(i))
+        if (kind >= 1 .and. kind <= last_kind) then
+          if (json) line = line//', "kind": '//json_text(trim(kind_names(kind)))
+          if (.not. json .and. kind == kind_chaotic) line = line//', chaotic'
+          if (.not. json .and. kind == kind_not_known) line = line//', not known to be periodic: perhaps a long transient'
+        end if
+      end if
       if (json) body = body//trim(merge(', ', '  ', i > 1))//'{'//line//'}'
       if (.not. json) body = body//new_line('a')//'    '//line
     end do

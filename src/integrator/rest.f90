@@ -21,6 +21,8 @@ module rest
   !> Relative change of the acceleration over what is left of a chatter sequence at which it is
   !> completed analytically.
   real(wp), parameter :: chatter_uniformity = 1e-6_wp
+  !> The same where a bounce no longer rises above the rounding of the position, so that it cannot be flown.
+  real(wp), parameter :: unflown_uniformity = 0.5_wp
   !> A bounce that takes less than this share of a period ends a chatter sequence whose restitution still changes.
   real(wp), parameter :: briefest_bounce = 1e-12_wp
 
@@ -182,9 +184,20 @@ contains
                 + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &
                + layer_change(law, speed)/machine%mass
       if (effects%nonlinear) change = change + effect_change(machine, state, speed, speed**2/(2*out))/machine%mass
-      if (change > chatter_uniformity*back) left = -1
+      if (change > merge(unflown_uniformity, chatter_uniformity, speed**2/(2*out) < position_rounding(machine, state%x))*back) then
+        left = -1
+      end if
     end associate
   end function chatter_time
+
+  !> What rounding does to a position [m] that is the sum of an equilibrium and a response.
+  pure real(wp) function position_rounding(machine, x) result(rounding)
+    type(oscillator_t), intent(in) :: machine
+    real(wp), intent(in) :: x
+    real(wp) :: stiffness
+    stiffness = max(machine%restoring%stiffness, machine%mass*machine%drive_frequency**2)
+    rounding = 4*epsilon(x)*(abs(x) + machine%force_scale/stiffness)
+  end function position_rounding
 
   !> The restitution over what is left of a chatter sequence; huge where it is not yet uniform.
   pure real(wp) function chatter_restitution(machine, speed, bounce) result(k)

@@ -5,7 +5,7 @@
 !> as the maps but in quadruple precision. Doubles go in and out; nothing else is visible outside.
 module reference_library
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
-  use attractors, only: attractor_t, packed_size, unpack_attractor
+  use attractors, only: attractor_t, unpack_attractor
   use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: wp
@@ -33,7 +33,7 @@ contains
     integer(c_int64_t), value :: event_budget
     real(c_double), intent(in) :: numbers(6)
     integer(c_int), value :: attractor_count, points
-    real(c_double), intent(in) :: packed(packed_size, attractor_count), starts(3, points)
+    real(c_double), intent(in) :: packed(*), starts(3, points)
     real(c_double), intent(out) :: results(6, points)
     type(law_choice_t) :: choices(law_count)
     type(motion_t) :: moving
@@ -64,8 +64,10 @@ contains
     call machine_of(choices, options, moving, error)
     if (allocated(error)) return
     allocate (catalogue(attractor_count))
+    position = 0
     do i = 1, attractor_count
-      catalogue(i) = unpack_attractor(real(packed(:, i), wp))
+      catalogue(i) = unpack_attractor(real(packed(position + 1:position + nint(packed(position + 1))), wp))
+      position = position + nint(packed(position + 1))
     end do
     do i = 1, points
       call run_trajectory(moving, catalogue, span, real(starts(1, i), wp), real(starts(2, i), wp), &

@@ -94,8 +94,8 @@ def test_legend_names_what_occurs_with_its_share(tmp_path: Path) -> None:
     regimes = legend_texts(draw(path, "regime"))
     assert regimes == ["unresolved (3.57 %)", "non-impact (71.43 %)", "impact (25.00 %)"]
     assert [text.split(" (")[0] for text in legend_texts(draw(path, "event_word"))] == [
+        "no cycle known",
         "no events",
-        "word .",
         "word R.",
     ]
 

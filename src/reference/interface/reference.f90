@@ -4,7 +4,7 @@
 !> Calls the reference library: the same numerics in quadruple precision.
 module reference
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
-  use attractors, only: attractor_t, pack_attractor, packed_size
+  use attractors, only: attractor_t, pack_attractor
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_table, only: find_law, law_choice_t
@@ -50,9 +50,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer(c_int) :: rows(size(laws)), status
     integer(c_int), allocatable :: lengths(:)
-    real(c_double), allocatable :: values(:), packed(:, :), out(:, :)
+    real(c_double), allocatable :: values(:), packed(:), out(:, :)
     integer :: i, k
-    allocate (lengths(0), values(0), packed(packed_size, size(catalogue)), out(6, size(starts, 2)))
+    allocate (lengths(0), values(0), packed(0), out(6, size(starts, 2)))
     do i = 1, size(laws)
       rows(i) = find_law(trim(laws(i)%family), trim(laws(i)%name))
       do k = 1, size(laws(i)%parameters)
@@ -61,7 +61,7 @@ contains
       end do
     end do
     do i = 1, size(catalogue)
-      packed(:, i) = pack_attractor(catalogue(i))
+      packed = [packed, pack_attractor(catalogue(i))]
     end do
     status = separatrix_reference_run(size(rows), rows, lengths, values, options%flight, &
       int(options%event_budget, int64), [reference_tolerance, options%domain, span%duration, span%window, &

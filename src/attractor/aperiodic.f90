@@ -1,0 +1,141 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A motion that has come to no cycle: the box of its section points, its features over many periods, and whether neighbouring
+!> motions drift apart, without which nobody knows what it is: perhaps a long transient.
+module aperiodic
+  use attractors, only: attractor_t, find_capture, kind_chaotic, kind_not_known, make_points, most_coordinates
+  use elementary, only: exponential, logarithm
+  use exact_return, only: returns_t, watch_returns
+  use kinds, only: int64, wp
+  use motion, only: motion_t
+  use motion_state, only: reset_tally, tally_t
+  use strobe, only: advance_strobe_period, coordinates_of, features_over, rest_lasts, scales_of, section_point, section_state, &
+    strobe_at, strobe_t
+  implicit none
+  private
+
+  public :: watch_long, add_aperiodic
+
+  !> Drive periods over which the motion is watched, and batches of them whose mean drifts are compared.
+  integer, parameter :: box_periods = 512, batches = 16
+  !> Distance of the neighbour, in units of the motion's size, and the smallest that is told from rounding.
+  real(wp), parameter :: neighbour = 1e-8_wp, rounding = 1e-15_wp
+  !> The mean drift counts as positive if it is so many of its standard errors.
+  real(wp), parameter :: errors_apart = 3
+
+contains
+
+  !> Watches a motion of half range `amplitude` [m] over many drive periods. `known` if it was captured by the catalogue
+  !> meanwhile, `ok` unless it had to be given up; else `found` describes it, and `returns` tells of its returns.
+  pure subroutine watch_long(moving, catalogue, amplitude, strobe, found, returns, known, ok)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: amplitude
+    type(strobe_t), intent(inout) :: strobe
+    type(attractor_t), intent(out) :: found
+    type(returns_t), intent(out) :: returns
+    logical, intent(out) :: known, ok
+    type(tally_t) :: tally
+    real(wp) :: before(most_coordinates), direction(most_coordinates), drift(box_periods), scale(most_coordinates)
+    integer(int64) :: slips
+    integer :: i, reason
+    known = .false.
+    tally%wants_v_max = .true.
+    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    found%coordinates = coordinates_of(moving)
+    call make_points(found, 2)
+    before = section_point(moving, strobe)
+    found%points = spread(before, 2, 2)
+    scale = max(scales_of(moving, amplitude), tiny(amplitude))
+    direction = 0
+    do i = 1, box_periods
+      slips = tally%slips
+      call advance_strobe_period(moving, strobe, tally, reason)
+      ok = reason == 0
+      if (.not. ok) return
+      associate (now => section_point(moving, strobe))
+        known = find_capture(catalogue, now, tally%slips > slips .or. .not. rest_lasts(moving)) > 0
+        if (known) return
+        found%points(:, 1) = min(found%points(:, 1), now)
+        found%points(:, 2) = max(found%points(:, 2), now)
+        call follow_neighbour(moving, found%coordinates, scale, before, now, direction, drift(i))
+        before = now
+      end associate
+      call watch_returns(moving, strobe, tally%chatters, returns)
+    end do
+    found%features = features_over(moving, tally, real(box_periods, wp))
+    found%features%word = 0
+    call judge_drift(drift, found)
+  end subroutine watch_long
+
+  !> Logarithm of the factor by which the distance to a neighbour in `direction` (0: any) grows from the section point `before` to
+  !> the next, `now`; the direction becomes that of the neighbour there.
+  pure subroutine follow_neighbour(moving, n, scale, before, now, direction, drift)
+    type(motion_t), intent(in) :: moving
+    integer, intent(in) :: n
+    real(wp), intent(in) :: scale(:), before(:), now(:)
+    real(wp), intent(inout) :: direction(:)
+    real(wp), intent(out) :: drift
+    type(strobe_t) :: twin
+    type(tally_t) :: unused
+    real(wp) :: start(n), reached(most_coordinates), distance
+    integer :: reason
+    if (.not. norm2(direction(:n)) > 0) direction(:n) = sqrt(1/real(n, wp))
+    start = before(:n) + neighbour*scale(:n)*direction(:n)
+    if (start(1) > moving%machine%contact%upper .or. start(1) < moving%machine%contact%lower) then
+      start = before(:n) - neighbour*scale(:n)*direction(:n)
+    end if
+    twin = strobe_at(moving, start)
+    call advance_strobe_period(moving, twin, unused, reason)
+    reached = section_point(moving, twin)
+    direction = 0
+    direction(:n) = (reached(:n) - now(:n))/scale(:n)
+    distance = norm2(direction(:n))
+    drift = logarithm(max(distance, rounding)/neighbour)
+    if (distance > rounding) then
+      direction = direction/distance
+    else
+      direction = 0
+    end if
+  end subroutine follow_neighbour
+
+  !> Chaotic if the mean drift is surely positive.
+  pure subroutine judge_drift(drift, found)
+    real(wp), intent(in) :: drift(:)
+    type(attractor_t), intent(inout) :: found
+    real(wp) :: means(batches), mean, error
+    integer :: length, i
+    length = size(drift)/batches
+    means = [(sum(drift((i - 1)*length + 1:i*length))/length, i=1, batches)]
+    mean = sum(means)/batches
+    error = sqrt(sum((means - mean)**2)/(batches*(batches - 1)))
+    found%multiplier = exponential(mean)
+    found%kind = merge(kind_chaotic, kind_not_known, mean > errors_apart*error)
+  end subroutine judge_drift
+
+  !> Adds what `watch_long` found to a catalogue. One of the same regime whose box meets it is widened instead.
+  pure subroutine add_aperiodic(moving, found, catalogue)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: found
+    type(attractor_t), allocatable, intent(inout) :: catalogue(:)
+    integer :: k
+    do k = 1, size(catalogue)
+      if (catalogue(k)%period /= 0 .or. catalogue(k)%features%regime /= found%features%regime) cycle
+      if (all(found%points(:, 1) <= catalogue(k)%points(:, 2) .and. &
+              found%points(:, 2) >= catalogue(k)%points(:, 1))) then
+        ! What is not known does not widen what is.
+        if (found%kind == kind_not_known .and. catalogue(k)%kind == kind_chaotic) return
+        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) catalogue(k) = found
+        catalogue(k)%points(:, 1) = min(catalogue(k)%points(:, 1), found%points(:, 1))
+        catalogue(k)%points(:, 2) = max(catalogue(k)%points(:, 2), found%points(:, 2))
+        catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
+        return
+      end if
+    end do
+    catalogue = [catalogue, found]
+    k = size(catalogue)
+    catalogue(k)%section = section_state(moving, found%points(:, 1))
+  end subroutine add_aperiodic
+
+end module aperiodic

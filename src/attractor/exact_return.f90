@@ -1,0 +1,196 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> States on the section that come back to the last bit. A completed chatter that is followed by rest forgets the motion before
+!> it: the section map has rank 0 there, what follows is one finite sequence, and a return of it proves a cycle, whatever its
+!> period. Near such a cycle the numbers of impacts differ from start to start, so that `refine_cycle` cannot verify it.
+module exact_return
+  use attractors, only: attractor_t, longest_exact_period, make_points, most_coordinates
+  use cycle, only: differentiate, direction, directions, rings, scale_of
+  use kinds, only: int64, wp
+  use matrices, only: eigenvalues
+  use motion, only: motion_t
+  use motion_state, only: reset_tally, tally_t
+  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, section_point, section_state, strobe_at, &
+    strobe_t
+  implicit none
+  private
+
+  public :: watch_returns, exact_cycle
+
+  !> Distance, in units of the motion's size, at which states of an exact cycle count as the same: rounding may carry it
+  !> through neighbouring numbers, several rounds of which come back exactly.
+  real(wp), parameter :: same_state = 1e-9_wp
+  !> Largest neighbourhood that is tried.
+  real(wp), parameter :: largest_radius = 0.02_wp
+  integer, parameter :: most_halvings = 20
+
+  !> Brent's search for a return: the state is compared with the one kept, which is replaced after 1, 2, 4, ... periods.
+  type, public :: returns_t
+    real(wp) :: kept(most_coordinates + 1) = huge(1.0_wp)
+    integer :: kept_mode = 0, since = 0, stride = 1
+    !> Chatters when the state was kept.
+    integer(int64) :: kept_chatters = 0
+    !> Drive periods of the last exact return (0 = none), and whether it led through a completed chatter.
+    integer :: period = 0
+    logical :: chattered = .false.
+  end type returns_t
+
+contains
+
+  !> Notes the state on the next section; `chatters` is a running count.
+  pure subroutine watch_returns(moving, strobe, chatters, returns)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    integer(int64), intent(in) :: chatters
+    type(returns_t), intent(inout) :: returns
+    real(wp) :: now(most_coordinates + 1)
+    now = [section_point(moving, strobe), strobe%state%z]
+    returns%since = returns%since + 1
+    if (strobe%state%mode == returns%kept_mode .and. .not. any(abs(now - returns%kept) > 0)) then
+      returns%period = returns%since
+      returns%chattered = chatters > returns%kept_chatters
+    else if (returns%since < returns%stride) then
+      return
+    else
+      returns%stride = 2*returns%stride
+    end if
+    returns%kept = now
+    returns%kept_mode = strobe%state%mode
+    returns%kept_chatters = chatters
+    returns%since = 0
+  end subroutine watch_returns
+
+  !> The attractor of a state on the section that comes back after `period` drive periods. `found` is false if it is not
+  !> stable, or returned by chance. A cycle with a completed chatter has the multipliers 0.
+  pure subroutine exact_cycle(moving, strobe, period, attractor, found)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    integer, intent(in) :: period
+    type(attractor_t), intent(out) :: attractor
+    logical, intent(out) :: found
+    real(wp), allocatable :: points(:, :), jacobian(:, :)
+    type(strobe_t) :: first
+    type(tally_t) :: tally
+    integer :: n, i, start, reason
+    found = .false.
+    if (period > longest_exact_period) return
+    n = coordinates_of(moving)
+    attractor%coordinates = n
+    allocate (points(most_coordinates, 0:period), jacobian(n, n))
+    call collect(moving, strobe, period, points, tally, found)
+    if (.not. found) return
+    attractor%scale = scale_of(moving, tally)
+    attractor%period = smallest_period(points(:n, 0:period - 1), attractor%scale(:n))
+    start = minloc(points(1, :attractor%period - 1), 1) - 1
+    first = strobe
+    do i = 1, start
+      call advance_strobe_period(moving, first, tally, reason)
+    end do
+    call make_points(attractor, attractor%period)
+    attractor%metric([(i*(i + 1)/2, i=1, n)], :) = 1
+    tally%wants_v_max = .true.
+    call collect(moving, first, attractor%period, points(:, :attractor%period), tally, found)
+    attractor%points = points(:, :attractor%period - 1)
+    attractor%features = features_over(moving, tally, real(attractor%period, wp))
+    attractor%features%word = cycle_word(moving, first, attractor%period)
+    attractor%section = section_state(moving, attractor%points(:, 1))
+    if (tally%chatters == 0) then
+      call differentiate(moving, attractor%points(:n, 1), attractor%period, attractor%scale(:n), jacobian, found)
+      if (.not. found) return
+      attractor%multipliers(:n) = eigenvalues(jacobian)
+      attractor%multiplier = abs(attractor%multipliers(1))
+    end if
+    attractor%capture_radius = largest_radius
+    do i = 1, most_halvings
+      found = all_follow(moving, attractor)
+      if (found) return
+      attractor%capture_radius = attractor%capture_radius/2
+    end do
+    ! Too near the edge of another course of events to tell: captured is what is on the cycle.
+    attractor%capture_radius = same_state
+    found = attractor%multiplier < 1
+  end subroutine exact_cycle
+
+  !> Section points of `periods` drive periods from a state on, and what happened meanwhile.
+  pure subroutine collect(moving, strobe, periods, points, tally, ok)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    integer, intent(in) :: periods
+    real(wp), intent(out) :: points(:, 0:)
+    type(tally_t), intent(inout) :: tally
+    logical, intent(out) :: ok
+    type(strobe_t) :: later
+    integer :: i, reason
+    later = strobe
+    call reset_tally(tally, later%state, allocated(moving%pair))
+    points(:, 0) = section_point(moving, later)
+    do i = 1, periods
+      call advance_strobe_period(moving, later, tally, reason)
+      ok = reason == 0
+      if (.not. ok) return
+      points(:, i) = section_point(moving, later)
+    end do
+  end subroutine collect
+
+  !> The smallest part of a closed round of section points after which all of them are the same but for rounding.
+  pure integer function smallest_period(points, scale) result(period)
+    real(wp), intent(in) :: points(:, 0:), scale(:)
+    integer :: i, whole
+    whole = size(points, 2)
+    do period = 1, whole - 1
+      if (modulo(whole, period) > 0) cycle
+      do i = 0, whole - 1
+        if (norm2((points(:, modulo(i + period, whole)) - points(:, i))/scale) > same_state) exit
+      end do
+      if (i == whole) return
+    end do
+    period = whole
+  end function smallest_period
+
+  !> Whether every sampled start on rings around every point of the cycle is on it within one round, or nearer by a quarter
+  !> after it.
+  pure logical function all_follow(moving, attractor)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: attractor
+    real(wp) :: point(attractor%coordinates)
+    integer :: i, ring, k, n
+    n = attractor%coordinates
+    all_follow = .false.
+    do i = 1, attractor%period
+      do ring = 1, size(rings)
+        do k = 1, directions
+          point = attractor%points(:n, i) + attractor%scale(:n)*rings(ring)*attractor%capture_radius*direction(k, n)
+          if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
+          if (.not. follows(moving, attractor, i, point, rings(ring)*attractor%capture_radius)) return
+        end do
+      end do
+    end do
+    all_follow = .true.
+  end function all_follow
+
+  pure logical function follows(moving, attractor, i, point, radius)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: attractor
+    integer, intent(in) :: i
+    real(wp), intent(in) :: point(:), radius
+    type(strobe_t) :: strobe
+    type(tally_t) :: tally
+    real(wp) :: reached(most_coordinates), distance
+    integer :: k, n, reason
+    follows = .false.
+    n = attractor%coordinates
+    strobe = strobe_at(moving, point)
+    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    do k = 1, attractor%period
+      call advance_strobe_period(moving, strobe, tally, reason)
+      if (reason /= 0) return
+      reached = section_point(moving, strobe)
+      distance = norm2((reached(:n) - attractor%points(:n, 1 + modulo(i + k - 1, attractor%period)))/attractor%scale(:n))
+      follows = distance <= same_state
+      if (follows) return
+    end do
+    follows = distance <= 0.75_wp*radius
+  end function follows
+
+end module exact_return
