@@ -10,11 +10,14 @@ module jointed_motion
     slide_ends, slides_down, slides_up
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, most_joints
   use jointed_state, only: free_force, is_held, joint_motion, jointed_state_t, key_of, turning_at
-  use kinds, only: int64, wp
+  use jointed_log, only: book_change, log_event, log_flight
+  use kinds, only: wp
   use linear_flight, only: fly_linear, watch_t
   use mode_choice, only: accelerations_of, choose_mode, project
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
-  use motion_state, only: append_word, options_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+  use motion_state, only: append_word, event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
+    event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
+    event_turning_point, log_t, options_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed
   implicit none
@@ -152,12 +155,14 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
   !> up (codes of module `status`).
-  pure subroutine advance_jointed(moving, state, time_end, tally, reason)
+  pure subroutine advance_jointed(moving, state, time_end, tally, reason, log)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    type(jointed_state_t) :: start
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
     type(path_t) :: path
@@ -181,11 +186,14 @@ contains
         before = state%time
         key = key_of(machine, state%phase)
         call note_slip(moving, state, key, tally)
+        start = state
         if (ready(moving, key) > 0) then
           call fly_linear(machine, moving%flows(ready(moving, key)), state, time_end, list, count_guards, fallen, path, watch)
+          if (present(log)) call log_flight(machine, moving%flows(ready(moving, key)), path, start, state%time - before, log)
         else
           if (spare%key /= key) call build_flow(machine, key, .false., spare)
           call fly_linear(machine, spare, state, time_end, list, count_guards, fallen, path, watch)
+          if (present(log)) call log_flight(machine, spare, path, start, state%time - before, log)
         end if
         tally%steps = tally%steps + watch%evaluations
         watch%evaluations = 0
@@ -193,7 +201,9 @@ contains
         stalls = merge(0, stalls + 1, state%time > before)
         burst = merge(burst, 0, state%time - before < burst_gap*machine%period)
         if (any(fallen)) then
+          start = state
           call transition(moving, state, list, fallen, stalls >= most_stalls, burst, tally, ok)
+          if (present(log) .and. ok) call log_transition(moving, start, state, list, fallen, log)
           if (.not. ok) reason = reason_step_failed
           if (stalls >= most_stalls) then
             stalls = 0
@@ -210,6 +220,56 @@ contains
     end associate
   end subroutine advance_jointed
 
+  !> Events and losses of a transition.
+  pure subroutine log_transition(moving, before, after, list, fallen, log)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: before, after
+    type(joint_guard_t), intent(in) :: list(:)
+    logical, intent(in) :: fallen(:)
+    type(log_t), intent(inout) :: log
+    type(jointed_state_t) :: struck
+    logical :: told(most_joints)
+    integer :: g, j, kind
+    associate (machine => moving%machine)
+      struck = after
+      struck%time = before%time
+      call book_change(machine, before, struck, log)
+      told = .false.
+      do g = 1, size(list)
+        if (.not. fallen(g)) cycle
+        j = list(g)%joint
+        select case (list(g)%meaning)
+        case (slide_ends)
+          kind = merge(event_stick, event_turning_point, after%phase(j) == 0)
+        case (slides_up, slides_down)
+          kind = event_release
+        case (meets_upper, meets_lower)
+          kind = merge(event_impact_upper, event_impact_lower, list(g)%meaning == meets_upper)
+          if (machine%joints(j)%kind == joint_soft) then
+            kind = merge(event_touch_upper, event_touch_lower, list(g)%meaning == meets_upper)
+          end if
+        case (lets_go)
+          kind = event_barrier_release
+        case (leaves)
+          kind = event_separation
+        case default
+          cycle
+        end select
+        told(j) = .true.
+        call log_event(machine, kind, j, before, struck, log)
+        if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0) then
+          kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
+          call log_event(machine, kind, j, before, struck, log)
+        end if
+      end do
+      ! What an impact or a cascade does to other joints.
+      do j = 1, size(machine%joints)
+        if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (before%phase(j) == 0 .eqv. after%phase(j) == 0)) cycle
+        call log_event(machine, merge(event_stick, event_release, after%phase(j) == 0), j, before, struck, log)
+      end do
+    end associate
+  end subroutine log_transition
+
   !> Number of the flow that is ready for a mode, 0 if there is none.
   pure integer function ready(moving, key)
     type(jointed_motion_t), intent(in) :: moving
@@ -222,15 +282,20 @@ contains
   end function ready
 
   !> Moves to the next section and starts the clock anew.
-  pure subroutine advance_jointed_period(moving, state, tally, reason)
+  pure subroutine advance_jointed_period(moving, state, tally, reason, log)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
     integer :: j
-    call advance_jointed(moving, state, moving%machine%period, tally, reason)
+    call advance_jointed(moving, state, moving%machine%period, tally, reason, log)
     if (reason /= 0) return
     state%time = 0
+    if (present(log)) then
+      log%origin = log%origin + moving%machine%period
+      if (.not. allocated(log%instants)) log%next_sample = 0
+    end if
     do j = 1, size(moving%machine%joints)
       ! Sliders are placed on surfaces that run on.
       if (moving%machine%joints(j)%kind == joint_elastic) state%slider(j) = &
