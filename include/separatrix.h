@@ -31,6 +31,12 @@ int separatrix_model_read(const char *path, separatrix_model **model, char *mess
 int separatrix_model_from_text(const char *text, const char *directory, separatrix_model **model,
                                char *message, size_t message_size);
 
+/* The same with settings on top, each "key.path=value" with a TOML value, as `--set` of the program takes
+ * them; `name` stands for the file in messages, and its folder is where files that the case names are looked
+ * for. */
+int separatrix_model_with(const char *text, const char *name, int setting_count, const char *const *settings,
+                          separatrix_model **model, char *message, size_t message_size);
+
 /* Frees a model; NULL is allowed. */
 void separatrix_model_free(separatrix_model *model);
 
@@ -101,6 +107,102 @@ int separatrix_segments(const separatrix_model *model, int chosen_count, const i
                         int *impacts, int *steady, int *reason, int impact_capacity, int *impact_count,
                         int *impact_segment, double *impact, char *message, size_t message_size);
 
+/* Numbers of a sample, an event and the summary of a trajectory, and of an attractor and a label. */
+enum {
+  separatrix_sample_numbers = 13,
+  separatrix_event_numbers = 7,
+  separatrix_summary_numbers = 25,
+  separatrix_attractor_numbers = 21,
+  separatrix_label_numbers = 13,
+  separatrix_section_points = 64,
+  separatrix_section_coordinates = 16
+};
+
+/* Flies one motion with every event, as the command `trajectory` does and with its bits, and to the end as
+ * the command `points` does and with its bits. (The two differ by rounding where the machine flies in lanes.)
+ *
+ * In:
+ *   start [3]
+ *     x [m], v [m/s], crank angle [rad]
+ *   duration
+ *     seconds; 0: that of the case
+ *   samples_per_period
+ *     0: that of the case; negative: no samples
+ *   sample_capacity, event_capacity
+ *     room for samples and events
+ *
+ * Out:
+ *   sample_count, event_count
+ *     how many there are; those beyond the room are left out
+ *   sample [sample_capacity][13]
+ *     time [s], x [m], v [m/s], mode (1 slip_plus, 2 slip_minus, 3 stick, 4 upper_barrier, 5 lower_barrier,
+ *     6 held); position of the foot of the spring [m] and not a number, of two bodies position [m] and
+ * velocity [m/s] of the driving one; force of soft barriers on the body [N]; energy [J], kinetic energy [J],
+ * energy lost since the start to friction, damping and contacts [J], put in by the drive [J] event
+ * [event_capacity][7] kind (docs/file-format.md), time [s], x [m], v before and after [m/s], of two bodies
+ * position and velocity of the driving one, otherwise not numbers summary [25] as `points`: x [m], v [m/s],
+ * number of impacts, speed before the last [m/s], regime, reason (the codes of docs/file-format.md). As
+ * `trajectory`, over the window at the end: amplitude [m], largest and smallest x [m], largest v [m/s],
+ * impacts per drive period, mean impact speed [m/s]. The machine: drive period [s], upper and lower barrier
+ * [m] (infinite: none), 1 if they are soft, 1 if it has two bodies. Reason of the `trajectory`; its energy
+ * [J] at the start, lost to friction, damping and contacts, put in; if it came to its end, energy at the end
+ * and what is missing in this book, otherwise not numbers */
+int separatrix_trajectory(const separatrix_model *model, int chosen_count, const int *chosen,
+                          const double *values, const double *start, double duration, int samples_per_period,
+                          int sample_capacity, int *sample_count, double *sample, int event_capacity,
+                          int *event_count, double *event, double *summary, char *message,
+                          size_t message_size);
+
+/* A machine and its attractors, as the command `basin` has them for a slice of a map. */
+typedef struct separatrix_catalogue separatrix_catalogue;
+
+/* The machine of a model with other values, without attractors yet. On success *catalogue must be given to
+ * separatrix_catalogue_free at the end, otherwise it is NULL. The model may be freed before. */
+int separatrix_catalogue_open(const separatrix_model *model, int chosen_count, const int *chosen,
+                              const double *values, separatrix_catalogue **catalogue, char *message,
+                              size_t message_size);
+
+/* Frees a catalogue; NULL is allowed. */
+void separatrix_catalogue_free(separatrix_catalogue *catalogue);
+
+/* Adds the attractors to which starts lead, then orders and numbers all from 1. start_count negative: the
+ * sample
+ * ([attractors]) that `basin` takes over the axes of the case; otherwise start [start_count][3], as above.
+ * Starts beyond a barrier are passed over. `stop`, if not NULL, is looked at between starts: not 0 ends the
+ * search with code 75. While it runs nothing else may use the catalogue. */
+int separatrix_catalogue_search(separatrix_catalogue *catalogue, int start_count, const double *start,
+                                const int *stop, char *message, size_t message_size);
+
+/* Number of attractors. */
+int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
+
+/* Attractor `index`, from 0.
+ *   numbers [21]
+ *     label, regime, period in drive periods (0: not periodic), event word; x [m] and v [m/s] on the section
+ * at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude [m],
+ * largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s], grazing
+ * margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be anywhere between
+ * stops, number of coordinates on the section, 1 if the machine has two bodies points [64][16], point_count
+ *     points on the section, of one body x [m] and v [m/s]; of a motion that is not periodic the lower and
+ * the upper corner of their box */
+int separatrix_catalogue_attractor(const separatrix_catalogue *catalogue, int index, double *numbers,
+                                   int *point_count, double *points, char *message, size_t message_size);
+
+/* Numbers the attractors of the slices of a map so that a branch keeps its label, as `basin` does: catalogues
+ * [count] over shape [axis_count] values of the parameters, the last axis fastest. */
+int separatrix_catalogue_number(int count, separatrix_catalogue *const *catalogues, int axis_count,
+                                const int *shape, char *message, size_t message_size);
+
+/* Where starts end up: values [start_count][13] = regime, attractor (0: none), reason, period, event word,
+ * impacts per drive period, mean impact speed [m/s], amplitude [m], largest and smallest x [m], largest v
+ * [m/s], settle time [s] (not a number: not captured), grazing margin [m] (infinite: no barrier missed), with
+ * the bits of `basin` before they are rounded to the types of its file. All are 0 where the start is not
+ * finite or beyond a barrier. `stop`, if not NULL, is looked at between some trajectories and the next: not 0
+ * ends the work with code 75, and the values that were not computed are 0. Several threads may call it with
+ * one catalogue. */
+int separatrix_labels(const separatrix_catalogue *catalogue, int start_count, const double *start,
+                      double *values, const int *stop, char *message, size_t message_size);
+
 /* The resolved case with other values in the parameters chosen[chosen_count]: an ordinary case file. Writes
  * at most text_size characters, the null character included, and the length of the whole text without it. */
 int separatrix_model_text(const separatrix_model *model, int chosen_count, const int *chosen,
@@ -113,6 +215,24 @@ int separatrix_model_text(const separatrix_model *model, int chosen_count, const
 int separatrix_effect_parameter(int index, char *effect, size_t effect_size, char *meaning,
                                 size_t meaning_size, char *parameter, size_t parameter_size, char *unit,
                                 size_t unit_size, double *numbers, char *message, size_t message_size);
+
+/* Row `index` of the effects, one per effect: its name; the function that it is one shape of, and over what;
+ * what it changes: "flight", "barrier" or "sensor"; its parameters in which what it does is linear near zero;
+ * those that are positive sizes; the law or parameter that a machine must have for it. Lists are parted by
+ * blanks. Code 64 beyond the last row. */
+int separatrix_effect(int index, char *name, size_t name_size, char *family, size_t family_size, char *acts,
+                      size_t acts_size, char *amplitudes, size_t amplitudes_size, char *sizes,
+                      size_t sizes_size, char *needs, size_t needs_size, char *message, size_t message_size);
+
+/* Row `index` of the pairs of effects that can be the same motion, and when. Code 64 beyond the last row. */
+int separatrix_effect_confusion(int index, char *one, size_t one_size, char *other, size_t other_size,
+                                char *reason, size_t reason_size, char *message, size_t message_size);
+
+/* The model with an effect added, `count` of whose parameters are given as keys[count] and values[count]; the
+ * others take their defaults. Code 65 if that makes no valid case. To be freed like any other. */
+int separatrix_model_with_effect(const separatrix_model *model, const char *effect, int count,
+                                 const char *const *keys, const double *values, separatrix_model **extended,
+                                 char *message, size_t message_size);
 
 #ifdef __cplusplus
 }

@@ -3,15 +3,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
 # Installs what Separatrix needs on Debian or Ubuntu and makes .venv with the Python packages.
-# Running it again is quick: it does only what is missing.
+# Running it again is quick: it does only what is missing. With --browser also what the browser tests of the viewer need:
+# Chromium, and Playwright to drive it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+browser=false
+case "${1:-}" in
+  --browser) browser=true ;;
+  "") ;;
+  *)
+    echo "usage: bootstrap.sh [--browser]" >&2
+    exit 64
+    ;;
+esac
 
 packages=(
   gfortran gcc g++ cmake ninja-build git
   openmpi-bin libopenmpi-dev libhdf5-openmpi-dev libhdf5-dev hdf5-tools
   libgsl-dev libtoml11-dev zlib1g-dev python3-venv
 )
+
+if $browser && ! command -v chromium > /dev/null; then
+  packages+=(chromium)
+fi
 
 fail() {
   echo "bootstrap: $*" >&2
@@ -62,10 +77,7 @@ find_python() {
 # What .venv depends on; it is made again if the interpreter is gone or broken.
 wanted() {
   .venv/bin/python --version
-  cat requirements.txt requirements-dev.txt
-  if [[ -f postprocess/pyproject.toml ]]; then
-    cat postprocess/pyproject.toml
-  fi
+  cat requirements.txt requirements-dev.txt pyproject.toml
 }
 
 make_venv() {
@@ -82,11 +94,21 @@ make_venv() {
   echo "bootstrap: installing the Python packages into .venv"
   local install=(.venv/bin/python -m pip install --quiet --disable-pip-version-check)
   "${install[@]}" -r requirements.txt -r requirements-dev.txt
-  if [[ -f postprocess/pyproject.toml ]]; then
-    "${install[@]}" -e postprocess
-  fi
+  # The Python package alone: the program is that of build/.
+  "${install[@]}" -e . -C wheel.cmake=false
   wanted > "$stamp"
+}
+
+# Kept out of .venv's stamp: who does not test the browser has neither.
+add_playwright() {
+  if ! .venv/bin/python -c 'import playwright' 2> /dev/null; then
+    echo "bootstrap: installing Playwright into .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-browser.txt
+  fi
 }
 
 install_packages
 make_venv
+if $browser; then
+  add_playwright
+fi

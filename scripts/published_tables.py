@@ -102,13 +102,13 @@ def impact_counts(path: Path) -> tuple[int, int, int]:
 
 @cache
 def region_limits(path: Path) -> dict[str, tuple[float, float]]:
-    """Return the brackets of a sweep file by name, in the order of LIMITS."""
+    """Return the brackets in which a sweep file saw the limits in steps, by name, in the order of LIMITS."""
     with open_result(path) as result:
         limits = table(result, "limits")
         names = [str(name) for name in limits["name"].values]
         if len(set(names)) < len(names):
             sys.exit(f"published: {path} has a limit twice; the page expects one of each")
-        ends = zip(limits["lower"].values.tolist(), limits["upper"].values.tolist(), strict=True)
+        ends = zip(*(limits[f"observed_{end}"].values.tolist() for end in ("lower", "upper")), strict=True)
         found = dict(zip(names, ends, strict=True))
         return {name: found[name] for name in LIMITS if name in found}
 

@@ -1,18 +1,76 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Open Separatrix result files and make figures from them."""
+"""Where the motions of impacting and rubbing machines end up (docs/python.md).
 
-from separatrix.errors import SeparatrixError
-from separatrix.open import decode_flags, decode_word, decode_words, flag_names, open_result, table
+    import separatrix as sx
+
+    case = sx.load("machine.toml").with_(drive__ratio=1.3)
+    result = sx.basin(case, x0=(0, 1.1, 400), v0=(-6, 6, 400))
+    result.separatrix.plot()
+
+Importing the package imports nothing else; each name below brings its module when it is first used.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+from separatrix.errors import CaseError, Interrupted, SeparatrixError, SeparatrixWarning
 from separatrix.version import __version__
 
+if TYPE_CHECKING:
+    from separatrix.cases import Case as Case
+    from separatrix.cases import linspace as linspace
+    from separatrix.cases import load as load
+    from separatrix.discovery.api import Discovery as Discovery
+    from separatrix.discovery.api import discover as discover
+    from separatrix.library import effects as effects
+    from separatrix.maps import basin as basin
+    from separatrix.maps import points as points
+    from separatrix.maps import sweep as sweep
+    from separatrix.motions import trajectory as trajectory
+    from separatrix.open import decode_flags as decode_flags
+    from separatrix.open import decode_word as decode_word
+    from separatrix.open import decode_words as decode_words
+    from separatrix.open import flag_names as flag_names
+    from separatrix.open import open_result as open_result
+    from separatrix.open import table as table
+
+_HOME = {
+    "Case": "separatrix.cases",
+    "Discovery": "separatrix.discovery.api",
+    "basin": "separatrix.maps",
+    "decode_flags": "separatrix.open",
+    "decode_word": "separatrix.open",
+    "decode_words": "separatrix.open",
+    "discover": "separatrix.discovery.api",
+    "effects": "separatrix.library",
+    "flag_names": "separatrix.open",
+    "linspace": "separatrix.cases",
+    "load": "separatrix.cases",
+    "open_result": "separatrix.open",
+    "points": "separatrix.maps",
+    "sweep": "separatrix.maps",
+    "table": "separatrix.open",
+    "trajectory": "separatrix.motions",
+}
+
 __all__ = [
+    "CaseError",
+    "Interrupted",
     "SeparatrixError",
+    "SeparatrixWarning",
     "__version__",
-    "decode_flags",
-    "decode_word",
-    "decode_words",
-    "flag_names",
-    "open_result",
-    "table",
+    *sorted(_HOME),
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'separatrix' has no attribute '{name}'")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

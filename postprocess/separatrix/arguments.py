@@ -53,3 +53,53 @@ def positive(text: str) -> float:
     if not 0 < value < 1e9:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
     return value
+
+
+def names(text: str) -> list[str]:
+    """Read a list parted by commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def two_names(text: str) -> tuple[str, str]:
+    """Read two names parted by a comma."""
+    found = names(text)
+    if len(found) != 2:
+        raise argparse.ArgumentTypeError(f"'{text}' is not two names parted by a comma")
+    return found[0], found[1]
+
+
+def interval(text: str) -> tuple[float, float]:
+    """Read A:B with A below B."""
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        low, high = 1.0, 0.0
+    if not low < high:
+        raise argparse.ArgumentTypeError(f"'{text}' is not A:B with numbers, A below B")
+    return low, high
+
+
+def pairs(ranges: bool) -> Callable[[str], dict]:
+    """Return the reader of NAME=VALUE,... or, with ranges, of NAME=A:B,..."""
+
+    def read(text: str) -> dict:
+        found = {}
+        for part in names(text):
+            name, _, value = part.partition("=")
+            try:
+                found[name.strip()] = interval(value) if ranges else float(value)
+            except ValueError:
+                form = "NAME=A:B" if ranges else "NAME=VALUE"
+                raise argparse.ArgumentTypeError(f"'{part}' is not {form}") from None
+        return found
+
+    return read
+
+
+def size(text: str) -> tuple[float, float]:
+    """Read WxH in mm."""
+    try:
+        width, height = (float(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not WxH in mm") from None
+    return width, height

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names and colours of the classes of a coded field: regimes, attractors, periods, event words."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -52,6 +53,13 @@ def classes(result: xr.Dataset, field: str, counts: dict[int, int]) -> list[Clas
             for code, place in zip(coded, places, strict=True)
         ]
     return nothing + _most_frequent(result, field, coded, counts)
+
+
+def recoloured(entries: list[Class], colours: Sequence[str]) -> list[Class]:
+    """Return the classes with other colours, in their order, for as many as are given."""
+    coded = [entry for entry in entries if entry.codes != (0,)]
+    new = dict(zip((entry.codes for entry in coded), colours, strict=False))
+    return [replace(entry, colour=new.get(entry.codes, entry.colour)) for entry in entries]
 
 
 def class_index(image: np.ndarray, entries: list[Class]) -> np.ndarray:
@@ -113,7 +121,15 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
         period = _aperiodic_text(catalogue, mine)
     else:
         period = ("period " if len(periods) == 1 else "periods ") + ", ".join(str(p) for p in periods)
-    return f"attractor {identity}: {' or '.join(regimes)}, {period}"
+    return f"attractor {identity}: {' or '.join(regimes)}, {period}{_rotation_text(catalogue, mine)}"
+
+
+def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return ', -1 turns per period' for a cycle of an angle that goes round; '' where it does not, or not always so."""
+    if "rotation_number" not in catalogue:
+        return ""
+    turns = np.unique(catalogue["rotation_number"].values[mine])
+    return f", {turns[0]:+.4g} turns per drive period" if turns.size == 1 and abs(turns[0]) > 0 else ""
 
 
 def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:

@@ -10,13 +10,18 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from separatrix import basin, contact, points, style, sweep, trajectory
-from separatrix.arguments import Parser, list_of, whole_number
+from separatrix import style
+from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
+from separatrix.figures import basin, contact, points, sweep, trajectory
+from separatrix.figures.animation import animate
+from separatrix.figures.look import CAPTIONS, UNITS, Look
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
 from separatrix.save import FORMATS, save
 from separatrix.version import __version__
+
+_FILM_DPI = 150
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -64,24 +69,55 @@ def make(path: Path, options: argparse.Namespace) -> list[Path]:
 
 
 def _make(path: Path, options: argparse.Namespace) -> list[Path]:
-    with style.context(), open_result(path) as result:
+    with style.context(options.style), open_result(path) as result:
         title = plain(options.title or result.attrs.get("title", path.stem))
         stem = path.name.removesuffix(".h5")
         folder = options.output or path.parent
+        look = _look(options)
+        if options.animate:
+            return [_animated(path, result, folder / f"{stem}_animation", title, look, options)]
         return [
             written
-            for name, figure in _figures(path, result, options.field, title).items()
+            for name, figure in _figures(path, result, options.field, title, look).items()
             for written in save(figure, folder / f"{stem}_{name}", options.formats, options.dpi)
         ]
 
 
-def _figures(path: Path, result: object, field: str | None, title: str) -> dict[str, Figure]:
+def _figures(path: Path, result: object, field: str | None, title: str, look: Look) -> dict[str, Figure]:
     kind = result.attrs["kind"]
     if kind == "basin":
-        return basin.figures(path, result, field, title)
+        return basin.figures(path, result, field, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
-    return {"sweep": sweep, "trajectory": trajectory, "points": points}[kind].figures(result, title)
+    return {"sweep": sweep, "trajectory": trajectory, "points": points}[kind].figures(result, title, look)
+
+
+def _animated(
+    path: Path, result: object, stem: Path, title: str, look: Look, options: argparse.Namespace
+) -> Path:
+    if result.attrs["kind"] != "basin":
+        raise SeparatrixError(
+            f"{path}: --animate is for basin files, this is a {result.attrs['kind']} file", USAGE
+        )
+    target = stem.with_name(f"{stem.name}.{options.film}")
+    dpi = min(options.dpi, _FILM_DPI)
+    return animate(result, options.animate, target, title, options.field or "attractor", look, dpi=dpi)
+
+
+def _look(options: argparse.Namespace) -> Look:
+    return Look(
+        region=options.region,
+        slice=options.slice,
+        axes=options.axes,
+        units=options.units,
+        shade=options.shade,
+        attractors=not options.no_attractors,
+        colours=options.colours,
+        colour_map=options.colour_map,
+        limits=options.range,
+        size=options.size,
+        caption=options.caption,
+    )
 
 
 def _report(error: SeparatrixError) -> int:
@@ -119,8 +155,66 @@ def _parser() -> Parser:
         default=style.PNG_DPI,
         help=f"resolution of images [{style.PNG_DPI}]",
     )
+    _add_looks(parser)
     parser.add_argument("--version", action="version", version=f"separatrix-figures {__version__}")
     return parser
+
+
+def _add_looks(parser: Parser) -> None:
+    looks = parser.add_argument_group("what is shown, and how")
+    looks.add_argument(
+        "--region",
+        metavar="NAME=A:B,...",
+        type=pairs(ranges=True),
+        default={},
+        help="show these ranges of axes",
+    )
+    looks.add_argument(
+        "--slice",
+        metavar="NAME=VALUE,...",
+        type=pairs(ranges=False),
+        default={},
+        help="show one value of axes, the nearest",
+    )
+    looks.add_argument(
+        "--axes", metavar="ACROSS,UP", type=two_names, help="basin files: the axes of the map [x0,v0]"
+    )
+    looks.add_argument(
+        "--units",
+        metavar="LIST",
+        type=list_of(UNITS),
+        default=[],
+        help=f"in the place of SI units: {', '.join(UNITS)}",
+    )
+    looks.add_argument(
+        "--shade", action="store_true", help="basin files: the settling time as lightness of the classes"
+    )
+    looks.add_argument(
+        "--no-attractors", action="store_true", help="basin files: do not mark the attractors on the section"
+    )
+    looks.add_argument(
+        "--colours", metavar="LIST", type=names, default=[], help="colours of the classes in their order"
+    )
+    looks.add_argument(
+        "--colour-map", metavar="NAME", help=f"of a field that is a number [{style.SCALAR_MAP}]"
+    )
+    looks.add_argument("--range", metavar="A:B", type=interval, help="range of the colours of such a field")
+    looks.add_argument(
+        "--size", metavar="WxH", type=size, help="width of the page and height of the axes in mm [85x62]"
+    )
+    looks.add_argument(
+        "--caption",
+        choices=CAPTIONS,
+        default="full",
+        help="all that is needed to repeat the run, less, none [full]",
+    )
+    looks.add_argument("--style", metavar="FILE", help="style of matplotlib, by name or file, on top of ours")
+    looks.add_argument(
+        "--animate", metavar="NAME", help="basin files: a film through the values of this axis instead"
+    )
+    looks.add_argument(
+        "--film", choices=("gif", "mp4"), default="gif", help="form of the film; mp4 needs ffmpeg [gif]"
+    )
 
 
 if __name__ == "__main__":

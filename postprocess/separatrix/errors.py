@@ -1,11 +1,16 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one exception of the package; its code is the exit code of the command."""
+"""The exceptions of the package; their codes are the exit codes of the command."""
+
+from collections.abc import Callable
 
 USAGE = 64
 BAD_DATA = 65
 NO_INPUT = 66
+INTERNAL = 70
+NO_MEMORY = 71
 CANNOT_CREATE = 73
+STOPPED = 75
 INTERRUPTED = 130
 TERMINATED = 143
 
@@ -17,3 +22,25 @@ class SeparatrixError(Exception):
         """Keep the message and the exit code."""
         super().__init__(message)
         self.code = code
+
+
+class CaseError(SeparatrixError):
+    """A case, a value or a call that the simulator refuses; `code` is that of the program."""
+
+
+class SeparatrixWarning(UserWarning):
+    """Something in a run that should be known to judge its results."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was stopped; what it has done is kept, and `resume` goes on with it.
+
+    It is a KeyboardInterrupt: nothing that does not ask for it swallows it. `done` is the share of the work
+    that is done.
+    """
+
+    def __init__(self, message: str, done: float, resume: Callable[[], object]) -> None:
+        """Keep how far it went and how to go on."""
+        super().__init__(message)
+        self.done = done
+        self.resume = resume

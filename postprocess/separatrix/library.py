@@ -10,25 +10,19 @@ import functools
 import os
 import shutil
 import weakref
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from separatrix.errors import SeparatrixError
+from separatrix.errors import CaseError
+from separatrix.program import NATIVE, SOURCE_TREE
 
 __all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
 
-# of an installation that was not copied elsewhere
-SOURCE_TREE = Path(__file__).resolve().parents[2]
-
 _NONE = 1e308  # bounds beyond this mean that there is none
 _TEXT = 4096
-
-
-class CaseError(SeparatrixError):
-    """A case, a value or a call that the library refuses; `code` is that of the program."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +37,23 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """A law of the family `effect`, its parameters; `value` is the default, NaN where it must be given."""
+    """A law of the family `effect`, its parameters; `value` is the default, NaN where it must be given.
+
+    `family` is the function that it is one shape of; it acts on the "flight", at the "barrier" or in the
+    "sensor". What it does is linear in the `amplitudes` near zero; the `sizes` are positive. A machine must
+    have what it `needs` (a law, or the path of a parameter; ''). `confused`: effects that can be the same
+    motion, and when.
+    """
 
     name: str
     meaning: str
     parameters: dict[str, Parameter]
+    family: str = ""
+    acts: str = "flight"
+    amplitudes: tuple[str, ...] = ()
+    sizes: tuple[str, ...] = ()
+    needs: str = ""
+    confused: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -107,6 +113,20 @@ class Model:
         _call("separatrix_model_from_text", text.encode(), os.fsencode(directory), ctypes.byref(handle))
         return cls(handle)
 
+    @classmethod
+    def from_settings(cls, text: str, name: str | Path, settings: Sequence[str]) -> "Model":
+        """Return the model of a case in memory with "key.path=value" on top, as `--set` takes them.
+
+        `name` stands for the file in messages; files that the case names are looked for in its folder.
+        """
+        handle = ctypes.c_void_p()
+        lines = (ctypes.c_char_p * len(settings))(*(line.encode() for line in settings))
+        _call(
+            "separatrix_model_with",
+            *(text.encode(), os.fsencode(name), len(settings), lines, ctypes.byref(handle)),
+        )
+        return cls(handle)
+
     @property
     def period(self) -> float:
         """Drive period of the case as it is [s]."""
@@ -125,6 +145,15 @@ class Model:
         text = ctypes.create_string_buffer(length.value + 1)
         _call("separatrix_model_text", self._handle, *chosen, text, _size(text), ctypes.byref(length))
         return text.value.decode()
+
+    def with_effect(self, name: str, values: Mapping[str, float]) -> "Model":
+        """Return the model with an effect added; parameters without a value take their defaults."""
+        handle = ctypes.c_void_p()
+        keys = (ctypes.c_char_p * len(values))(*(key.encode() for key in values))
+        numbers = (ctypes.c_double * len(values))(*values.values())
+        arguments = (self._handle, name.encode(), len(values), keys, numbers, ctypes.byref(handle))
+        _call("separatrix_model_with_effect", *arguments)
+        return Model(handle)
 
     def segments(
         self,
@@ -219,33 +248,48 @@ class Model:
         return self._index[path]
 
 
+@functools.cache
 def effects() -> dict[str, Effect]:
-    """Return the catalogue of effects that may be added to a case, by name, as the law table has it."""
+    """Return the catalogue of effects that may be added to a case, by name, as the tables of laws have it."""
     found: dict[str, Effect] = {}
+    parameters: dict[str, dict[str, Parameter]] = {}
+    meanings: dict[str, str] = {}
+    numbers = (ctypes.c_double * 4)()
+    for name, meaning, parameter, unit in _rows("separatrix_effect_parameter", 4, numbers):
+        default, lower, upper, optional = numbers
+        one = _parameter(default if optional else np.nan, unit, lower, upper)
+        parameters.setdefault(name, {})[parameter] = one
+        meanings[name] = meaning
+    for name, family, acts, amplitudes, sizes, needs in _rows("separatrix_effect", 6):
+        words = (tuple(amplitudes.split()), tuple(sizes.split()))
+        found[name] = Effect(name, meanings[name], parameters[name], family, acts, *words, needs)
+    for one, other, reason in _rows("separatrix_effect_confusion", 3):
+        found[one].confused[other] = found[other].confused[one] = reason
+    return found
+
+
+def _rows(function: str, count: int, *numbers: ctypes.Array) -> Iterator[list[str]]:
+    """Rows of a table of the library, of so many texts; `numbers` hold those of the last row."""
     index = 0
     while True:
-        texts = [ctypes.create_string_buffer(_TEXT) for _ in range(4)]
-        numbers = (ctypes.c_double * 4)()
+        texts = [ctypes.create_string_buffer(_TEXT) for _ in range(count)]
         sized = [argument for text in texts for argument in (text, _size(text))]
         try:
-            _call("separatrix_effect_parameter", index, *sized, numbers)
+            _call(function, index, *sized, *numbers)
         except CaseError:
-            return found
-        name, meaning, parameter, unit = (text.value.decode() for text in texts)
-        default, lower, upper, optional = numbers
-        effect = found.setdefault(name, Effect(name, meaning, {}))
-        effect.parameters[parameter] = _parameter(default if optional else np.nan, unit, lower, upper)
+            return
+        yield [text.value.decode() for text in texts]
         index += 1
 
 
 def library_path() -> Path:
-    """Return where the library is: $SEPARATRIX_LIBRARY, beside the installed program, or in build/lib."""
+    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, in build/lib, beside the program."""
     asked = os.environ.get("SEPARATRIX_LIBRARY")
     if asked:
         return Path(asked)
     program = shutil.which("separatrix")
-    folders = [Path(program).resolve().parent.parent / "lib"] if program else []
-    folders.append(SOURCE_TREE / "build" / "lib")
+    folders = [NATIVE / "lib", SOURCE_TREE / "build" / "lib"]
+    folders += [Path(program).resolve().parent.parent / "lib"] if program else []
     for folder in folders:
         path = folder / "libseparatrix.so"
         if path.is_file():

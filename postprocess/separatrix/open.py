@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Open a result file: HDF5 -> xarray, codes -> text."""
 
+import importlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,6 +44,8 @@ def open_result(path: str | Path) -> xr.Dataset:
             _close(parts)
             raise
     result.attrs = attributes | texts
+    # results have their accessor, however they were made
+    importlib.import_module("separatrix.accessor")
     result.set_close(lambda: _close(parts))
     return result
 

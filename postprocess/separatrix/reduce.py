@@ -134,7 +134,9 @@ def _read_slab(
 def _slab_rows(dataset: h5py.Dataset, row_axis: int, column_axis: int, factor: int) -> int:
     """Rows of a slab: whole blocks, and whole chunks where that fits, so that none is unpacked twice."""
     rows = max(1, SLAB_BYTES // (dataset.shape[column_axis] * dataset.dtype.itemsize))
-    chunk = dataset.chunks[row_axis] if dataset.chunks else 1
+    # an array in memory has none
+    chunks = getattr(dataset, "chunks", None)
+    chunk = chunks[row_axis] if chunks else 1
     unit = int(np.lcm(factor, chunk))
     unit = unit if unit <= rows else factor
     return max(unit, rows // unit * unit)

@@ -2,17 +2,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One style for all figures: print widths, fonts, colours that colour-blind readers can tell apart."""
 
+import io
 from contextlib import AbstractContextManager
+from pathlib import Path
 
 import matplotlib
+import matplotlib.style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from separatrix.errors import USAGE, SeparatrixError
 
 SINGLE_COLUMN = 85.0
 DOUBLE_COLUMN = 175.0
 PNG_DPI = 300
 
-# Okabe and Ito (2008), in the order in which attractors take them
+# Colours of attractors in their order, mostly Paul Tol's. The first three differ by 20 and more in lightness,
+# so that they can be told apart in grey; all by 20 and more for colour-blind readers (CIE 76).
+ATTRACTORS = (
+    "#004488", "#DDAA33", "#BB5566", "#99DDFF", "#000000", "#44AA99", "#661100", "#EEDD88",
+)  # fmt: skip
+# Okabe and Ito (2008), for lines
 OKABE_ITO = ("#D55E00", "#0072B2", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#F0E442", "#000000")
 # Paul Tol, muted
 TOL_MUTED = (
@@ -25,16 +35,17 @@ SCALAR_MAP = "cividis"
 
 REGIMES = {
     "unresolved": NOTHING,
-    "non_impact": OKABE_ITO[0],
-    "impact": OKABE_ITO[1],
-    "sticking": OKABE_ITO[2],
-    "mixed": OKABE_ITO[3],
-    "chattering": OKABE_ITO[4],
-    "at_rest": OKABE_ITO[6],
-    "stuck": OKABE_ITO[5],
+    "non_impact": ATTRACTORS[1],
+    "impact": ATTRACTORS[0],
+    "sticking": ATTRACTORS[5],
+    "mixed": ATTRACTORS[2],
+    "chattering": ATTRACTORS[6],
+    "at_rest": ATTRACTORS[3],
+    "stuck": ATTRACTORS[7],
 }
-RUN_UP = OKABE_ITO[0]
-RUN_DOWN = OKABE_ITO[1]
+RUN_UP = "#D55E00"
+RUN_DOWN = "#004488"
+BOTH_RUNS = "#333333"
 BARRIER = OKABE_ITO[2]
 BRANCH = "#C4C4C4"
 MOTION = OKABE_ITO[1]
@@ -70,18 +81,40 @@ _RC = {
 }
 
 
-def context() -> AbstractContextManager:
-    """Return the context in which figures are made and saved."""
-    return matplotlib.rc_context(_RC)
+def context(sheet: str | Path | None = None) -> AbstractContextManager:
+    """Return the context of figures; `sheet`: a style of matplotlib, or a file of one, on top of ours."""
+    try:
+        more = dict(matplotlib.style.library.get(str(sheet), {})) if sheet else {}
+        if sheet and not more:
+            more = dict(matplotlib.rc_params_from_file(sheet, use_default_template=False))
+    except OSError as error:
+        raise SeparatrixError(
+            f"{sheet}: no style of matplotlib, and no file that can be read", USAGE
+        ) from error
+    return matplotlib.rc_context({**_RC, **more})
+
+
+class PrintFigure(Figure):
+    """A figure that is saved in this style whatever the settings of the caller, and shown by notebooks."""
+
+    def savefig(self, *arguments: object, **options: object) -> None:
+        """Save it as matplotlib does."""
+        with context():
+            super().savefig(*arguments, **options)
+
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=200)
+        return image.getvalue()
 
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size in mm; no window system is needed."""
-    figure = Figure(figsize=(width / 25.4, height / 25.4))
+    figure = PrintFigure(figsize=(width / 25.4, height / 25.4))
     FigureCanvasAgg(figure)
     return figure
 
 
 def palette(number: int) -> tuple[str, ...]:
-    """Return the palette for a number of classes: Okabe-Ito up to 8, Tol muted up to 10."""
-    return OKABE_ITO if number <= len(OKABE_ITO) else TOL_MUTED
+    """Return the palette for a number of classes: that of attractors up to 8, Tol muted up to 10."""
+    return ATTRACTORS if number <= len(ATTRACTORS) else TOL_MUTED

@@ -15,6 +15,11 @@ if(SEPARATRIX_MPI)
   target_compile_definitions(separatrix_mpi INTERFACE SEPARATRIX_MPI)
 endif()
 
+# Debian's shared HDF5 brings in curl and Kerberos for a driver that nothing here uses; a static one leaves that out.
+if(SEPARATRIX_STATIC)
+  set(HDF5_USE_STATIC_LIBRARIES ON)
+endif()
+
 # With both kinds of HDF5 installed, the module takes the one that is asked for or, silently, the other.
 set(HDF5_PREFER_PARALLEL ${SEPARATRIX_MPI})
 find_package(HDF5 1.10 REQUIRED COMPONENTS C Fortran HL)
@@ -28,11 +33,26 @@ endif()
 # The dimension scales are in the high-level library, which HDF5::HDF5 leaves out.
 add_library(separatrix_hdf5 INTERFACE)
 target_include_directories(separatrix_hdf5 SYSTEM INTERFACE ${HDF5_Fortran_INCLUDE_DIRS} ${HDF5_C_INCLUDE_DIRS})
-target_link_libraries(separatrix_hdf5 INTERFACE
+set(hdf5_libraries
   ${HDF5_Fortran_HL_LIBRARIES} ${HDF5_Fortran_LIBRARIES} ${HDF5_C_HL_LIBRARIES} ${HDF5_C_LIBRARIES})
+if(SEPARATRIX_STATIC)
+  # The module takes the C library statically as well; the compression library needs a second one.
+  list(FILTER hdf5_libraries EXCLUDE REGEX "/lib(c|m|dl|pthread|rt)\\.a$")
+  find_library(AEC_LIBRARY libaec.a)
+  if(AEC_LIBRARY)
+    list(APPEND hdf5_libraries "${AEC_LIBRARY}")
+  endif()
+  list(APPEND hdf5_libraries m dl)
+  set(shared_suffixes ${CMAKE_FIND_LIBRARY_SUFFIXES})
+  set(CMAKE_FIND_LIBRARY_SUFFIXES .a)
+endif()
+target_link_libraries(separatrix_hdf5 INTERFACE ${hdf5_libraries})
 
 find_package(ZLIB REQUIRED)
 find_package(GSL REQUIRED)
+if(SEPARATRIX_STATIC)
+  set(CMAKE_FIND_LIBRARY_SUFFIXES ${shared_suffixes})
+endif()
 
 # Debian's package has the headers only.
 find_package(toml11 QUIET)

@@ -5,6 +5,7 @@
 !> motions drift apart, without which nobody knows what it is: perhaps a long transient.
 module aperiodic
   use attractors, only: attractor_t, find_capture, kind_chaotic, kind_not_known, make_points, most_coordinates
+  use circle, only: nearest_turn, point_near
   use elementary, only: exponential, logarithm
   use exact_return, only: returns_t, watch_returns
   use kinds, only: int64, wp
@@ -44,6 +45,7 @@ contains
     tally%wants_v_max = .true.
     call reset_tally(tally, strobe%state, allocated(moving%pair))
     found%coordinates = coordinates_of(moving)
+    found%turn = moving%machine%turn
     call make_points(found, 2)
     before = section_point(moving, strobe)
     found%points = spread(before, 2, 2)
@@ -57,8 +59,7 @@ contains
       associate (now => section_point(moving, strobe))
         known = find_capture(catalogue, now, tally%slips > slips .or. .not. rest_lasts(moving)) > 0
         if (known) return
-        found%points(:, 1) = min(found%points(:, 1), now)
-        found%points(:, 2) = max(found%points(:, 2), now)
+        call widen(found, spread(now, 2, 2))
         call follow_neighbour(moving, found%coordinates, scale, before, now, direction, drift(i))
         before = now
       end associate
@@ -90,6 +91,7 @@ contains
     call advance_strobe_period(moving, twin, unused, reason)
     reached = section_point(moving, twin)
     direction = 0
+    reached = point_near(reached, now, moving%machine%turn)
     direction(:n) = (reached(:n) - now(:n))/scale(:n)
     distance = norm2(direction(:n))
     drift = logarithm(max(distance, rounding)/neighbour)
@@ -122,13 +124,15 @@ contains
     integer :: k
     do k = 1, size(catalogue)
       if (catalogue(k)%period /= 0 .or. catalogue(k)%features%regime /= found%features%regime) cycle
-      if (all(found%points(:, 1) <= catalogue(k)%points(:, 2) .and. &
-              found%points(:, 2) >= catalogue(k)%points(:, 1))) then
+      if (boxes_meet(found, catalogue(k))) then
         ! What is not known does not widen what is.
         if (found%kind == kind_not_known .and. catalogue(k)%kind == kind_chaotic) return
-        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) catalogue(k) = found
-        catalogue(k)%points(:, 1) = min(catalogue(k)%points(:, 1), found%points(:, 1))
-        catalogue(k)%points(:, 2) = max(catalogue(k)%points(:, 2), found%points(:, 2))
+        if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) then
+          catalogue(k)%kind = kind_chaotic
+          catalogue(k)%features = found%features
+          catalogue(k)%multiplier = found%multiplier
+        end if
+        call widen(catalogue(k), found%points)
         catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
         return
       end if
@@ -137,5 +141,37 @@ contains
     k = size(catalogue)
     catalogue(k)%section = section_state(moving, found%points(:, 1))
   end subroutine add_aperiodic
+
+  !> Whether the boxes of two motions have a point in common.
+  pure logical function boxes_meet(a, b)
+    type(attractor_t), intent(in) :: a, b
+    real(wp) :: box(most_coordinates, 2)
+    box = box_near(a%points(:, :2), b)
+    boxes_meet = all(box(:, 1) <= b%points(:, 2) .and. box(:, 2) >= b%points(:, 1))
+  end function boxes_meet
+
+  !> Widens the box of a motion by another; that of an angle up to the whole circle.
+  pure subroutine widen(motion, box)
+    type(attractor_t), intent(inout) :: motion
+    real(wp), intent(in) :: box(:, :)
+    real(wp) :: near(most_coordinates, 2)
+    near = box_near(box, motion)
+    motion%points(:, 1) = min(motion%points(:, 1), near(:, 1))
+    motion%points(:, 2) = max(motion%points(:, 2), near(:, 2))
+    if (motion%turn > 0 .and. motion%points(1, 2) - motion%points(1, 1) >= motion%turn) then
+      motion%points(1, :2) = [-0.5_wp, 0.5_wp]*motion%turn
+    end if
+  end subroutine widen
+
+  !> The box whole turns away that is nearest to that of a motion.
+  pure function box_near(box, motion) result(near)
+    real(wp), intent(in) :: box(:, :)
+    type(attractor_t), intent(in) :: motion
+    real(wp) :: near(most_coordinates, 2), middle
+    near = box
+    if (.not. motion%turn > 0) return
+    middle = sum(box(1, :))/2
+    near(1, :) = box(1, :) + (nearest_turn(middle, sum(motion%points(1, :2))/2, motion%turn) - middle)
+  end function box_near
 
 end module aperiodic

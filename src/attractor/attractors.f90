@@ -3,12 +3,14 @@
 
 !> What an attractor is here, and whether a state on the stroboscopic section has been captured by one.
 module attractors
+  use circle, only: nearest_turn, point_near
   use kinds, only: int64, wp
   use motion_state, only: tally_t
   implicit none
   private
 
-  public :: regime_of, make_points, find_capture, find_box, squared_distance, pack_attractor, packed_length, unpack_attractor
+  public :: regime_of, wrap_range, make_points, find_capture, find_box, squared_distance, pack_attractor, packed_length, &
+    unpack_attractor
 
   !> Regimes of a motion; stuck are two bodies that move as one.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
@@ -31,7 +33,7 @@ module attractors
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 
-  integer, parameter :: packed_scalars = 22 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
+  integer, parameter :: packed_scalars = 24 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
   !> Share of its size by which a box of section points is widened on each side.
   real(wp), parameter :: box_margin = 0.05_wp
   !> Fewest numbers of a packed attractor.
@@ -44,6 +46,8 @@ module attractors
     real(wp) :: impacts_per_period = 0, mean_impact_speed = 0
     real(wp) :: amplitude = 0, x_max = 0, x_min = 0, v_max = 0
     real(wp) :: grazing_margin = huge(1.0_wp)
+    !> Turns of an angle per drive period, upwards.
+    real(wp) :: rotation = 0
   end type features_t
 
   !> One attractor: a stable cycle of the stroboscopic map, the set of all positions of rest
@@ -63,6 +67,8 @@ module attractors
     real(wp) :: section(4) = 0
     !> Number of coordinates on the section.
     integer :: coordinates = 2
+    !> The first coordinate repeats after this [rad]; 0 = never.
+    real(wp) :: turn = 0
     !> A motion of two bodies between their stops, which it does not touch: it may be anywhere. The coordinates are those
     !> after the first.
     logical :: any_place = .false.
@@ -109,6 +115,24 @@ contains
     features%grazing_margin = tally%grazing_margin
   end function regime_of
 
+  !> Puts the range of an angle into one turn: the whole circle for a motion that goes round.
+  pure subroutine wrap_range(features, turn)
+    type(features_t), intent(inout) :: features
+    real(wp), intent(in) :: turn
+    real(wp) :: middle, shift
+    if (.not. turn > 0) return
+    if (features%x_max - features%x_min < turn) then
+      middle = (features%x_max + features%x_min)/2
+      shift = nearest_turn(middle, 0.0_wp, turn) - middle
+      features%x_max = features%x_max + shift
+      features%x_min = features%x_min + shift
+    else
+      features%x_max = turn/2
+      features%x_min = -turn/2
+      features%amplitude = turn/2
+    end if
+  end subroutine wrap_range
+
   !> Index of the attractor whose verified neighbourhood holds a point on the section; 0 if none.
   !> `slipped` tells whether the body moved during the last whole period.
   pure integer function find_capture(catalogue, point, slipped) result(found)
@@ -143,7 +167,7 @@ contains
     n = attractor%coordinates
     if (n == 2) then
       ! One body: the same operations as in lanes.
-      d(:2) = (point(:2) - attractor%points(:2, i))*(1/attractor%scale(:2))
+      d(:2) = (point_near(point(:2), attractor%points(:2, i), attractor%turn) - attractor%points(:2, i))*(1/attractor%scale(:2))
       square = attractor%metric(1, i)*d(1)*d(1) + 2*attractor%metric(2, i)*d(2)*d(1) + attractor%metric(3, i)*d(2)*d(2)
       return
     end if
@@ -187,13 +211,14 @@ contains
   pure logical function in_box(attractor, point)
     type(attractor_t), intent(in) :: attractor
     real(wp), intent(in) :: point(:)
-    real(wp) :: margin(most_coordinates)
+    real(wp) :: margin(most_coordinates), near(size(point))
     integer :: n
     in_box = .false.
     if (attractor%period /= 0 .or. attractor%rests) return
     n = attractor%coordinates
     margin = box_margin*(attractor%points(:, 2) - attractor%points(:, 1))
-    in_box = all(point(:n) >= attractor%points(:n, 1) - margin(:n) .and. point(:n) <= attractor%points(:n, 2) + margin(:n))
+    near = point_near(point, (attractor%points(:, 1) + attractor%points(:, 2))/2, attractor%turn)
+    in_box = all(near(:n) >= attractor%points(:n, 1) - margin(:n) .and. near(:n) <= attractor%points(:n, 2) + margin(:n))
   end function in_box
 
   !> Whether a stretch of a motion of regime `whole` may be of regime `part`: without some of its events.
@@ -227,7 +252,8 @@ contains
         real(attractor%coordinates, wp), merge(1.0_wp, 0.0_wp, attractor%rests), real(f%regime, wp), real(f%word, wp), &
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
         f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
-        merge(1.0_wp, 0.0_wp, attractor%any_place), real(attractor%kind, wp), attractor%scale, &
+        merge(1.0_wp, 0.0_wp, attractor%any_place), real(attractor%kind, wp), attractor%turn, &
+        f%rotation, attractor%scale, &
         real(attractor%multipliers), aimag(attractor%multipliers)]
     end associate
     if (allocated(attractor%points)) packed(packed_scalars + 1:) = &
@@ -244,15 +270,16 @@ contains
     attractor%coordinates = nint(packed(4))
     attractor%rests = packed(5) > 0
     attractor%features = features_t(nint(packed(6)), nint(packed(7), int64), packed(8), packed(9), packed(10), packed(11), &
-                                    packed(12), packed(13), packed(14))
+                                    packed(12), packed(13), packed(14), packed(24))
     attractor%multiplier = packed(15)
     attractor%capture_radius = packed(16)
     attractor%section = packed(17:20)
     attractor%any_place = packed(21) > 0
     attractor%kind = nint(packed(22))
-    attractor%scale = packed(23:22 + most_coordinates)
-    attractor%multipliers = cmplx(packed(23 + most_coordinates:22 + 2*most_coordinates), &
-                                  packed(23 + 2*most_coordinates:packed_scalars), wp)
+    attractor%turn = packed(23)
+    attractor%scale = packed(25:24 + most_coordinates)
+    attractor%multipliers = cmplx(packed(25 + most_coordinates:24 + 2*most_coordinates), &
+                                  packed(25 + 2*most_coordinates:packed_scalars), wp)
     count = (size(packed) - packed_scalars)/packed_per_point
     if (count == 0) return
     call make_points(attractor, count)

@@ -5,8 +5,10 @@
 !> neighbourhood that provably (by sampling its rings) contracts into it with the same events.
 module cycle
   use attractors, only: attractor_t, longest_period, make_points, metric_numbers, most_coordinates, squared_distance
+  use circle, only: point_near
   use constants, only: two_pi
-  use elementary, only: exponential, sine_cosine
+  use elementary, only: sine_cosine
+  use free_motion, only: free_multipliers, is_linear
   use kinds, only: wp
   use matrices, only: cholesky, eigenvalues, solve, spectral_radius
   use motion, only: motion_t
@@ -15,9 +17,12 @@ module cycle
   implicit none
   private
 
-  public :: map_point, refine_cycle, scale_of, differentiate, direction, is_linear, free_multipliers
+  public :: map_point, refine_cycle, scale_of, derivative, direction
 
   integer, parameter :: most_newton = 20, most_halvings = 30
+  !> Differences that change by less when their step is quartered are taken as they are; divisions tried otherwise.
+  real(wp), parameter :: smooth = 1e-6_wp
+  integer, parameter :: most_divisions = 7
   !> Directions and radii of the starts by which a neighbourhood is tested.
   integer, parameter, public :: directions = 24
   real(wp), parameter, public :: rings(4) = [1.0_wp, 0.6_wp, 0.3_wp, 0.1_wp]
@@ -65,6 +70,7 @@ contains
     call map_point(moving, guess, period, image, tally, found)
     if (.not. found) return
     attractor%coordinates = n
+    attractor%turn = moving%machine%turn
     attractor%period = period
     attractor%scale = scale_of(moving, tally)
     point = guess
@@ -73,7 +79,7 @@ contains
     call order_points(moving, attractor, point, found)
     if (.not. found) return
     do i = 1, attractor%period
-      call differentiate(moving, attractor%points(:n, i), attractor%period, attractor%scale(:n), jacobian, found)
+      call derivative(moving, attractor%points(:n, i), attractor%period, attractor%scale(:n), jacobian, found)
       if (.not. found) return
       if (i == 1) attractor%multiplier = spectral_radius(jacobian)
       if (i == 1) attractor%multipliers(:n) = eigenvalues(jacobian)
@@ -82,6 +88,8 @@ contains
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
     call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true.)
+    ! Rounding may put the point and its image on different sides of the seam.
+    if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
     attractor%features = features_over(moving, tally, real(attractor%period, wp))
     if (attractor%period > 1) attractor%features%word = &
       cycle_word(moving, strobe_at(moving, attractor%points(:n, 1)), attractor%period)
@@ -91,25 +99,6 @@ contains
     end if
     call verify_neighbourhood(moving, attractor, found)
   end subroutine refine_cycle
-
-  !> Whether the motion of one body between its barriers is that of a linear, damped oscillator with a closed form: then it has
-  !> one motion without impact, which attracts.
-  pure logical function is_linear(moving)
-    type(motion_t), intent(in) :: moving
-    is_linear = moving%exact .and. .not. allocated(moving%pair) .and. moving%layer <= 0 .and. moving%flow%decay > 0 .and. &
-                .not. moving%machine%friction%kinetic > 0 .and. .not. moving%machine%friction%break_away > 0
-  end function is_linear
-
-  !> Multipliers of a motion of such an oscillator over some drive periods: exp((-g +- i w_d) t).
-  pure function free_multipliers(moving, periods) result(multipliers)
-    type(motion_t), intent(in) :: moving
-    integer, intent(in) :: periods
-    complex(wp) :: multipliers(2)
-    real(wp) :: time, sine, cosine
-    time = periods*moving%machine%period
-    call sine_cosine(moving%flow%damped*time, sine, cosine)
-    multipliers = exponential(-moving%flow%decay*time)*cmplx(cosine, abs(sine)*[1.0_wp, -1.0_wp], wp)
-  end function free_multipliers
 
   !> Scales of the coordinates, from half the range of the position.
   pure function scale_of(moving, tally) result(scale)
@@ -143,7 +132,7 @@ contains
     do i = 1, most_newton
       call map_point(moving, point, period, image, tally, converged)
       if (.not. converged) return
-      miss = (image - point)/scale
+      miss = (point_near(image, point, moving%machine%turn) - point)/scale
       if (norm2(miss) <= 64*epsilon(1.0_wp)) return
       if (i > 4 .and. norm2(miss) < 1e-11_wp .and. norm2(miss) >= best) return
       best = min(best, norm2(miss))
@@ -163,18 +152,48 @@ contains
     converged = best < 1e-9_wp
   end subroutine newton
 
-  !> Scaled derivative of P^period by central differences; one-sided at a barrier.
-  pure subroutine differentiate(moving, point, period, scale, jacobian, ok)
+  !> Scaled derivative of P^period. Next to a graze the map is linear only in a range that shrinks like the square of the impact
+  !> speed: where a quarter of the step of the differences gives another result, it is divided on until the results agree best.
+  pure subroutine derivative(moving, point, period, scale, jacobian, ok)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:), scale(:)
     integer, intent(in) :: period
     real(wp), intent(out) :: jacobian(:, :)
     logical, intent(out) :: ok
+    real(wp), dimension(size(point), size(point)) :: coarse, fine
+    real(wp) :: share, best, change
+    integer :: k
+    share = 1
+    best = huge(best)
+    call differentiate(moving, point, period, scale, coarse, ok)
+    jacobian = coarse
+    do k = 1, most_divisions
+      if (.not. ok) return
+      share = share/4
+      call differentiate(moving, point, period, scale, fine, ok, share)
+      if (.not. ok) return
+      change = norm2(fine - coarse)
+      if (k == 1 .and. change <= smooth*max(1.0_wp, norm2(coarse))) return
+      if (change < best) jacobian = fine
+      best = min(best, change)
+      coarse = fine
+    end do
+  end subroutine derivative
+
+  !> Scaled derivative of P^period by central differences over `share` of the usual step; one-sided at a barrier.
+  pure subroutine differentiate(moving, point, period, scale, jacobian, ok, share)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:), scale(:)
+    integer, intent(in) :: period
+    real(wp), intent(out) :: jacobian(:, :)
+    logical, intent(out) :: ok
+    real(wp), intent(in), optional :: share
     real(wp), dimension(size(point)) :: ahead, behind, image_ahead, image_behind
     real(wp) :: h
     type(tally_t) :: tally
     integer :: k
     h = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+    if (present(share)) h = share*h
     do k = 1, size(point)
       ahead = point
       behind = point
@@ -186,6 +205,7 @@ contains
       if (.not. ok) return
       call map_point(moving, behind, period, image_behind, tally, ok)
       if (.not. ok) return
+      image_ahead = point_near(image_ahead, image_behind, moving%machine%turn)
       jacobian(:, k) = (image_ahead - image_behind)/scale/((ahead(k) - behind(k))/scale(k))
     end do
   end subroutine differentiate
@@ -201,11 +221,11 @@ contains
     type(tally_t) :: tally
     integer :: i, n
     n = size(point)
-    cycle_points(:, 1) = point
+    cycle_points(:, 1) = point_near(point, 0*point, attractor%turn)
     do i = 2, attractor%period
       call map_point(moving, cycle_points(:, i - 1), 1, image, tally, ok)
       if (.not. ok) return
-      if (norm2((image - point)/attractor%scale(:n)) < 1e-8_wp) then
+      if (norm2((point_near(image, point, attractor%turn) - point)/attractor%scale(:n)) < 1e-8_wp) then
         attractor%period = i - 1
         exit
       end if

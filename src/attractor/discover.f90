@@ -7,9 +7,11 @@ module discover
   use aperiodic, only: add_aperiodic, watch_long
   use attractors, only: attractor_t, find_box, find_capture, kind_rest, longest_period, make_points, most_coordinates, &
     regime_non_impact
+  use circle, only: point_near
   use contact_law, only: contact_t
-  use cycle, only: is_linear, map_point, refine_cycle
+  use cycle, only: map_point, refine_cycle
   use exact_return, only: exact_cycle, returns_t, watch_returns
+  use free_motion, only: is_linear
   use kinds, only: int64, wp
   use matrices, only: solve
   use motion, only: motion_t
@@ -211,6 +213,7 @@ contains
       call make_points(found, 1)
       found%points(:, 1) = points(:, 0)
       found%coordinates = n
+      found%turn = moving%machine%turn
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0
       found%features%word = cycle_word(moving, strobe, 1)
@@ -223,7 +226,7 @@ contains
     if (ok) first = 2
     associate (sizes => scales_of(moving, (tally%x_max - tally%x_min)/2))
       do p = 1, max_period
-        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n))) cycle
+        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), moving%machine%turn)) cycle
         if (first == 1) then
           call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
           if (ok) found%section = section_state(moving, found%points(:, 1))
@@ -239,13 +242,13 @@ contains
   end subroutine recognise
 
   !> Whether every one of a run of section points comes back after `p` periods.
-  pure logical function returns(points, p, size_of_motion)
-    real(wp), intent(in) :: points(:, 0:), size_of_motion(:)
+  pure logical function returns(points, p, size_of_motion, turn)
+    real(wp), intent(in) :: points(:, 0:), size_of_motion(:), turn
     integer, intent(in) :: p
     integer :: i
     returns = .false.
     do i = 0, ubound(points, 2) - p
-      if (norm2((points(:, i + p) - points(:, i))/size_of_motion) > return_tolerance) return
+      if (norm2((point_near(points(:, i + p), points(:, i), turn) - points(:, i))/size_of_motion) > return_tolerance) return
     end do
     returns = .true.
   end function returns

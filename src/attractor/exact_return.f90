@@ -6,7 +6,8 @@
 !> period. Near such a cycle the numbers of impacts differ from start to start, so that `refine_cycle` cannot verify it.
 module exact_return
   use attractors, only: attractor_t, longest_exact_period, make_points, most_coordinates
-  use cycle, only: differentiate, direction, directions, rings, scale_of
+  use circle, only: point_near
+  use cycle, only: derivative, direction, directions, rings, scale_of
   use kinds, only: int64, wp
   use matrices, only: eigenvalues
   use motion, only: motion_t
@@ -77,11 +78,12 @@ contains
     if (period > longest_exact_period) return
     n = coordinates_of(moving)
     attractor%coordinates = n
+    attractor%turn = moving%machine%turn
     allocate (points(most_coordinates, 0:period), jacobian(n, n))
     call collect(moving, strobe, period, points, tally, found)
     if (.not. found) return
     attractor%scale = scale_of(moving, tally)
-    attractor%period = smallest_period(points(:n, 0:period - 1), attractor%scale(:n))
+    attractor%period = smallest_period(points(:n, 0:period - 1), attractor%scale(:n), attractor%turn)
     start = minloc(points(1, :attractor%period - 1), 1) - 1
     first = strobe
     do i = 1, start
@@ -96,7 +98,7 @@ contains
     attractor%features%word = cycle_word(moving, first, attractor%period)
     attractor%section = section_state(moving, attractor%points(:, 1))
     if (tally%chatters == 0) then
-      call differentiate(moving, attractor%points(:n, 1), attractor%period, attractor%scale(:n), jacobian, found)
+      call derivative(moving, attractor%points(:n, 1), attractor%period, attractor%scale(:n), jacobian, found)
       if (.not. found) return
       attractor%multipliers(:n) = eigenvalues(jacobian)
       attractor%multiplier = abs(attractor%multipliers(1))
@@ -134,14 +136,16 @@ contains
   end subroutine collect
 
   !> The smallest part of a closed round of section points after which all of them are the same but for rounding.
-  pure integer function smallest_period(points, scale) result(period)
-    real(wp), intent(in) :: points(:, 0:), scale(:)
+  pure integer function smallest_period(points, scale, turn) result(period)
+    real(wp), intent(in) :: points(:, 0:), scale(:), turn
     integer :: i, whole
     whole = size(points, 2)
     do period = 1, whole - 1
       if (modulo(whole, period) > 0) cycle
       do i = 0, whole - 1
-        if (norm2((points(:, modulo(i + period, whole)) - points(:, i))/scale) > same_state) exit
+        associate (later => point_near(points(:, modulo(i + period, whole)), points(:, i), turn))
+          if (norm2((later - points(:, i))/scale) > same_state) exit
+        end associate
       end do
       if (i == whole) return
     end do
@@ -185,8 +189,10 @@ contains
     do k = 1, attractor%period
       call advance_strobe_period(moving, strobe, tally, reason)
       if (reason /= 0) return
-      reached = section_point(moving, strobe)
-      distance = norm2((reached(:n) - attractor%points(:n, 1 + modulo(i + k - 1, attractor%period)))/attractor%scale(:n))
+      associate (wanted => attractor%points(:, 1 + modulo(i + k - 1, attractor%period)))
+        reached = point_near(section_point(moving, strobe), wanted, attractor%turn)
+        distance = norm2((reached(:n) - wanted(:n))/attractor%scale(:n))
+      end associate
       follows = distance <= same_state
       if (follows) return
     end do

@@ -4,6 +4,7 @@
 !> Carries labels from one parameter value to the next, so that a branch keeps its number and its colour.
 module match
   use attractors, only: attractor_t
+  use circle, only: point_near
   use kinds, only: wp
   implicit none
   private
@@ -74,12 +75,15 @@ contains
     distance = huge(1.0_wp)
     n = a%coordinates
     if (a%period /= b%period .or. a%features%regime /= b%features%regime .or. n /= b%coordinates) return
+    if (abs(a%features%rotation - b%features%rotation) > 0 .and. a%period > 0) return
     if (a%rests .or. a%period == 0) then
       distance = 0
       return
     end if
     do i = 1, b%period
-      distance = min(distance, norm2((a%points(:n, 1) - b%points(:n, i))/max(a%scale(:n), b%scale(:n))))
+      associate (near => point_near(b%points(:n, i), a%points(:n, 1), a%turn))
+        distance = min(distance, norm2((a%points(:n, 1) - near)/max(a%scale(:n), b%scale(:n))))
+      end associate
     end do
   end function branch_distance
 

@@ -5,7 +5,7 @@
 module sampling
   use kinds, only: wp
   use motion, only: motion_t
-  use motion_state, only: tally_t
+  use motion_state, only: place_of, tally_t
   use pair_modes, only: at_x1
   use strobe, only: advance_strobe, advance_strobe_period, start_strobe, strobe_t
   implicit none
@@ -37,7 +37,7 @@ contains
         section = section + moving%machine%period
       end do
       if (reason == 0) call advance_strobe(moving, strobe, times(i) - section, tally, reason)
-      x(i) = strobe%state%x
+      x(i) = place_of(strobe%state)
       if (allocated(moving%pair)) driver(i) = strobe%pair%y(at_x1)
     end do
   end subroutine sample_positions

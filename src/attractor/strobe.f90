@@ -6,7 +6,7 @@
 !> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
 !> velocity of both where nothing ties either to the ground.
 module strobe
-  use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck
+  use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck, wrap_range
   use contact_law, only: contact_t
   use energy, only: energy_of_body, record_with_book
   use event_words, only: canonical_word
@@ -17,7 +17,7 @@ module strobe
   use jointed_state, only: jointed_state_t
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: log_t, record_sample, reset_tally, state_t, tally_t
+  use motion_state, only: log_t, record_sample, reset_tally, state_t, take_turns, tally_t
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion
   use pair_flight, only: body_state, driver_of, energy_of
   use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
@@ -120,6 +120,7 @@ contains
       strobe%state = body_state(strobe%pair)
     else
       strobe%state = start_state(moving, start(1), start(2), start(3))
+      call take_turns(moving%machine%turn, strobe%state)
     end if
   end function start_strobe
 
@@ -173,6 +174,7 @@ contains
       return
     else if (.not. allocated(moving%pair)) then
       strobe%state = start_state(moving, point(1), point(2), 0.0_wp)
+      call take_turns(moving%machine%turn, strobe%state)
       return
     end if
     n = coordinates_of(moving)
@@ -236,7 +238,9 @@ contains
     if (allocated(moving%jointed)) then
       scales = scales_of_jointed(moving%jointed, half_range)
     else if (.not. allocated(moving%pair)) then
-      scales(:2) = half_range*[1.0_wp, w]
+      length = half_range
+      if (moving%machine%turn > 0) length = min(length, moving%machine%turn/2)
+      scales(:2) = length*[1.0_wp, w]
     else
       counts = counts_of(moving)
       n = count(counts)
@@ -281,6 +285,7 @@ contains
       strobe%state = body_state(strobe%pair)
     else
       call advance_period(moving, strobe%state, tally, reason, log)
+      call take_turns(moving%machine%turn, strobe%state, tally)
     end if
   end subroutine advance_strobe_period
 
@@ -291,6 +296,8 @@ contains
     real(wp), intent(in) :: periods
     type(features_t) :: features
     features = regime_of(tally, periods)
+    features%rotation = real(tally%turns, wp)/periods
+    call wrap_range(features, moving%machine%turn)
     if (allocated(moving%pair) .and. features%regime == regime_at_rest) features%regime = regime_stuck
   end function features_over
 

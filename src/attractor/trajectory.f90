@@ -7,14 +7,14 @@ module trajectory
   use attractors, only: attractor_t, features_t, find_box, find_capture
   use kinds, only: int64, wp
   use motion, only: advance, motion_t
-  use motion_state, only: log_t, reset_tally, tally_t
+  use motion_state, only: log_t, place_of, reset_tally, tally_t
   use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, rest_lasts, section_point, &
     start_strobe, strobe_t
   use status, only: reason_settled, reason_time_over
   implicit none
   private
 
-  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, conclude
+  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, conclude, fit_window
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -23,6 +23,8 @@ module trajectory
     real(wp) :: extension = 4
     !> End at capture, described by the attractor; otherwise run the whole duration.
     logical :: stop_when_captured = .true.
+    !> The window is to be a whole number of drive periods; see `fit_window`.
+    logical :: whole_periods = .false.
   end type span_t
 
   type, public :: outcome_t
@@ -141,6 +143,14 @@ contains
     sections_ahead = max(0, int((end_of_phase(span, course%phase) - course%elapsed)/moving%machine%period) - 2)
   end function sections_ahead
 
+  !> Makes the window the nearest whole number of drive periods [s], at least one, that the duration holds, if it is to be so.
+  pure subroutine fit_window(period, span)
+    real(wp), intent(in) :: period
+    type(span_t), intent(inout) :: span
+    if (.not. span%whole_periods .or. span%duration < period) return
+    span%window = min(max(1.0_wp, anint(span%window/period)), aint(span%duration/period))*period
+  end subroutine fit_window
+
   !> Whether a course is over as soon as it is captured.
   pure logical function ends_captured(span, course)
     type(span_t), intent(in) :: span
@@ -241,7 +251,7 @@ contains
   pure subroutine note_state(course, outcome)
     type(course_t), intent(in) :: course
     type(outcome_t), intent(inout) :: outcome
-    outcome%x = course%state%x
+    outcome%x = place_of(course%state)
     outcome%v = course%state%v
     outcome%impacts = course%impacts + course%tally%impacts
     outcome%last_impact_speed = latest_impact_speed(course)

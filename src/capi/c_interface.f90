@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The functions of include/separatrix.h, which says what they do, but for the one of `c_segments`. Nothing is kept between
+!> The functions of include/separatrix.h, which says what they do, but for those of `c_segments` and `c_effects`. Nothing is kept between
 !> calls but what a handle holds.
 module c_interface
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
@@ -9,7 +9,7 @@ module c_interface
   use c_text, only: answer, from_c, to_c
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: effect_family, find_law, law_choice_t, law_rows => laws, parameters
+  use law_table, only: law_choice_t
   use model_type, only: check_values, find_parameter, model_from_text, model_options, model_t, read_model, text_with
   use motion, only: motion_t
   use parameter_list, only: put_values
@@ -19,7 +19,7 @@ module c_interface
   private
 
   public :: separatrix_model_read, separatrix_model_from_text, separatrix_model_free, separatrix_parameter_count, &
-    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_model_text, separatrix_effect_parameter
+    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_model_text
 
 contains
 
@@ -162,31 +162,5 @@ contains
     end if
     code = answer(error, message, message_size)
   end function separatrix_model_text
-
-  integer(c_int) function separatrix_effect_parameter(index, effect, effect_size, meaning, meaning_size, parameter, &
-      parameter_size, unit, unit_size, numbers, message, message_size) bind(c) result(code)
-    integer(c_int), value :: index
-    character(kind=c_char), intent(inout) :: effect(*), meaning(*), parameter(*), unit(*), message(*)
-    integer(c_size_t), value :: effect_size, meaning_size, parameter_size, unit_size, message_size
-    real(c_double), intent(out) :: numbers(4)
-    type(error_t), allocatable :: error
-    integer, allocatable :: rows(:)
-    integer :: i
-    numbers = 0
-    rows = pack([(i, i=1, size(parameters))], parameters%family == effect_family)
-    if (index < 0 .or. index >= size(rows)) then
-      call fail(error, exit_usage, 'row of the effects: found '//to_text(int(index))//', allowed 0 to '// &
-                to_text(size(rows) - 1))
-    else
-      associate (row => parameters(rows(index + 1)))
-        call to_c(trim(row%law), effect, effect_size)
-        call to_c(trim(law_rows(find_law(effect_family, trim(row%law)))%meaning), meaning, meaning_size)
-        call to_c(trim(row%name), parameter, parameter_size)
-        call to_c(trim(row%unit), unit, unit_size)
-        numbers = [row%default, row%lower, row%upper, merge(1.0_wp, 0.0_wp, row%optional)]
-      end associate
-    end if
-    code = answer(error, message, message_size)
-  end function separatrix_effect_parameter
 
 end module c_interface

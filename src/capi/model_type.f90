@@ -5,12 +5,13 @@
 module model_type
   use case_echo, only: echo_case
   use case_reader, only: load_case, load_case_text
+  use case_setup, only: options_of
   use case_type, only: case_t, drive_law
   use case_values, only: allowed_range, bounds_t
   use errors, only: error_t, fail
-  use kinds, only: int64, wp
-  use law_table, only: law_choice_t, set_value
-  use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
+  use kinds, only: wp
+  use law_table, only: effect_family, find_law, law_choice, law_choice_t, law_names, parameter_row_t, parameters_of, set_value
+  use motion_state, only: options_t
   use parameter_list, only: list_parameters, parameter_t, put_values
   use status, only: exit_bad_case, exit_usage
   use suggest, only: nearest_word
@@ -18,7 +19,8 @@ module model_type
   implicit none
   private
 
-  public :: read_model, model_from_text, find_parameter, check_values, laws_with_force, model_options, text_with
+  public :: read_model, model_from_text, find_parameter, check_values, laws_with_force, model_options, text_with, &
+    model_with_effect
 
   type, public :: model_t
     type(case_t) :: the_case
@@ -115,21 +117,12 @@ contains
   end subroutine laws_with_force
 
   !> Integrator options of the case with another `tolerance` of the adaptive flight.
-  pure function model_options(model, tolerance) result(options)
+  function model_options(model, tolerance) result(options)
     type(model_t), intent(in) :: model
     real(wp), intent(in) :: tolerance
     type(options_t) :: options
-    select case (model%the_case%integrator%flight)
-    case ('exact')
-      options%flight = flight_exact
-    case ('adaptive')
-      options%flight = flight_adaptive
-    case default
-      options%flight = flight_auto
-    end select
+    options = options_of(model%the_case)
     options%tolerance = tolerance
-    options%event_budget = int(model%the_case%integrator%event_budget, int64)
-    options%domain = model%the_case%run%domain
   end function model_options
 
   !> The resolved case with other values. Code 65 if together they make no valid case.
@@ -146,5 +139,48 @@ contains
     text = echo_case(changed)
     call load_case_text(text, model%the_case%path, no_overrides, read_back, error)
   end subroutine text_with
+
+  !> The model with the effect `name` added, of which `keys` have `values`; the others take their defaults. Code 65 if there is
+  !> no such effect, it is there already, a parameter is unknown or missing, or together they make no valid case.
+  subroutine model_with_effect(model, name, keys, values, extended, error)
+    type(model_t), intent(in) :: model
+    character(len=*), intent(in) :: name, keys(:)
+    real(wp), intent(in) :: values(:)
+    type(model_t), intent(out) :: extended
+    type(error_t), allocatable, intent(out) :: error
+    type(parameter_row_t), allocatable :: rows(:)
+    type(law_choice_t) :: added
+    type(case_t) :: changed
+    character(len=1) :: no_overrides(0)
+    integer :: i
+    if (find_law(effect_family, name) == 0) then
+      call fail(error, exit_bad_case, 'effect '''//name//''': unknown; allowed '//law_names(effect_family))
+      return
+    end if
+    if (any(model%the_case%laws%family == effect_family .and. model%the_case%laws%name == name)) then
+      call fail(error, exit_bad_case, model%the_case%path//': effect '''//name//''': the case has it already')
+      return
+    end if
+    rows = parameters_of(effect_family, name)
+    do i = 1, size(keys)
+      if (any(rows%name == keys(i))) cycle
+      call fail(error, exit_bad_case, 'effect.'//name//': parameter '''//trim(keys(i))//''': unknown; allowed '// &
+                join(rows%name, ', '))
+      return
+    end do
+    added = law_choice(effect_family, name)
+    do i = 1, size(rows)
+      if (any(keys == rows(i)%name)) then
+        call set_value(added, trim(rows(i)%name), [values(findloc(keys == rows(i)%name, .true., dim=1))])
+      else if (.not. rows(i)%optional) then
+        call fail(error, exit_bad_case, 'effect.'//name//': '''//trim(rows(i)%name)//''' is missing')
+        return
+      end if
+    end do
+    changed = model%the_case
+    changed%laws = [changed%laws, added]
+    call load_case_text(echo_case(changed), model%the_case%path, no_overrides, extended%the_case, error)
+    if (.not. allocated(error)) extended%parameters = list_parameters(extended%the_case%laws)
+  end subroutine model_with_effect
 
 end module model_type

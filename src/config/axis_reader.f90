@@ -3,6 +3,7 @@
 
 !> The tables [[axis]], [grid] and [sweep].
 module axis_reader
+  use angle_units, only: unit_of
   use axis, only: axis_t, linear_values
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
   use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, &
@@ -12,6 +13,7 @@ module axis_reader
     take_range, take_real, take_reals, take_text
   use kinds, only: wp
   use law_table, only: law_choice_t
+  use restoring_law, only: position_is_angle
   use text, only: to_text
   use toml_bindings, only: toml_array
   implicit none
@@ -217,8 +219,10 @@ contains
       if (any(sweep%starts == 0) .and. any(sweep%starts > 0)) then
         call report(source, 'sweep.starts', 'found one zero, allowed [0, 0] or two positive numbers')
       end if
-      call take_start_range(source, the_case%axes, 'x0', 'm', sweep%starts(1), sweep%x0)
-      call take_start_range(source, the_case%axes, 'v0', 'm/s', sweep%starts(2), sweep%v0)
+      associate (is_angle => position_is_angle(the_case%laws))
+        call take_start_range(source, the_case%axes, 'x0', unit_of('m', is_angle), sweep%starts(1), sweep%x0)
+        call take_start_range(source, the_case%axes, 'v0', unit_of('m/s', is_angle), sweep%starts(2), sweep%v0)
+      end associate
       call take_integer(source, 'sweep.samples', 1, sweep%samples)
       call take_real(source, 'sweep.limit_tolerance', more_than(0.0_wp, bounds%unit), sweep%limit_tolerance)
     end associate

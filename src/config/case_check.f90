@@ -26,7 +26,7 @@ module case_check
   implicit none
   private
 
-  public :: check_case, require_axes, require_sweep, require_start
+  public :: beyond, check_case, require_axes, require_sweep, require_start
 
   !> Combinations of axis values that are checked one by one; of more, the corners.
   integer, parameter :: most_combinations = 4096

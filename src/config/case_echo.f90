@@ -164,6 +164,7 @@ contains
              newline//'[run]'//newline// &
              line('duration', to_text(run%duration))// &
              line('window', to_text(run%window))// &
+             line('average', quoted(trim(run%average)))// &
              line('stop', quoted(trim(run%stop)))// &
              line('extension', to_text(run%extension))// &
              line('domain', to_text(run%domain))// &
@@ -176,7 +177,8 @@ contains
              newline//'[attractors]'//newline// &
              line('sample', to_text(attractors%sample))// &
              line('seed', to_text(attractors%seed))// &
-             line('max_period', to_text(attractors%max_period))
+             line('max_period', to_text(attractors%max_period))// &
+             line('second_look', to_text(attractors%second_look))
     end associate
   end function settings_text
 

@@ -3,11 +3,13 @@
 
 !> Parameters by name: 'x0', 'v0', 'crank_angle' of the start, 'family.parameter' of a law and 'effect.NAME.parameter'.
 module case_parameters
+  use angle_units, only: unit_of
   use case_values, only: allowed_range, any_number, between, bounds_t
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
     path_of
+  use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
   implicit none
   private
@@ -69,9 +71,9 @@ contains
     found = .true.
     select case (path)
     case ('x0')
-      bounds = any_number('m')
+      bounds = any_number(unit_of('m', position_is_angle(laws)))
     case ('v0')
-      bounds = any_number('m/s')
+      bounds = any_number(unit_of('m/s', position_is_angle(laws)))
     case ('crank_angle')
       bounds = between(-largest_angle, largest_angle, 'rad')
     case default

@@ -4,6 +4,7 @@
 !> From a case file (docs/case-file.md) to a case. Every problem of a file is reported at once, a
 !> line each: `FILE:LINE: key 'friction.damping': found ..., allowed ...`.
 module case_reader
+  use angle_units, only: unit_of
   use attractors, only: longest_period
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
@@ -15,10 +16,14 @@ module case_reader
   use kinds, only: wp
   use law_reader, only: read_laws
   use law_table, only: largest_angle
+  use restoring_law, only: position_is_angle
   use refinement, only: largest_block, largest_step, most_probes
   use toml_bindings, only: read_text_file
   implicit none
   private
+
+  !> Most starts of a second look for attractors.
+  integer, parameter :: most_starts = 1000000
 
   public :: load_case, load_case_text
 
@@ -71,8 +76,10 @@ contains
     logical :: found
     call enter_table(source, 'start', found)
     associate (start => the_case%start)
-      call take_real(source, 'start.x0', any_number('m'), start%x0)
-      call take_real(source, 'start.v0', any_number('m/s'), start%v0)
+      associate (is_angle => position_is_angle(the_case%laws))
+        call take_real(source, 'start.x0', any_number(unit_of('m', is_angle)), start%x0)
+        call take_real(source, 'start.v0', any_number(unit_of('m/s', is_angle)), start%v0)
+      end associate
       call take_real(source, 'start.crank_angle', between(-largest_angle, largest_angle, 'rad'), start%crank_angle)
     end associate
   end subroutine read_start
@@ -86,6 +93,7 @@ contains
       call take_real(source, 'run.duration', more_than(0.0_wp, 's'), run%duration)
       run%window = run%duration/4
       call take_real(source, 'run.window', more_than(0.0_wp, 's'), run%window)
+      call take_choice(source, 'run.average', ['whole_periods', 'window       '], run%average)
       call take_choice(source, 'run.stop', ['captured', 'duration'], run%stop)
       call take_real(source, 'run.extension', at_least(1.0_wp, '1'), run%extension)
       call take_real(source, 'run.domain', more_than(0.0_wp, 'm'), run%domain)
@@ -115,6 +123,7 @@ contains
       call take_integer(source, 'attractors.sample', 1, attractors%sample)
       call take_integer(source, 'attractors.seed', 0, attractors%seed)
       call take_integer(source, 'attractors.max_period', 1, attractors%max_period, highest=longest_period)
+      call take_integer(source, 'attractors.second_look', 0, attractors%second_look, highest=most_starts)
     end associate
   end subroutine read_attractors
 

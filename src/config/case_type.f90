@@ -28,6 +28,8 @@ module case_type
     real(wp) :: extension = 4
     !> Largest |x| (m).
     real(wp) :: domain = 1e6_wp
+    !> What steady values are taken over: whole drive periods, or the window as it is.
+    character(len=13) :: average = 'whole_periods'
   end type run_t
 
   type, public :: integrator_t
@@ -49,6 +51,8 @@ module case_type
     integer :: seed = 1
     !> Longest period looked for, in drive periods.
     integer :: max_period = 16
+    !> Most points without an attractor from which attractors are searched again.
+    integer :: second_look = 128
   end type attractors_t
 
   type, public :: sweep_t

@@ -279,7 +279,7 @@ contains
   subroutine take_choice(source, path, words, value)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path, words(:)
-    character(len=8), intent(inout) :: value
+    character(len=*), intent(inout) :: value
     integer :: at
     call look_up(source, path, at=at)
     if (at == 0) return

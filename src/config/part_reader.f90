@@ -8,8 +8,8 @@ module part_reader
   use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
   use kinds, only: wp
-  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, parameters_of, &
-    part_family, part_kind, part_law, set_value, value_of
+  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
+    parameters_of, part_family, part_kind, part_law, set_value, value_of
   use suggest, only: nearest_word
   use text, only: join, starts_with, to_text
   use toml_bindings, only: toml_array, toml_string, toml_table

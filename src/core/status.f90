@@ -11,7 +11,7 @@ module status
   ! Exit codes (sysexits style).
   integer, parameter, public :: exit_done = 0, exit_usage = 64, exit_bad_case = 65, &
     exit_no_input = 66, exit_internal = 70, exit_cannot_create = 73, exit_io = 74, &
-    exit_resumable = 75, exit_other_case = 76
+    exit_resumable = 75, exit_other_case = 76, exit_uncertain = 77
 
   ! Why a trajectory ended. The codes add up to the number of points; there is no catch-all.
   integer, parameter, public :: reason_not_run = 0, reason_settled = 1, reason_time_over = 2, &

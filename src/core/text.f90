@@ -7,7 +7,7 @@ module text
   implicit none
   private
 
-  public :: to_text, read_number, join, number_length, replace_all, starts_with
+  public :: to_text, interval_text, read_number, join, number_length, replace_all, starts_with
 
   !> Shortest common form of a number: integers plain, reals with up to 17 significant digits so
   !> that reading them back gives the same bits.
@@ -62,6 +62,19 @@ contains
       if (status == 0 .and. back == value) return
     end do
   end function real_to_text
+
+  !> Both ends of an interval, to a tenth of its width or six digits.
+  pure function interval_text(interval, between) result(text)
+    real(real64), intent(in) :: interval(2)
+    character(len=*), intent(in) :: between
+    character(len=:), allocatable :: text
+    real(real64) :: largest, width
+    integer :: digits
+    largest = max(maxval(abs(interval)), tiny(largest))
+    width = max(abs(interval(2) - interval(1)), epsilon(largest)*largest)
+    digits = min(17, max(6, 2 + ceiling(log10(largest/width))))
+    text = to_text(interval(1), digits)//between//to_text(interval(2), digits)
+  end function interval_text
 
   pure function with_digits(value, digits) result(text)
     real(real64), intent(in) :: value

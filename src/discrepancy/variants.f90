@@ -8,6 +8,7 @@
 !> tolerance that neighbours do not share.
 module variants
   use build_motion, only: machine_of
+  use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
@@ -34,10 +35,6 @@ module variants
   integer, parameter, public :: sensor_bias = 1, sensor_gain = 2, sensor_delay = 3
   character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
     'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
-
-  !> Laws that decide only what happens at the barriers.
-  character(len=*), parameter :: contact_tables(4) = [character(len=26) :: &
-    'contact', 'effect.restitution_slope', 'effect.compliant_contact', 'effect.second_barrier']
 
   !> A machine that is a step away.
   type, public :: variant_t
@@ -187,7 +184,11 @@ contains
 
   pure elemental logical function of_contact(path)
     character(len=*), intent(in) :: path
-    of_contact = any(contact_tables == path(:index(path, '.', back=.true.) - 1))
+    character(len=*), parameter :: effect = 'effect.'
+    integer :: last
+    last = index(path, '.', back=.true.) - 1
+    of_contact = path(:last) == 'contact'
+    if (index(path, effect) == 1) of_contact = acts_at_barrier(path(len(effect) + 1:last))
   end function of_contact
 
   pure subroutine take_step(plan, which, sense, share, adaptive, variant, error)

@@ -4,66 +4,44 @@
 !> `separatrix basin`: where every point of a grid ends up.
 module basin_driver
   use attractors, only: last_regime, regime_names
-  use basin, only: basin_points, basin_variables, catalogue_t, marks_of_attractor, points_at_a_time, settling_value, &
-    slice_cache_t
+  use basin, only: basin_variables, marks_of_attractor
+  use basin_work, only: basin_work_t, prepare_counts, sum_counts
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_report, only: attractor_text, not_known_text
+  use catalogue_report, only: attractor_text, missed_text, not_known_text
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use endings, only: report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
-  use grid, only: grid_t, point_slice, slice_period, two_axes
+  use grid, only: two_axes
   use journal, only: json_text
   use kinds, only: int64, wp
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
-  use refinement, only: automatic_block, last_origin
+  use refinement, only: automatic_block
   use refinement_report, only: add_refinement, report_refinement
   use refined_tile, only: layers_of, pilot_share
   use pair, only: is_pair
+  use restoring_law, only: position_is_angle
   use session, only: describe_file, identity_of, open_session, session_t
   use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
-  use status, only: last_reason, exit_done, reason_settled
+  use second_look, only: look_again, offer_second_look, resume_second_look
+  use status, only: exit_done
   use text, only: to_text
-  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
-  use trajectory, only: span_t
+  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, run_tiles
   implicit none
   private
 
-  public :: run_basin, prepare_basin, prepare_counts, describe_basin, end_basin
+  public :: run_basin, prepare_basin, describe_basin, end_basin
 
   !> Bytes of a point in the working file.
   integer, parameter, public :: bytes_per_point = 1 + 4 + 1 + 2 + 8 + 8*4
   integer, parameter :: bytes_per_refined_point = 1 + 4 + 1 + 2 + 8 + 1
   !> Slices up to which a dry run builds the catalogues.
   integer, parameter :: most_dry_slices = 16
-
-  type, extends(point_work_t), public :: basin_work_t
-    type(grid_t) :: grid
-    type(span_t) :: span
-    integer :: max_period = 16
-    type(catalogue_t), allocatable :: catalogues(:)
-    type(slice_cache_t) :: cache
-    !> Points per regime, per reason, and per entry of the catalogue.
-    integer(int64) :: regimes(0:last_regime) = 0, reasons(0:last_reason) = 0
-    integer(int64), allocatable :: captured(:)
-    !> Points of a refined map per origin.
-    integer(int64) :: origins(0:last_origin) = 0
-    !> The slice whose drive period [s] was last asked for.
-    integer(int64) :: period_slice = -1
-    real(wp) :: period = 1
-    !> Entries of the catalogue before each slice.
-    integer, allocatable :: offset(:)
-  contains
-    procedure :: compute => compute_basin_points
-    procedure :: note => note_basin_point
-    procedure :: tell_apart => tell_apart_basin_points
-    procedure :: points_from => basin_points_from
-  end type basin_work_t
 
 contains
 
@@ -113,8 +91,10 @@ contains
                                                pack_catalogues(work%catalogues, spread(.true., 1, size(work%catalogues))))
     call open_tiles(session, path, schema, dimensions, tile, file)
     if (command%search_only) call finish_search(session, file)
+    call resume_second_look(session, file, work)
     call run_tiles(session, file, work, complete)
     if (command%shard > 0 .and. complete) call finish_shard(session, file)
+    if (complete) call look_again(session, file, work, complete)
     call end_basin(session, work, file, complete)
   end subroutine run_basin
 
@@ -161,6 +141,7 @@ contains
     else
       call add_map_variables(schema, '', dimensions)
     end if
+    if (size(work%catalogues) > 0) call offer_second_look(session%the_case%attractors%second_look, schema)
   end subroutine describe_basin
 
   !> The final file with its catalogue, the shares of the regimes, and the end of the program.
@@ -188,89 +169,6 @@ contains
                                                                                                    work%refined_axes))
     work%marks = marks_of_attractor
   end subroutine prepare_refinement
-
-  !> Counts per entry of the catalogue, all 0.
-  subroutine prepare_counts(work)
-    type(basin_work_t), intent(inout) :: work
-    integer :: i
-    allocate (work%offset(size(work%catalogues) + 1))
-    work%offset(1) = 0
-    do i = 1, size(work%catalogues)
-      work%offset(i + 1) = work%offset(i) + size(work%catalogues(i)%attractors)
-    end do
-    allocate (work%captured(work%offset(size(work%offset))), source=0_int64)
-  end subroutine prepare_counts
-
-  subroutine compute_basin_points(self, index, values, error)
-    class(basin_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:, :)
-    real(wp), intent(out) :: values(:, :)
-    type(error_t), allocatable, intent(out) :: error
-    call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
-  end subroutine compute_basin_points
-
-  subroutine basin_points_from(self, index, points, error)
-    class(basin_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    integer, intent(out) :: points
-    type(error_t), allocatable, intent(out) :: error
-    points = 1
-    if (size(self%catalogues) > 0) call points_at_a_time(self%grid, self%span, index, self%cache, points, error)
-  end subroutine basin_points_from
-
-  !> Points of one cell are to have the same attractor, and to settle about equally fast.
-  subroutine tell_apart_basin_points(self, index, values, marks, settling, error)
-    class(basin_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:, :)
-    real(wp), intent(in) :: values(:, :)
-    real(wp), intent(out) :: marks(:, :), settling(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: slice
-    integer :: i
-    marks = values(:, :marks_of_attractor)
-    settling = 0
-    do i = 1, size(settling)
-      if (nint(values(i, 3)) /= reason_settled) cycle
-      slice = point_slice(self%grid, index(:, i))
-      if (slice /= self%period_slice) call slice_period(self%grid, slice, self%period, error)
-      if (allocated(error)) return
-      self%period_slice = slice
-      settling(i) = values(i, settling_value)/self%period
-    end do
-  end subroutine tell_apart_basin_points
-
-  subroutine note_basin_point(self, index, values)
-    class(basin_work_t), intent(inout) :: self
-    integer, intent(in) :: index(:)
-    real(wp), intent(in) :: values(:)
-    integer(int64) :: slice
-    integer :: k
-    associate (regime => nint(values(1)), label => nint(values(2)), reason => nint(values(3)))
-      self%regimes(regime) = self%regimes(regime) + 1
-      self%reasons(reason) = self%reasons(reason) + 1
-      if (self%refine%active) then
-        associate (origin => nint(values(marks_of_attractor + 1)))
-          self%origins(origin) = self%origins(origin) + 1
-        end associate
-      end if
-      if (label == 0 .or. size(self%catalogues) == 0) return
-      slice = point_slice(self%grid, index) + 1
-      do k = 1, size(self%catalogues(slice)%attractors)
-        if (self%catalogues(slice)%attractors(k)%id == label) then
-          self%captured(self%offset(slice) + k) = self%captured(self%offset(slice) + k) + 1
-        end if
-      end do
-    end associate
-  end subroutine note_basin_point
-
-  subroutine sum_counts(session, work)
-    type(session_t), intent(in) :: session
-    type(basin_work_t), intent(inout) :: work
-    call session%team%sum(work%regimes)
-    call session%team%sum(work%reasons)
-    call session%team%sum(work%origins)
-    if (size(work%captured) > 0) call session%team%sum(work%captured)
-  end subroutine sum_counts
 
   !> Says what a dry run would do, with a rate from a few points, and ends the program.
   subroutine report_plan(session, work, tile)
@@ -311,9 +209,11 @@ contains
       source, '"attractors": '//to_text(last))
     if (len(not_known_text(work%catalogues, work%span%extension)) > 0) call session%journal%line('warning', &
       not_known_text(work%catalogues, work%span%extension))
+    call session%journal%line('missed', missed_text(work%catalogues, session%the_case%attractors%sample))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
-      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k)))
+      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k), &
+                                                          position_is_angle(session%the_case%laws)))
     end do
   end subroutine report_catalogue
 

@@ -3,20 +3,26 @@
 
 !> What is said of the attractors of a map.
 module catalogue_report
-  use attractors, only: attractor_t, kind_chaotic, kind_not_known, regime_names
+  use angle_units, only: unit_of
+  use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_not_known, regime_names
   use basin, only: catalogue_t
   use kinds, only: wp
+  use statistics, only: share_upper_limit
   use text, only: to_text
   implicit none
   private
 
-  public :: attractor_text, not_known_text
+  public :: attractor_text, not_known_text, missed_text
+
+  !> Confidence of the bound on what the sample has missed.
+  real(wp), parameter :: confidence = 0.95_wp
 
 contains
 
   !> An attractor in a line.
-  function attractor_text(attractor) result(line)
+  function attractor_text(attractor, is_angle) result(line)
     type(attractor_t), intent(in) :: attractor
+    logical, intent(in) :: is_angle
     character(len=:), allocatable :: line
     line = '  '//to_text(attractor%id)//': '//trim(regime_names(attractor%features%regime))
     select case (attractor%kind)
@@ -27,8 +33,11 @@ contains
     case default
       line = line//', period '//to_text(attractor%period)
     end select
-    line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' m, '// &
+    line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
            to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
+    if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) then
+      line = line//', rotation number '//to_text(attractor%features%rotation, 4)
+    end if
     if (attractor%kind == kind_chaotic .or. attractor%kind == kind_not_known) then
       line = line//', neighbours drift apart by '//to_text(attractor%multiplier, 4)//' a period'
     else
@@ -55,5 +64,19 @@ contains
       ' slices, are not known to be periodic, nor do neighbouring motions drift apart: perhaps long transients. A longer '// &
       'run.duration or run.extension (now '//to_text(extension, 3)//') tells'
   end function not_known_text
+
+  !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where
+  !> there is no catalogue. The bound is that of independent starts.
+  function missed_text(catalogues, sample) result(line)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    integer, intent(in) :: sample
+    character(len=:), allocatable :: line
+    line = ''
+    if (size(catalogues) == 0) return
+    line = 'an attractor that was not found attracts less than '//to_text(100*share_upper_limit(0, sample, confidence), 3)// &
+      ' % of the starts'
+    if (size(catalogues) > 1) line = line//' of its slice'
+    line = line//', with '//to_text(100*confidence, 2)//' % confidence: none of '//to_text(sample)//' sampled starts led to another'
+  end function missed_text
 
 end module catalogue_report

@@ -6,7 +6,7 @@ module command_line
   use errors, only: error_t, fail
   use kinds, only: wp
   use status, only: exit_usage
-  use text, only: join, read_number, starts_with
+  use text, only: join, read_number, starts_with, to_text
   implicit none
   private
 
@@ -39,9 +39,13 @@ module command_line
     logical :: help = .false., version = .false., validate = .false., dry_run = .false.
     logical :: force = .false., resume = .false., json = .false., quiet = .false., search_only = .false.
     real(wp) :: time_limit = 0
+    !> Seconds between lines of progress; 0 = as the journal thinks fit.
+    real(wp) :: progress = 0
     integer :: ranks_per_node = 0
     !> `verify`: points rerun, and the seed that chooses them.
     integer :: sample = 200, seed = 1
+    !> `verify`: share of the labels that may change, in per cent.
+    real(wp) :: max_changes = 1
   end type command_t
 
 contains
@@ -187,7 +191,7 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--time-limit', '--ranks-per-node', '--sample', '--seed')
+          '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -220,13 +224,17 @@ contains
     case ('--shard')
       call read_shard(value, command, error)
     case ('--time-limit')
-      call read_seconds(name, value, command%time_limit, error)
+      call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%time_limit, error)
+    case ('--progress')
+      call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%progress, error)
     case ('--ranks-per-node')
       call read_integer(name, value, 1, command%ranks_per_node, error)
     case ('--sample')
       call read_integer(name, value, 1, command%sample, error)
     case ('--seed')
       call read_integer(name, value, 0, command%seed, error)
+    case ('--max-changes')
+      call read_number_in(name, value, 0.0_wp, 100.0_wp, 'per cent', command%max_changes, error)
     end select
   end subroutine take_value
 
@@ -267,18 +275,22 @@ contains
     end select
   end subroutine take_path
 
-  subroutine read_seconds(name, value, number, error)
-    character(len=*), intent(in) :: name, value
+  !> A number of `unit` from `lowest`, where tiny stands for above 0, to `highest`, where huge stands for any.
+  subroutine read_number_in(name, value, lowest, highest, unit, number, error)
+    character(len=*), intent(in) :: name, value, unit
+    real(wp), intent(in) :: lowest, highest
     real(wp), intent(out) :: number
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: range
     integer :: status
     number = 0
     status = verify(value, '0123456789.eE+-')
     if (status == 0) call read_number(value, number, status)
-    if (status /= 0 .or. .not. number > 0 .or. number > huge(number)) then
-      call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of seconds above 0")
-    end if
-  end subroutine read_seconds
+    if (status == 0 .and. number >= lowest .and. number <= highest) return
+    range = 'from '//to_text(lowest)//' to '//to_text(highest)
+    if (highest >= huge(highest)) range = 'above 0'
+    call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of "//unit//' '//range)
+  end subroutine read_number_in
 
   subroutine read_integer(name, value, least, number, error)
     character(len=*), intent(in) :: name, value
@@ -340,11 +352,13 @@ contains
       lines = 'separatrix info FILE [--json]: what a file holds, with shares of regimes and attractors'//nl
       return
     case ('verify')
-      lines = 'separatrix verify FILE [--sample N] [--seed N] [--json]: checks a map file'//nl// &
+      lines = 'separatrix verify FILE [--sample N] [--seed N] [--max-changes P] [--json]: checks a file'//nl// &
         '  Reads everything back, checks sums and invariants, and reruns a random sample of the points in double'//nl// &
         '  precision (must agree to the bit) and in quadruple precision (label flips, largest deviation).'//nl// &
+        '  Ends with code 77 if more labels would change than are allowed.'//nl// &
         '  --sample N      points rerun (default 200)'//nl// &
-        '  --seed N        seed that chooses them (default 1)'//nl
+        '  --seed N        seed that chooses them (default 1)'//nl// &
+        '  --max-changes P per cent of the labels rerun that may change (default 1)'//nl
       return
     case default
       lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl// &
@@ -371,12 +385,13 @@ contains
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &
+      '  --progress S       progress every S seconds (default: in a log after 10 s, then ever less often)'//nl// &
       '  --json             log as JSON lines'//nl// &
       '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'//nl// &
       '  -q, --quiet        errors only'//nl// &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &
       'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &
-      '75 stopped early and resumable, 76 file belongs to another case.'//nl
+      '75 stopped early and resumable, 76 file belongs to another case, 77 too many labels would change.'//nl
   end function help_text
 
 end module command_line

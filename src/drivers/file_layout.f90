@@ -3,7 +3,7 @@
 
 !> The variables of each kind of file, as docs/file-format.md lists them.
 module file_layout
-  use attractors, only: attractor_t, kind_cycle, kind_names, last_kind, last_regime, regime_names
+  use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_names, kind_not_known, last_kind, last_regime, regime_names
   use axis, only: axis_t
   use basin, only: catalogue_t
   use kinds, only: int64, wp
@@ -189,6 +189,9 @@ contains
              all_of_them%features%mean_impact_speed)
     call add('grazing_margin', type_float64, 'm', 'smallest distance to a barrier missed', &
              all_of_them%features%grazing_margin)
+    if (any(all_of_them%turn > 0)) call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', &
+      merge(all_of_them%features%rotation, ieee_value(1.0_wp, ieee_quiet_nan), all_of_them%kind /= kind_chaotic .and. &
+            all_of_them%kind /= kind_not_known))
     call add('count', type_int64, '1', 'points of the map captured', real(counts, wp))
     call schema%add_variable('kind', type_int8, ['entry'], units=coded_unit, group='catalogue', &
       long_name='whether it is a cycle, rest, chaotic, or nothing of them is known', flag_values=[(i, i=1, last_kind)], &

@@ -6,13 +6,14 @@ module info_driver
   use attractors, only: kind_chaotic, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t, fail
   use event_words, only: word_text
-  use journal, only: json_text
+  use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
   use map_verify, only: probe_file
   use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
-  use text, only: join, to_text
+  use text, only: interval_text, join, to_text
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -257,7 +258,7 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: table(:, :), entry_kinds(:)
+    real(wp), allocatable :: table(:, :), entry_kinds(:), rotations(:)
     character(len=:), allocatable :: line
     integer :: i, k
     integer(int64) :: kind
@@ -267,7 +268,14 @@ contains
     if (.not. allocated(error)) then
       if (reader%has('/catalogue/kind')) call reader%read_values('/catalogue/kind', entry_kinds, error)
     end if
+    ! Of an angle.
+    if (.not. allocated(error)) then
+      if (reader%has('/catalogue/rotation_number')) call reader%read_values('/catalogue/rotation_number', rotations, error)
+    end if
     if (allocated(error)) return
+    if (allocated(rotations)) then
+      if (size(rotations) /= size(table, 1)) deallocate (rotations)
+    end if
     if (allocated(entry_kinds)) then
       if (size(entry_kinds) /= size(table, 1)) deallocate (entry_kinds)
     end if
@@ -291,6 +299,12 @@ contains
           line = line//to_text(whole(table(i, k)))
         end select
       end do
+      if (allocated(rotations)) then
+        if (json) line = line//', "rotation_number": '
+        if (json .and. ieee_is_nan(rotations(i))) line = line//'null'
+        if (json .and. .not. ieee_is_nan(rotations(i))) line = line//to_text(rotations(i))
+        if (.not. json .and. abs(rotations(i)) > 0) line = line//', rotation_number '//to_text(rotations(i), 4)
+      end if
       if (allocated(entry_kinds)) then
         kind = whole(entry_kinds(i))
         if (kind >= 1 .and. kind <= last_kind) then
@@ -338,12 +352,15 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: names(:)
+    character(len=*), parameter :: group = '/limits/', columns(4) = [character(len=14) :: 'lower', 'upper', 'observed_lower', &
+      'observed_upper']
+    character(len=:), allocatable :: names(:), line
     real(wp), allocatable :: ends(:, :)
-    integer :: i
+    integer :: i, k, last
     if (.not. reader%has('/limits/name')) return
+    last = merge(4, 2, reader%has('/limits/observed_upper'))
     call reader%read_strings('/limits/name', names, error)
-    if (.not. allocated(error)) call reader%read_columns(['/limits/lower', '/limits/upper'], ends, error)
+    if (.not. allocated(error)) call reader%read_columns(group//columns(:last), ends, error)
     if (allocated(error)) return
     if (size(ends, 1) /= size(names)) then
       call fail(error, exit_io, "the columns of '/limits' in '"//reader%path//"' differ in length")
@@ -353,10 +370,16 @@ contains
     if (.not. json) body = body//new_line('a')//'  limits:'
     do i = 1, size(names)
       if (json) then
-        body = body//trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))//', "lower": '// &
-          to_text(ends(i, 1))//', "upper": '//to_text(ends(i, 2))//'}'
+        line = trim(merge(', ', '  ', i > 1))//'{"name": '//json_text(trim(names(i)))
+        do k = 1, last
+          line = line//', "'//trim(columns(k))//'": '//json_number(ends(i, k))
+        end do
+        body = body//line//'}'
       else
-        body = body//new_line('a')//'    '//trim(names(i))//': '//to_text(ends(i, 1), 6)//' .. '//to_text(ends(i, 2), 6)
+        line = 'not known'
+        if (abs(ends(i, 1)) <= huge(1.0_wp)) line = interval_text(ends(i, :2), ' .. ')
+        if (last == 4) line = line//'; in steps '//interval_text(ends(i, 3:), ' .. ')
+        body = body//new_line('a')//'    '//trim(names(i))//': '//line
       end if
     end do
     if (json) body = body//']'

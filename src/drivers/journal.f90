@@ -14,7 +14,7 @@ module journal
   implicit none
   private
 
-  public :: json_text, duration_text
+  public :: json_text, json_number, duration_text
 
   real(wp), parameter :: terminal_interval = 0.5_wp, first_interval = 10, longest_interval = 300
 
@@ -29,7 +29,7 @@ module journal
     logical :: active = .true., json = .false., quiet = .false.
     real(wp) :: started = 0
     real(wp) :: next_progress = 0, interval = first_interval
-    logical :: terminal = .false., line_open = .false.
+    logical :: terminal = .false., line_open = .false., steady = .false.
     !> Stdout, and the file of JSON lines.
     type(sink_t), private :: out, copy
     !> One of them could not be written.
@@ -51,10 +51,19 @@ module journal
 
 contains
 
-  !> Starts the clock.
-  subroutine open_journal(self, active, json, quiet)
+  !> A number in JSON, null where there is none.
+  pure function json_number(value) result(text)
+    real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
+    text = 'null'
+    if (abs(value) <= huge(value)) text = to_text(value)
+  end function json_number
+
+  !> Starts the clock. `progress_interval` [s]: 0 = every half second on a terminal, in a log ever less often.
+  subroutine open_journal(self, active, json, quiet, progress_interval)
     class(journal_t), intent(inout) :: self
     logical, intent(in) :: active, json, quiet
+    real(wp), intent(in), optional :: progress_interval
     self%active = active
     self%json = json
     self%quiet = quiet
@@ -62,6 +71,8 @@ contains
     self%started = monotonic_seconds()
     self%terminal = stderr_is_terminal() .and. .not. json
     self%interval = merge(terminal_interval, first_interval, self%terminal)
+    if (present(progress_interval)) self%steady = progress_interval > 0
+    if (self%steady) self%interval = progress_interval
     self%next_progress = self%started + self%interval
   end subroutine open_journal
 
@@ -149,7 +160,7 @@ contains
     if (.not. self%active .or. (self%quiet .and. self%copy%descriptor < 0)) return
     now = monotonic_seconds()
     if (now < self%next_progress .or. done <= self%before) return
-    if (.not. self%terminal) self%interval = min(2*self%interval, longest_interval)
+    if (.not. (self%terminal .or. self%steady)) self%interval = min(2*self%interval, longest_interval)
     self%next_progress = now + self%interval
     rate = real(done - self%before, wp)/max(now - self%stretch_started, 1e-3_wp)
     message = to_text(done)//' of '//to_text(self%total)//' '//self%things//', '//to_text(nint(100*real(done, wp) &

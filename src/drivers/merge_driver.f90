@@ -3,7 +3,8 @@
 
 !> `separatrix merge`: the shares of a map or of a list of starts become the file that one run would have written.
 module merge_driver
-  use basin_driver, only: basin_work_t, describe_basin, end_basin, prepare_basin, prepare_counts
+  use basin_driver, only: describe_basin, end_basin, prepare_basin
+  use basin_work, only: basin_work_t, prepare_counts
   use case_reader, only: load_case_text
   use catalogue_search, only: unpack_catalogues
   use command_line, only: command_t
@@ -12,6 +13,7 @@ module merge_driver
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
   use points_driver, only: describe_list, end_points, list_work_t, points_per_tile, read_list
+  use second_look, only: look_again
   use serial_team, only: serial_team_t
   use session, only: session_t
   use share_files, only: join_shares, note_builds, read_shares, shares_t
@@ -62,6 +64,7 @@ contains
     type(error_t), allocatable :: error
     character(len=name_length), allocatable :: dimensions(:)
     integer, allocatable :: tile(:)
+    logical :: complete
     if (len(session%command%csv) > 0) call fail(error, exit_usage, '--csv belongs to the shares of a list of starts')
     call session%stop_if(error)
     call prepare_basin(session%the_case, work, tile)
@@ -72,7 +75,8 @@ contains
     call note_builds(session, shares, schema, error)
     call session%stop_if(error)
     call join_shares(session, shares, session%command%path, schema, dimensions, tile, work, file)
-    call end_basin(session, work, file, complete=.true.)
+    call look_again(session, file, work, complete)
+    call end_basin(session, work, file, complete)
   end subroutine merge_map
 
   subroutine merge_list(session, shares)

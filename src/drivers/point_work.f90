@@ -22,11 +22,14 @@ module point_work
     integer :: marks = 0
     !> Points computed by this process, with those that several blocks have asked for.
     integer(int64) :: computed = 0
+    !> Tiles are there already: only points that do not stand are computed again.
+    logical :: again = .false.
   contains
     procedure(compute_points), deferred :: compute
     procedure(note_point), deferred :: note
     procedure :: tell_apart => by_all_values
     procedure :: points_from => block_of_points
+    procedure :: stands => never_again
   end type point_work_t
 
   abstract interface
@@ -87,6 +90,15 @@ contains
       points = self%block
     end associate
   end subroutine block_of_points
+
+  !> Whether a point of these values need not be computed again.
+  logical function never_again(self, values)
+    class(point_work_t), intent(in) :: self
+    real(wp), intent(in) :: values(:)
+    associate (unused => self, unused_too => values)
+    end associate
+    never_again = .true.
+  end function never_again
 
   !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch says stop.
   subroutine compute_list(work, index, values, whole, error, watch)

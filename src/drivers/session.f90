@@ -19,6 +19,7 @@ module session
   use output_check, only: check_create, check_result, check_resume, check_table, working_path
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
+  use restoring_law, only: position_is_angle
   use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
@@ -70,7 +71,7 @@ contains
     else
       call start_team(session%team)
     end if
-    call session%journal%open(session%team%is_root(), command%json, command%quiet)
+    call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     call session%stop_if(error)
     ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
@@ -140,6 +141,7 @@ contains
     character(len=*), intent(in), optional :: inputs
     type(schema_t), intent(inout) :: schema
     character(len=:), allocatable :: identity
+    schema%positions_are_angles = position_is_angle(session%the_case%laws)
     call session%provenance%describe(schema)
     call schema%add_attribute('', 'kind', kind)
     call schema%add_attribute('', 'title', session%the_case%title)

@@ -11,8 +11,10 @@ module sweep_chain
   use kinds, only: int64, wp
   use status, only: reason_time_over
   use stop_check, only: check_stop
+  use settling, only: settled_t
   use strobe, only: strobe_t
-  use sweep, only: bracket_limit, hold_parameter, hold_t
+  use sweep, only: hold_parameter, hold_t
+  use sweep_limits, only: branch_end, limit_not_known, observe_limit
   use team, only: team_t
   use trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -24,17 +26,20 @@ module sweep_chain
   !> Numbers kept of a hold before its samples: regime, reason, period, word, impacts per period, mean
   !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
   !> not a number there.
-  integer, parameter :: hold_numbers = 10, hold_codes = 4
+  integer, parameter :: hold_numbers = 11, hold_codes = 4
   integer, parameter, public :: hold_reason = 2
-  !> Most limits that are kept of one chain.
-  integer, parameter :: most_limits = 64
+  !> Most limits that are kept of one chain, and numbers kept of each.
+  integer, parameter :: most_limits = 64, limit_numbers = 7
 
   type, public :: limit_t
     !> Marks of the holds (see `hold_t`) before and behind it, and whether the parameter goes up.
     integer :: from = 0, to = 0
     logical :: up = .true.
-    !> Values between which the change lies.
+    !> Values between which the change was seen in steps.
+    real(wp) :: observed(2) = 0
+    !> Values between which the settled motion comes to its end, if the outcome is `limit_bracketed`; else not numbers.
     real(wp) :: bracket(2) = 0
+    integer :: outcome = limit_not_known
   end type limit_t
 
   !> Up (1) and down (2): numbers of each hold, and its section samples.
@@ -48,8 +53,8 @@ module sweep_chain
 contains
 
   !> Runs the chains that `ran` asks for over `values` of the parameter `path`, from the grid's own start, and tells
-  !> every rank.
-  subroutine run_chains(team, journal, time_limit, grid, span, path, values, ran, samples, tolerance, chains, error)
+  !> every rank. Cycles of at most `longest` drive periods are looked for.
+  subroutine run_chains(team, journal, time_limit, grid, span, path, values, ran, samples, longest, tolerance, chains, error)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
     real(wp), intent(in) :: time_limit
@@ -58,7 +63,7 @@ contains
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: values(:), tolerance
     logical, intent(in) :: ran(2)
-    integer, intent(in) :: samples
+    integer, intent(in) :: samples, longest
     type(chains_t), intent(out) :: chains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: mine(:), all_values(:), packed(:)
@@ -71,7 +76,7 @@ contains
     do direction = 1, 2
       if (.not. ran(direction) .or. modulo(direction - 1, team%size()) /= team%rank()) cycle
       call journal%begin('values', size(values, kind=int64), 0_int64)
-      call run_chain(journal, time_limit, grid, span, path, values, direction == 1, samples, tolerance, packed, error)
+      call run_chain(journal, time_limit, grid, span, path, values, direction == 1, samples, longest, tolerance, packed, error)
       if (allocated(error)) exit
       mine = [mine, real(direction, wp), packed]
     end do
@@ -81,8 +86,9 @@ contains
     call unpack_chains(all_values, samples, size(values), chains)
   end subroutine run_chains
 
-  !> One chain as plain numbers: holds, samples, number of limits, and marks before and behind, lower, upper of each.
-  subroutine run_chain(journal, time_limit, grid, span, path, values, up, samples, tolerance, packed, error)
+  !> One chain as plain numbers: holds, samples, number of limits, and of each marks before and behind, the bracket in steps, that of the
+  !> settled motion, its outcome.
+  subroutine run_chain(journal, time_limit, grid, span, path, values, up, samples, longest, tolerance, packed, error)
     type(journal_t), intent(inout) :: journal
     real(wp), intent(in) :: time_limit
     type(grid_t), intent(in) :: grid
@@ -90,36 +96,42 @@ contains
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: values(:), tolerance
     logical, intent(in) :: up
-    integer, intent(in) :: samples
+    integer, intent(in) :: samples, longest
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), bracket(2)
-    real(wp) :: limits(4, most_limits)
+    real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), observed(2), bracket(2)
+    real(wp) :: limits(limit_numbers, most_limits), course(size(values))
     type(hold_t) :: held
+    type(settled_t) :: settled(size(values))
     type(strobe_t) :: state
-    integer :: i, k, found, before, mark, next
+    integer :: i, k, found, before, mark, next, outcome
     state%state%x = grid%start(1)
     state%state%v = grid%start(2)
     found = 0
     before = 0
     mark = 0
+    course = values
+    if (.not. up) course = values(size(values):1:-1)
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
-      call hold_parameter(grid, span, path, values(k), state, merge(grid%start(3), 0.0_wp, i == 1), samples, held, error)
+      call hold_parameter(grid, span, path, course(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, error)
       if (allocated(error)) return
+      settled(i) = held%settled
       holds(:, k) = numbers_of(held)
       points(:, :, k) = held%samples
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == reason_time_over) then
         if (before > 0 .and. held%mark /= mark .and. found < most_limits) then
           next = held%mark
-          call bracket_limit(grid, span, path, values(before), values(k), state, mark, tolerance, next, bracket, error)
+          call observe_limit(grid, span, path, course(before), course(i), state, mark, tolerance, next, observed, error)
+          if (.not. allocated(error)) call branch_end(grid, path, course, settled(:before), state, mark, longest, tolerance, &
+                                                      bracket, outcome, error)
           if (allocated(error)) return
           found = found + 1
-          limits(:, found) = [real([mark, next], wp), bracket]
+          limits(:, found) = [real([mark, next], wp), observed, bracket, real(outcome, wp)]
         end if
         mark = held%mark
-        before = k
+        before = i
         state = held%state
       end if
       call journal%progress(int(i, int64))
@@ -127,15 +139,15 @@ contains
       if (allocated(error)) return
     end do
     packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(found, wp), &
-              reshape(limits(:, :found), [4*found])]
+              reshape(limits(:, :found), [limit_numbers*found])]
   end subroutine run_chain
 
   pure function numbers_of(held) result(numbers)
     type(hold_t), intent(in) :: held
     real(wp) :: numbers(hold_numbers)
     associate (f => held%features)
-      numbers = [real(f%regime, wp), real(held%reason, wp), real(held%period, wp), real(f%word, wp), &
-                 f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max]
+      numbers = [real(f%regime, wp), real(held%reason, wp), real(held%settled%period, wp), real(f%word, wp), &
+                 f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, f%rotation]
     end associate
   end function numbers_of
 
@@ -156,11 +168,12 @@ contains
       position = position + 2*samples*values
       count = nint(all_values(position))
       do i = 1, count
-        associate (numbers => all_values(position + 4*i - 3:position + 4*i))
-          chains%limits = [chains%limits, limit_t(nint(numbers(1)), nint(numbers(2)), direction == 1, numbers(3:))]
+        associate (numbers => all_values(position + limit_numbers*(i - 1) + 1:position + limit_numbers*i))
+          chains%limits = [chains%limits, limit_t(nint(numbers(1)), nint(numbers(2)), direction == 1, numbers(3:4), numbers(5:6), &
+                                                  nint(numbers(7)))]
         end associate
       end do
-      position = position + 4*count + 1
+      position = position + limit_numbers*count + 1
     end do
   end subroutine unpack_chains
 

@@ -3,30 +3,28 @@
 
 !> `separatrix sweep`: run up, run down, and many starts at every value of the parameter.
 module sweep_driver
-  use attractors, only: regime_impact, regime_names
+  use attractors, only: longest_period
   use axis, only: axis_t, linear_values
   use basin_driver, only: bytes_per_point
   use basin, only: basin_points, basin_variables, catalogue_t, points_at_a_time, slice_cache_t
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of
-  use case_type, only: case_t, contact_position => contact_law
+  use case_type, only: case_t
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
-  use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
   use endings, only: report_reasons
   use errors, only: error_t
-  use file_layout, only: add_axes, add_map_variables, add_reason, add_regime, axis_dimension
+  use file_layout, only: add_map_variables, axis_dimension
   use grid, only: grid_t
   use kinds, only: int64, wp
-  use law_table, only: effect_family
   use map_file, only: map_file_t
   use map_final, only: write_whole
-  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int64, type_string
-  use pair, only: is_pair
+  use map_schema, only: name_length, schema_t, type_float64
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_done, last_reason, reason_names, reason_settled, reason_time_over
-  use sweep_chain, only: chains_t, hold_reason, limit_t, run_chains
-  use text, only: replace_all, to_text
+  use status, only: exit_done, last_reason, reason_settled, reason_time_over
+  use sweep_chain, only: chains_t, run_chains
+  use sweep_report, only: describe_chains, report_given_up, report_limits
+  use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
   use written_check, only: check_written
@@ -92,7 +90,8 @@ contains
       call run_chains(session%team, session%journal, command%time_limit, &
                       grid_of(session%the_case, session%the_case%axes(:0)), work%span, &
                       trim(sweep%swept%name), sweep%swept%values, [sweep%directions /= 'down', &
-                      sweep%directions /= 'up'], sweep%samples, sweep%limit_tolerance, chains, error)
+                      sweep%directions /= 'up'], sweep%samples, longest_cycle(session%the_case), &
+                      sweep%limit_tolerance, chains, error)
       call session%stop_if(error)
       call report_given_up(session, chains)
       call report_limits(session, chains)
@@ -110,6 +109,12 @@ contains
     end if
     call session%end_with(exit_done)
   end subroutine run_sweep
+
+  !> Drive periods of the longest cycle that the runs look for: that of the attractors, or half of the samples that are kept.
+  pure integer function longest_cycle(the_case)
+    type(case_t), intent(in) :: the_case
+    longest_cycle = max(the_case%attractors%max_period, min(the_case%sweep%samples/2, longest_period))
+  end function longest_cycle
 
   subroutine prepare_branches(session, work)
     type(session_t), intent(in) :: session
@@ -207,157 +212,6 @@ contains
       end if
     end associate
   end subroutine note_branch_point
-
-  !> Run up and run down as variables, and the limits as a table.
-  subroutine describe_chains(session, chains, schema)
-    type(session_t), intent(in) :: session
-    type(chains_t), intent(in) :: chains
-    type(schema_t), intent(inout) :: schema
-    character(len=name_length), allocatable :: swept(:)
-    character(len=name_length) :: dimensions(2)
-    real(wp), allocatable :: barriers(:)
-    call add_axes(schema, [session%the_case%sweep%swept], swept)
-    call schema%add_dimension('direction', 2_int64)
-    call schema%add_dimension('sample', int(session%the_case%sweep%samples, int64))
-    dimensions = [character(len=name_length) :: 'direction', swept(1)]
-    call add_regime(schema, 'regime', dimensions, .false.)
-    call fill(1)
-    call add_reason(schema, 'reason', dimensions, .false.)
-    call fill(2)
-    call add('period', type_int16, '1', 'period in drive periods, 0 = not periodic', 3)
-    call add('event_word', type_int64, '1', 'events of one period of the motion, three bits each', 4)
-    call add('impacts_per_period', type_float64, '1', 'impacts per drive period', 5)
-    call add('mean_impact_speed', type_float64, 'm/s', 'mean speed just before impact', 6)
-    call add('amplitude', type_float64, 'm', 'half the range of the position', 7)
-    call add('x_max', type_float64, 'm', 'largest position', 8)
-    call add('x_min', type_float64, 'm', 'smallest position', 9)
-    call add('v_max', type_float64, 'm/s', 'largest velocity towards the upper barrier', 10)
-    call schema%add_variable('strobe_x', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
-      units='m', long_name='position at crank angle 0', data=reshape(chains%samples(1, :, :, :), &
-      [size(chains%samples)/2]))
-    call schema%add_variable('strobe_v', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
-      units='m/s', long_name='velocity at crank angle 0', data=reshape(chains%samples(2, :, :, :), &
-      [size(chains%samples)/2]))
-    if (size(chains%limits) > 0) call add_limits(session, schema, chains%limits)
-    barriers = barriers_of(session)
-    ! A barrier that is swept has no one position.
-    if (session%the_case%sweep%swept%name == 'contact.upper') barriers(1) = huge(1.0_wp)
-    if (session%the_case%sweep%swept%name == 'contact.lower') barriers(2) = -huge(1.0_wp)
-    if (barriers(1) < sqrt(huge(1.0_wp))) call schema%add_attribute('', 'barrier_upper', barriers(1))
-    if (barriers(2) > -sqrt(huge(1.0_wp))) call schema%add_attribute('', 'barrier_lower', barriers(2))
-
-  contains
-
-    subroutine add(name, type, units, long_name, row)
-      character(len=*), intent(in) :: name, units, long_name
-      integer, intent(in) :: type, row
-      call schema%add_variable(name, type, dimensions, units=units, long_name=long_name)
-      call fill(row)
-    end subroutine add
-
-    subroutine fill(row)
-      integer, intent(in) :: row
-      schema%variables(size(schema%variables))%data = reshape(chains%holds(row, :, :), [2*size(chains%holds, 2)])
-    end subroutine fill
-
-  end subroutine describe_chains
-
-  function barriers_of(session) result(barriers)
-    type(session_t), intent(in) :: session
-    real(wp) :: barriers(2)
-    type(contact_t) :: contact
-    integer :: i
-    associate (laws => session%the_case%laws)
-      contact = contact_of(laws(contact_position), mass=1.0_wp)
-      do i = 1, size(laws)
-        if (laws(i)%family == effect_family) call add_to_contact(contact, laws(i))
-      end do
-    end associate
-    barriers = barrier_positions(contact)
-  end function barriers_of
-
-  subroutine add_limits(session, schema, limits)
-    type(session_t), intent(in) :: session
-    type(schema_t), intent(inout) :: schema
-    type(limit_t), intent(in) :: limits(:)
-    character(len=40) :: names(size(limits))
-    character(len=:), allocatable :: unit
-    integer :: i
-    unit = trim(session%the_case%sweep%swept%unit)
-    do i = 1, size(limits)
-      names(i) = limit_name(session, limits(i))
-    end do
-    call schema%add_dimension('limit', size(limits, kind=int64))
-    call schema%add_variable('name', type_string, ['limit'], strings=names, group='limits', &
-                             long_name='where impacts start or stop, or a regime of two bodies gives way')
-    call schema%add_variable('lower', type_float64, ['limit'], units=unit, long_name='lower end of the bracket', &
-                             data=limits%bracket(1), group='limits')
-    call schema%add_variable('upper', type_float64, ['limit'], units=unit, long_name='upper end of the bracket', &
-                             data=limits%bracket(2), group='limits')
-  end subroutine add_limits
-
-  !> What happens at a limit: impacts start or stop, or one regime of two bodies gives way to another.
-  pure function limit_name(session, limit) result(name)
-    type(session_t), intent(in) :: session
-    type(limit_t), intent(in) :: limit
-    character(len=:), allocatable :: name
-    if (is_pair(session%the_case%laws)) then
-      name = trim(regime_names(limit%from))//'_to_'//trim(regime_names(limit%to))
-    else
-      name = 'impacts_'//trim(merge('start', 'stop ', limit%to == regime_impact))
-    end if
-    name = name//'_'//trim(merge('up  ', 'down', limit%up))
-  end function limit_name
-
-  !> Where holds had to be given up, and why: ranges of the parameter.
-  subroutine report_given_up(session, chains)
-    type(session_t), intent(inout) :: session
-    type(chains_t), intent(in) :: chains
-    integer :: direction, i, first, reason
-    associate (reasons => nint(chains%holds(hold_reason, :, :)), values => session%the_case%sweep%swept%values)
-      do direction = 1, 2
-        first = 1
-        do i = 1, size(values)
-          reason = reasons(i, direction)
-          if (i < size(values)) then
-            if (reasons(i + 1, direction) == reason) cycle
-          end if
-          if (chains%ran(direction) .and. reason /= reason_time_over) then
-            call session%journal%line('given_up', '  run '//trim(merge('up  ', 'down', direction == 1))//': given up from '// &
-              to_text(values(first), 6)//' to '//to_text(values(i), 6)//' as '//trim(reason_names(reason)), &
-              '"reason": "'//trim(reason_names(reason))//'", "from": '//to_text(values(first))//', "to": '//to_text(values(i)))
-          end if
-          first = i + 1
-        end do
-      end do
-    end associate
-  end subroutine report_given_up
-
-  subroutine report_limits(session, chains)
-    type(session_t), intent(inout) :: session
-    type(chains_t), intent(in) :: chains
-    character(len=:), allocatable :: name
-    integer :: i
-    associate (limits => chains%limits)
-      do i = 1, size(limits)
-        name = limit_name(session, limits(i))
-        associate (bracket => limits(i)%bracket)
-          call session%journal%line('limit', '  run '//trim(merge('up  ', 'down', limits(i)%up))//': '// &
-            replace_all(name(:index(name, '_', back=.true.) - 1), '_', ' ')//' between '//to_text(bracket(1), 6)//' and '// &
-            to_text(bracket(2), 6), '"name": "'//name//'", "lower": '//to_text(bracket(1))//', "upper": '//to_text(bracket(2)))
-        end associate
-      end do
-    end associate
-    if (size(chains%limits) > 0) return
-    if (any(count(nint(chains%holds(hold_reason, :, :)) == reason_time_over, dim=1) < size(chains%holds, 2) .and. &
-            chains%ran)) then
-      call session%journal%line('limit', '  no limit seen between the values that were not given up')
-    else if (is_pair(session%the_case%laws)) then
-      call session%journal%line('limit', '  one regime throughout')
-    else
-      call session%journal%line('limit', '  impacts neither start nor stop')
-    end if
-  end subroutine report_limits
 
   !> Ranges of the parameter where starts lead to motions with impacts, without, and both.
   subroutine report_multiple(session, work)

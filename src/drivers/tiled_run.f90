@@ -99,8 +99,8 @@ contains
     watch%total = sum([(file%tiling%points(mine(tile)), tile=1, size(mine))])
     watch%before = note_earlier(session, file, work)
     watch%unfinished = size(unfinished)
-    if (session%command%resume) call session%journal%line('resumed', to_text(size(mine) - size(unfinished))// &
-      ' of '//to_text(size(mine))//' tiles were done before')
+    if (session%command%resume .and. .not. work%again) call session%journal%line('resumed', &
+      to_text(size(mine) - size(unfinished))//' of '//to_text(size(mine))//' tiles were done before')
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
@@ -154,7 +154,9 @@ contains
     do point = 1, points
       index(:, point) = index_in_block(lower, extent, point)
     end do
-    if (work%refine%active) then
+    if (work%again .and. .not. work%refine%active) then
+      call compute_again(session, file, work, tile, index, values, watch, whole)
+    else if (work%refine%active) then
       allocate (values(points, work%marks + 1))
       call refine_tile(work, int(file%tiling%lengths), int(lower), int(extent), values, whole, error, watch)
     else
@@ -170,6 +172,28 @@ contains
       call work%note(index(:, point), values(point, :))
     end do
   end subroutine run_tile
+
+  !> The values of a tile that was done, with those points computed again that do not stand.
+  subroutine compute_again(session, file, work, tile, index, values, watch, whole)
+    type(session_t), intent(inout) :: session
+    type(map_file_t), intent(inout) :: file
+    class(point_work_t), intent(inout) :: work
+    integer, intent(in) :: tile, index(:, :)
+    real(wp), allocatable, intent(out) :: values(:, :)
+    type(tile_watch_t), intent(inout) :: watch
+    logical, intent(out) :: whole
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: new(:, :)
+    integer, allocatable :: left(:)
+    integer :: i
+    call file%read_tile(tile, values, error)
+    call session%abort_if(error)
+    left = pack([(i, i=1, size(values, 1))], [(.not. work%stands(values(i, :)), i=1, size(values, 1))])
+    allocate (new(size(left), work%variables))
+    call compute_list(work, index(:, left), new, whole, error, watch)
+    call session%abort_if(error)
+    if (whole) values(left, :) = new
+  end subroutine compute_again
 
   subroutine look_at_run(self, stop_now)
     class(tile_watch_t), intent(inout) :: self

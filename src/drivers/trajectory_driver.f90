@@ -3,13 +3,14 @@
 
 !> `separatrix trajectory`: one motion, its time history and every event.
 module trajectory_driver
-  use attractors, only: attractor_t, features_t, regime_names
+  use angle_units, only: unit_of
+  use attractors, only: attractor_t, features_t, kind_cycle, regime_names
   use case_check, only: require_start
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use contact_law, only: barrier_positions, contact_at_speed, force_on_body
-  use drive_law, only: foot_motion
+  use contact_law, only: barrier_positions
+  use discover, only: discover_attractors, sort_attractors
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
@@ -19,16 +20,17 @@ module trajectory_driver
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
+  use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
-  use pair, only: driven_by_motion
   use record_writer, only: write_record
+  use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
   use span_check, only: check_periods
-  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
+  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_settled, reason_time_over
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   implicit none
   private
 
@@ -50,7 +52,7 @@ contains
     type(outcome_t) :: outcome
     type(schema_t) :: schema
     type(error_t), allocatable :: error
-    type(attractor_t) :: no_catalogue(0)
+    type(attractor_t) :: no_catalogue(0), cycle
     character(len=:), allocatable :: path
     call open_session(command, session)
     call require_start(session%the_case, error)
@@ -60,6 +62,7 @@ contains
     span%extension = 1
     span%stop_when_captured = .false.
     call slice_motion(grid, 0_int64, moving, error)
+    if (.not. allocated(error)) call fit_window(moving%machine%period, span)
     if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
     if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
     if (.not. allocated(error) .and. len(command%record) > 0) call check_record(session%the_case, error)
@@ -74,8 +77,10 @@ contains
     call session%begin(path, tiled=.false.)
     call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
     call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
+    call describe_cycle(moving, span_of(session%the_case), span, session%the_case%attractors%max_period, grid%start, outcome, &
+                        cycle)
     call describe_file(session, 'trajectory', schema)
-    call describe_motion(moving, span, outcome, log, schema)
+    call describe_motion(moving, span, outcome, cycle, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     if (allocated(moving%pair)) call add_driver_events(log, schema)
@@ -94,7 +99,7 @@ contains
     end if
     call session%stop_if(error)
     call check_written(session, path)
-    call report(session, moving, outcome, log)
+    call report(session, moving, span, outcome, cycle, log)
     call report_files(session, command, path)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
@@ -120,11 +125,33 @@ contains
               to_text(nint(most_samples))//' samples in all)')
   end subroutine check_record
 
-  !> Attributes: the drive, the barriers, and the steady values over the window.
-  subroutine describe_motion(moving, span, outcome, log, schema)
+  !> The cycle that the motion has come to by its end, period 0 if none; then the steady values are those of the cycle. Not where
+  !> they are asked for over the window as it is. `patience`: span of the case, with its extension.
+  subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: patience, span
+    integer, intent(in) :: max_period
+    real(wp), intent(in) :: start(3)
+    type(outcome_t), intent(inout) :: outcome
+    type(attractor_t), intent(out) :: cycle
+    type(attractor_t), allocatable :: own(:)
+    type(outcome_t) :: again
+    if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
+    call discover_attractors(moving, patience, reshape(start, [3, 1]), max_period, own)
+    if (size(own) == 0) return
+    call sort_attractors(own)
+    call run_trajectory(moving, own, span, start(1), start(2), start(3), again)
+    if (again%reason /= reason_settled) return
+    cycle = own(again%attractor)
+    if (cycle%kind == kind_cycle) outcome%window = cycle%features
+  end subroutine describe_cycle
+
+  !> Attributes: the drive, the barriers, and the steady values over the cycle or the window.
+  subroutine describe_motion(moving, span, outcome, cycle, log, schema)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(outcome_t), intent(in) :: outcome
+    type(attractor_t), intent(in) :: cycle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: unreachable, barriers(2)
@@ -140,6 +167,7 @@ contains
       call schema%add_attribute('', 'contact_work', log%contact_work)
     end if
     call schema%add_attribute('', 'window', span%window)
+    call schema%add_attribute('', 'period', cycle%period)
     associate (f => outcome%window)
       call schema%add_attribute('', 'amplitude', f%amplitude)
       call schema%add_attribute('', 'x_max', f%x_max)
@@ -148,6 +176,10 @@ contains
       call schema%add_attribute('', 'impacts', nint(f%impacts_per_period*span%window/moving%machine%period))
       call schema%add_attribute('', 'impacts_per_period', f%impacts_per_period)
       call schema%add_attribute('', 'mean_impact_speed', f%mean_impact_speed)
+      if (moving%machine%turn > 0) then
+        call schema%add_attribute('', 'turn', moving%machine%turn)
+        call schema%add_attribute('', 'rotation_number', f%rotation)
+      end if
       call schema%add_attribute('', 'regime', trim(regime_names(f%regime)))
       call schema%add_attribute('', 'reason', reason_name(outcome%reason))
     end associate
@@ -173,7 +205,8 @@ contains
       call schema%add_variable('driver_v', type_float64, ['time'], units='m/s', long_name='velocity of the driving body', &
                                data=log%sample_driver(2, :log%samples))
     else
-      call add_foot(moving, crank_angle, log, schema)
+      call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
+                               data=foot_positions(moving, crank_angle, log))
     end if
     if (moving%machine%contact%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
@@ -183,32 +216,6 @@ contains
       flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
       data=real(log%sample_mode(:log%samples), wp))
   end subroutine add_history
-
-  !> Forces of soft barriers at the samples.
-  function contact_forces(moving, log) result(forces)
-    type(motion_t), intent(in) :: moving
-    type(log_t), intent(in) :: log
-    real(wp) :: forces(log%samples), place(2, log%samples)
-    place = log%sample_data(2:3, :log%samples)
-    if (allocated(moving%pair)) then
-      if (moving%pair%machine%carried) place = place - log%sample_driver(:, :log%samples)
-    end if
-    forces = force_on_body(contact_at_speed(moving%machine%contact, log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
-  end function contact_forces
-
-  subroutine add_foot(moving, crank_angle, log, schema)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: crank_angle
-    type(log_t), intent(in) :: log
-    type(schema_t), intent(inout) :: schema
-    real(wp) :: foot(log%samples)
-    integer :: i
-    do i = 1, log%samples
-      call foot_motion(moving%machine%drive, crank_angle + moving%machine%drive_frequency*log%sample_data(1, i), foot(i))
-    end do
-    call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
-                             data=foot)
-  end subroutine add_foot
 
   !> Where the energy went by the end, or until the motion was given up.
   subroutine add_book(book, complete, schema)
@@ -266,19 +273,6 @@ contains
                              long_name='its rate just after the event', data=joints(4, :))
   end subroutine add_joint_events
 
-  !> Kinetic energy of several bodies at the samples.
-  function kinetic_energy(machine, log) result(kinetic)
-    type(jointed_t), intent(in) :: machine
-    type(log_t), intent(in) :: log
-    real(wp) :: kinetic(log%samples)
-    integer :: i
-    do i = 1, log%samples
-      associate (v => log%sample_coordinates(machine%n + 1:2*machine%n, i))
-        kinetic(i) = 0.5_wp*sum(v*matmul(machine%mass, v))
-      end associate
-    end do
-  end function kinetic_energy
-
   !> The driving body of two at the events.
   subroutine add_driver_events(log, schema)
     type(log_t), intent(in) :: log
@@ -295,13 +289,7 @@ contains
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: kinetic(log%samples)
-    kinetic = 0.5_wp*moving%machine%mass*log%sample_data(3, :log%samples)**2
-    if (allocated(moving%jointed)) kinetic = kinetic_energy(moving%jointed%machine, log)
-    if (allocated(moving%pair)) then
-      if (moving%pair%machine%drive /= driven_by_motion) then
-        kinetic = kinetic + 0.5_wp*moving%pair%machine%mass*log%sample_driver(2, :log%samples)**2
-      end if
-    end if
+    kinetic = kinetic_energies(moving, log)
     associate (book => log%sample_book(:, :log%samples))
       call add('energy', book(5, :), 'energy of spring and bodies')
       call add('kinetic_energy', kinetic, 'kinetic energy')
@@ -354,27 +342,45 @@ contains
     if (len(command%record) > 0) call session%journal%line('written', 'wrote '//command%record)
   end subroutine report_files
 
-  subroutine report(session, moving, outcome, log)
+  subroutine report(session, moving, span, outcome, cycle, log)
     type(session_t), intent(inout) :: session
     type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
     type(outcome_t), intent(in) :: outcome
+    type(attractor_t), intent(in) :: cycle
     type(log_t), intent(in) :: log
-    associate (f => outcome%window, journal => session%journal)
+    associate (f => outcome%window, journal => session%journal, is_angle => position_is_angle(session%the_case%laws))
       if (outcome%reason /= reason_time_over) then
         call journal%line('end', 'given up before the end: '//explained(outcome%reason)//'; '//to_text(log%events)// &
           ' events recorded until then')
         return
       end if
       call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
-        ' m, v_max '//to_text(f%v_max, 6)//' m/s, '//to_text(f%impacts_per_period, 5)// &
-        ' impacts per period at '//to_text(f%mean_impact_speed, 6)//' m/s (last '// &
-        to_text(session%the_case%run%window)//' s)', '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
+        ' '//unit_of('m', is_angle)//', v_max '//to_text(f%v_max, 6)//' '//unit_of('m/s', is_angle)//', '// &
+        to_text(f%impacts_per_period, 5)//' impacts per period at '//to_text(f%mean_impact_speed, 6)//' '// &
+        unit_of('m/s', is_angle)//' ('//taken_over(moving, span, cycle)//')', &
+        '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
         to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
       call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, drive period '// &
         to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
     end associate
   end subroutine report
+
+  !> What steady values are taken over.
+  pure function taken_over(moving, span, cycle) result(text)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(attractor_t), intent(in) :: cycle
+    character(len=:), allocatable :: text
+    if (cycle%period > 0) then
+      text = 'over its cycle of period '//to_text(cycle%period)
+    else if (span%whole_periods) then
+      text = 'last '//to_text(nint(span%window/moving%machine%period))//' drive periods'
+    else
+      text = 'last '//to_text(span%window)//' s'
+    end if
+  end function taken_over
 
   !> The reason, and what counts where that is not plain.
   pure function explained(reason) result(text)

@@ -4,6 +4,7 @@
 !> `separatrix verify`: checksums, invariants, and a random sample of the points run again: in double precision,
 !> which must give what the file holds, and in quadruple precision, which tells how far it can be trusted.
 module verify_driver
+  use angle_units, only: unit_of
   use attractors, only: regime_names
   use axis, only: axis_t
   use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
@@ -25,10 +26,12 @@ module verify_driver
   use random, only: uniform
   use reference, only: run_reference
   use refinement, only: origin_contradicted
+  use restoring_law, only: position_is_angle
+  use second_look, only: recall_second_look
   use serial_team, only: serial_team_t
   use span_check, only: check_periods
   use statistics, only: share_upper_limit
-  use status, only: exit_io, reason_settled
+  use status, only: exit_io, exit_uncertain, reason_settled
   use sweep_driver, only: sweep_axes
   use text, only: to_text
   use trajectories, only: journey_t, run_trajectories
@@ -44,16 +47,20 @@ module verify_driver
     integer :: points = 0, differing = 0, flips = 0, impact_count_differs = 0
     !> Of a refined map: points that were inferred, and those of them that were inferred wrongly.
     integer :: inferred = 0, inferred_differing = 0
+    !> Points whose label changes: flips, and what was inferred wrongly.
+    integer :: changes = 0
     !> Every point was run again.
     logical :: whole = .false.
     real(wp) :: x_deviation = 0, v_deviation = 0
+    !> The positions are angles.
+    logical :: is_angle = .false.
     character(len=:), allocatable :: first_difference
   end type audit_t
 
 contains
 
-  !> Verifies the file that `command` names. Code 74 naming what is wrong; label flips against quadruple precision are
-  !> reported, not an error.
+  !> Verifies the file that `command` names. Code 74 naming what is wrong; 77 where the sample shows that more labels would
+  !> change than the command allows.
   subroutine run_verify(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -77,6 +84,7 @@ contains
                                                     the_case, error)
     if (.not. allocated(error)) call check_invariants(reader, kind, points, error)
     if (.not. allocated(error)) then
+      audit%is_angle = position_is_angle(the_case%laws)
       select case (kind)
       case ('basin')
         call audit_map(reader, journal, the_case, the_case%axes, '', command%sample, command%seed, audit, error)
@@ -92,7 +100,33 @@ contains
     call report(command, kind, datasets, points, audit)
     if (audit%differing > 0) call fail(error, exit_io, "'"//command%path//"': "//to_text(audit%differing)// &
       ' of '//to_text(audit%points)//' points rerun differ from the file, first '//audit%first_difference)
+    if (.not. allocated(error)) call judge_changes(command, audit, error)
   end subroutine run_verify
+
+  !> Code 77 if the share of the sample whose label changes is above what is allowed. The share itself is judged, not its
+  !> confidence limit: without a change there is nothing against a file, however small the sample.
+  subroutine judge_changes(command, audit, error)
+    type(command_t), intent(in) :: command
+    type(audit_t), intent(in) :: audit
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: limits
+    if (.not. 100.0_wp*audit%changes > command%max_changes*audit%points) return
+    limits = ''
+    if (.not. audit%whole) limits = ' (of the whole file, with 95 % confidence, '// &
+      per_cent(1 - share_upper_limit(audit%points - audit%changes, audit%points, 0.975_wp))//' to '// &
+      per_cent(share_upper_limit(audit%changes, audit%points, 0.975_wp))//')'
+    call fail(error, exit_uncertain, "warning: '"//command%path//"': "//to_text(audit%changes)//' of '// &
+      to_text(audit%points)//' labels rerun would change, '// &
+      per_cent(audit%changes/real(audit%points, wp))//limits//'; allowed are '//to_text(command%max_changes)// &
+      ' % (--max-changes). Points like these depend on rounding or were inferred wrongly: their labels tell nothing')
+  end subroutine judge_changes
+
+  !> A share as '1.49 %'.
+  pure function per_cent(share) result(text)
+    real(wp), intent(in) :: share
+    character(len=:), allocatable :: text
+    text = to_text(100*share, 3)//' %'
+  end function per_cent
 
   !> Reruns random points of a map over `axes`, after its catalogue has been searched again.
   subroutine audit_map(reader, journal, the_case, axes, prefix, sample, seed, audit, error)
@@ -112,10 +146,11 @@ contains
     integer, allocatable :: index(:)
     integer(int64), allocatable :: lengths(:), place(:)
     integer(int64) :: points
-    integer :: i
+    integer :: i, before
     grid = grid_of(the_case, axes)
     call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
                            error)
+    if (.not. allocated(error)) call recall(reader, alone, journal, grid, the_case, catalogues, error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
@@ -134,14 +169,35 @@ contains
       call basin_points(grid, span_of(the_case), the_case%attractors%max_period, catalogues, reshape(index, [size(index), 1]), &
                         cache, values, error)
       if (allocated(error)) return
+      before = audit%flips + audit%inferred_differing
       call compare_with_file(reader, prefix, place, values(1, :), audit, error)
       if (allocated(error)) return
       call compare_with_reference(grid, catalogues, index, values(1, :), cache%journey, &
                                   audit, error)
       if (allocated(error)) return
+      if (audit%flips + audit%inferred_differing > before) audit%changes = audit%changes + 1
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
+
+  !> Adds to the catalogues what a second look of the file found.
+  subroutine recall(reader, alone, journal, grid, the_case, catalogues, error)
+    type(reader_t), intent(in) :: reader
+    type(serial_team_t), intent(in) :: alone
+    type(journal_t), intent(in) :: journal
+    type(grid_t), intent(in) :: grid
+    type(case_t), intent(in) :: the_case
+    type(catalogue_t), intent(inout) :: catalogues(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(int64), allocatable :: lengths(:)
+    if (.not. reader%has('/second_look/start')) return
+    call reader%read_values('/second_look/start', values, error)
+    if (.not. allocated(error)) call reader%lengths('/second_look/start', lengths, error)
+    if (allocated(error)) return
+    call recall_second_look(alone, journal, grid, span_of(the_case), the_case%attractors%max_period, values, int(lengths(2)), &
+                            catalogues, error)
+  end subroutine recall
 
   !> Indices of point `i` of the sample: each point once where the sample is the `whole`, else a random one.
   pure function sampled(shape, whole, seed, i) result(index)
@@ -319,6 +375,7 @@ contains
       if (nint(results(3, 1)) /= outcomes(1)%features%regime) audit%flips = audit%flips + 1
       call note_deviation(outcomes(1), results(:, 1), audit)
     end do
+    audit%changes = audit%flips
   end subroutine audit_points
 
   subroutine report(command, kind, datasets, points, audit)
@@ -334,6 +391,7 @@ contains
       write (output_unit, '(a)') '{"path": '//json_text(command%path)//', "kind": '//json_text(kind)// &
         ', "datasets": '//to_text(datasets)//', "points": '//to_text(points)//', "rerun": '//to_text(audit%points)// &
         ', "differing": '//to_text(audit%differing)//', "label_flips": '//to_text(audit%flips)// &
+        ', "labels_changing": '//to_text(audit%changes)//', "max_changes_percent": '//to_text(command%max_changes)// &
         ', "label_flip_share_upper_95": '//to_text(share_upper_limit(audit%flips, audit%points, 0.95_wp))// &
         ', "impact_counts_differ": '//to_text(audit%impact_count_differs)//', "x_deviation": '// &
         to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//', "inferred": '// &
@@ -353,7 +411,8 @@ contains
       trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
-      to_text(audit%x_deviation, 3)//' m, '//to_text(audit%v_deviation, 3)//' m/s'
+      to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
+      unit_of('m/s', audit%is_angle)
     if (.not. audit%whole) write (output_unit, '(a)') &
       '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &
       ' % of the labels would change'

@@ -29,15 +29,16 @@ module map_file
     character(len=:), allocatable :: path
     type(schema_t) :: schema
     type(tiling_t) :: tiling
-    type(h5_file_t), private :: part
+    type(h5_file_t) :: part
     !> Positions in the schema of the tiled variables, and their datasets.
     integer, allocatable, private :: tiled(:)
     type(h5_dataset_t), allocatable, private :: datasets(:)
     type(h5_dataset_t), private :: states, checksums
     logical, private :: writable = .true.
-    logical, allocatable, private :: done(:)
+    !> Per tile.
+    logical, allocatable :: done(:)
     !> Opened by one process: data must be flushed to be safe.
-    logical, private :: alone = .true.
+    logical :: alone = .true.
   contains
     procedure :: tile_count
     procedure :: tile_done

@@ -4,6 +4,7 @@
 !> The description of a file: dimensions, variables, attributes and texts. Groups are named without
 !> slashes ('catalogue'); '' is the root.
 module map_schema
+  use angle_units, only: unit_of
   use kinds, only: int64, real64
   use value_types, only: type_float32, type_float64, type_int16, type_int32, type_int64, type_int8, &
     type_string
@@ -58,6 +59,8 @@ module map_schema
     type(variable_t), allocatable :: variables(:)
     type(attribute_t), allocatable :: attributes(:)
     type(text_t), allocatable :: texts(:)
+    !> Positions are angles: lengths and speeds get the units of these.
+    logical :: positions_are_angles = .false.
   contains
     procedure :: add_dimension
     procedure :: add_variable
@@ -106,7 +109,7 @@ contains
     allocate (variable%dimensions(size(dimensions)))
     variable%dimensions = dimensions
     if (present(group)) variable%group = group
-    if (present(units)) variable%units = units
+    if (present(units)) variable%units = unit_of(units, self%positions_are_angles)
     if (present(long_name)) variable%long_name = long_name
     if (present(flag_values)) variable%flag_values = flag_values
     if (present(flag_meanings)) variable%flag_meanings = flag_meanings

@@ -14,6 +14,7 @@
 
 #include "lane_layer.hpp"
 #include "lane_modes.hpp"
+#include "lane_series.hpp"
 #include "lane_stops.hpp"
 
 namespace {
@@ -382,7 +383,9 @@ void fly_through_modes(const lane_machine &m, int first, lane_batch &batch) {
 }
 
 void fly_group(const lane_machine &m, int first, lane_batch &batch) {
-  if (m.several_modes > 0)
+  if (m.law.series > 0)
+    fly_in_series(m, first, batch);
+  else if (m.several_modes > 0)
     fly_through_modes(m, first, batch);
   else if (m.layer.excess > 0)
     fly_through_layers(m, first, batch);

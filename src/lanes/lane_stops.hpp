@@ -21,8 +21,28 @@ inline vec captors(const lane_batch &batch, vec x, vec v) {
   return captor;
 }
 
-// Lanes `there`, where they are to stop. At the end of a period the clock starts anew, and those that need
-// not stop pass.
+// Lanes `there`, where they are to stop, at x and v. At the end of a period the clock starts anew, and those
+// that need not stop pass.
+inline void stop_or_pass(double period, double domain, mask there, vec x, vec v, const lane_batch &batch,
+                         lane_group &g) {
+  mask section = there & (g.until >= period);
+  vec captor = captors(batch, x, v);
+  mask passing =
+      section & (g.sections > 0.5) & (magnitude(x) <= domain) & ((captor < 0.5) | (g.leaves < 0.5));
+  passing = batch.complete ? passing : mask{};
+  put(g.flights, there, g.flights + 1.0);
+  put(g.x, there, x);
+  put(g.v, there, v);
+  put(g.time, there, pick(section, vec{}, g.until));
+  put(g.start, section, g.start - period);
+  put(g.elapsed, passing, g.elapsed + period);
+  put(g.captor, passing, captor);
+  put(g.settled, passing, pick(captor < 0.5, -1, pick(g.settled < 0.0, g.elapsed, g.settled)));
+  put(g.sections, passing, g.sections - 1.0);
+  put(g.status, there & ~passing, lane_stopped);
+}
+
+// The same for flights in closed form.
 template <bool damping, class machine>
 inline void take_stops(const machine &m, mask there, const lane_batch &batch, lane_group &g) {
   if (!any(there))
@@ -30,21 +50,7 @@ inline void take_stops(const machine &m, mask there, const lane_batch &batch, la
   kinematics k = evaluate<damping>(m, g, g.until - g.start);
   if constexpr (machine::modal)
     k.x += m.origin;
-  mask section = there & (g.until >= m.period);
-  vec captor = captors(batch, k.x, k.v);
-  mask passing =
-      section & (g.sections > 0.5) & (magnitude(k.x) <= m.domain) & ((captor < 0.5) | (g.leaves < 0.5));
-  passing = batch.complete ? passing : mask{};
-  put(g.flights, there, g.flights + 1.0);
-  put(g.x, there, k.x);
-  put(g.v, there, k.v);
-  put(g.time, there, pick(section, vec{}, g.until));
-  put(g.start, section, g.start - m.period);
-  put(g.elapsed, passing, g.elapsed + m.period);
-  put(g.captor, passing, captor);
-  put(g.settled, passing, pick(captor < 0.5, -1, pick(g.settled < 0.0, g.elapsed, g.settled)));
-  put(g.sections, passing, g.sections - 1.0);
-  put(g.status, there & ~passing, lane_stopped);
+  stop_or_pass(m.period, m.domain, there, k.x, k.v, batch, g);
 }
 
 } // namespace

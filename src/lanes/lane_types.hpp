@@ -38,6 +38,21 @@ struct lane_mode {
   double cosine[most_harmonics], sine[most_harmonics];
 };
 
+// The forces of a machine without a closed form, per unit of mass, and what its series needs; see
+// `effect_law.f90`. A closed form: series 0.
+struct lane_law {
+  double series;
+  double stiffness, pendulum, cubic, viscous, asymmetric_viscous, quadratic, kinetic, asymmetric, offset;
+  // Spring without stretch where the foot is at its mean [m].
+  double length;
+  // Stribeck excesses, and the speed above which they are nil; all dry friction at rest.
+  double excess[2], velocity[2], exponent[2], edge, rest_friction;
+  // Dahl's sigma [N/m] and level up and down [N], where the other forces are per mass.
+  double dahl_stiffness, dahl_level[2], inverse_mass;
+  // Logarithm of the length to which errors are compared.
+  double log_scale;
+};
+
 // The machine, per unit of mass where forces are meant, SI.
 struct lane_machine {
   enum { modal = 0 };
@@ -66,6 +81,8 @@ struct lane_machine {
   // rate of the drive's force [m/s^3].
   double several_modes, friction_slope, force_rate;
   lane_mode mode[lane_modes_count];
+  // Without a closed form; then `cosine` and `sine` are those of the foot of the spring.
+  lane_law law;
 };
 
 // Laws of restitution, by the numbers of `contact_law.f90`.
@@ -100,6 +117,8 @@ template <class T> struct lane_fields {
   // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
   // lower barrier (2).
   T place;
+  // Dahl's friction [N].
+  T z;
   // The time since the start of the flight at which the body leaves
   // the layer (`start_v`, ... are those then), and at which it enters it again or hits, with its motion.
   // Fourth derivative at the end of the flight.

@@ -56,6 +56,15 @@ module lanes
     real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
   end type mode_t
 
+  !> Mirrors `lane_law` of lane_types.hpp.
+  type, bind(c) :: law_t
+    real(c_double) :: series = 0
+    real(c_double) :: stiffness = 0, pendulum = 0, cubic = 0, viscous = 0, asymmetric_viscous = 0, quadratic = 0, kinetic = 0, &
+      asymmetric = 0, offset = 0, length = 0
+    real(c_double) :: excess(2) = 0, velocity(2) = 1, exponent(2) = 1, edge = 0, rest_friction = 0
+    real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
+  end type law_t
+
   !> Mirrors `lane_machine` of lane_types.hpp.
   type, bind(c) :: machine_t
     real(c_double) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, period = 0
@@ -67,6 +76,7 @@ module lanes
     type(layer_t) :: layer
     real(c_double) :: several_modes = 0, friction_slope = 0, force_rate = 0
     type(mode_t) :: mode(0:5)
+    type(law_t) :: law
   end type machine_t
 
   !> Mirrors `lane_region` of lane_types.hpp.
@@ -81,8 +91,8 @@ module lanes
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
       flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
-      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, skip = 0, reach = 0, reach_v = 0, &
-      reach_a = 0, reach_j = 0, end_s = 0
+      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, z = 0, skip = 0, &
+      reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
     integer(c_int) :: regions = 0, complete = 1
     type(region_t) :: region(most_regions)
   end type lane_batch_t
@@ -136,8 +146,8 @@ contains
     lane_sizes = machine == c_sizeof(here) .and. batch == c_sizeof(there)
   end function lane_sizes
 
-  !> Lanes for one body whose equation is linear in every mode of slip, or has a thin Stribeck layer, no harmonic at resonance,
-  !> if its options ask for lanes.
+  !> Lanes for one body, if its options ask for lanes: in closed form where its equation is linear in every mode of slip, or
+  !> has a thin Stribeck layer, without a harmonic at resonance; else in series where all forces have one.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
@@ -148,6 +158,9 @@ contains
     else
       call prepare_modes(moving, flow)
     end if
+    if (flow%available .or. moving%exact .and. .not. moving%layer > 0) return
+    flow = lane_flow_t(width=flow%width)
+    call prepare_series(moving, flow)
   end subroutine prepare_lanes
 
   !> What does not depend on the mode.
@@ -331,6 +344,59 @@ contains
     end associate
   end subroutine set_layer
 
+  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, rigid barriers.
+  pure subroutine prepare_series(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(inout) :: flow
+    real(wp) :: length
+    associate (law => moving%machine, m => flow%machine, l => flow%machine%law, friction => moving%machine%friction, &
+               effects => moving%machine%effects)
+      flow%available = .not. (law%drive%interval > 0 .or. law%contact%soft) .and. size(law%drive%cosine) <= most_harmonics
+      if (friction%excess > 0) flow%available = flow%available .and. has_series(friction%stribeck_exponent)
+      if (friction%second_excess > 0) flow%available = flow%available .and. has_series(friction%second_exponent)
+      if (effects%dahl_stiffness > 0) flow%available = flow%available .and. &
+        effects%dahl_sliding > 2*abs(effects%asymmetric_coulomb)
+      if (.not. flow%available) return
+      call set_common(moving, flow)
+      l%series = 1
+      l%stiffness = merge(law%restoring%stiffness, 0.0_wp, law%restoring%is_linear)/law%mass
+      l%pendulum = merge(0.0_wp, law%restoring%stiffness, law%restoring%is_linear)/law%mass
+      l%cubic = effects%cubic/law%mass
+      l%viscous = friction%damping/law%mass
+      l%asymmetric_viscous = effects%asymmetric_viscous/law%mass
+      l%quadratic = effects%quadratic_drag/law%mass
+      l%kinetic = friction%kinetic/law%mass
+      if (.not. effects%dahl_stiffness > 0) l%asymmetric = effects%asymmetric_coulomb/law%mass
+      l%offset = effects%offset/law%mass
+      l%length = law%restoring%free_length + law%drive%mean
+      l%excess = [friction%excess, friction%second_excess]/law%mass
+      l%velocity = [friction%stribeck_velocity, friction%second_velocity]
+      l%exponent = [friction%stribeck_exponent, friction%second_exponent]
+      l%edge = friction%layer_speed
+      l%rest_friction = l%kinetic + sum(l%excess)
+      l%dahl_stiffness = effects%dahl_stiffness
+      l%dahl_level = [effects%dahl_sliding, -effects%dahl_sliding] + effects%asymmetric_coulomb
+      l%inverse_mass = 1/law%mass
+      m%friction_slope = effects%friction_slope
+      m%upper = law%contact%upper
+      m%lower = law%contact%lower
+      m%cosine(:m%harmonics) = law%drive%cosine
+      m%sine(:m%harmonics) = law%drive%sine
+      m%stride = 0.25_wp*law%period
+      length = 1
+      if (law%restoring%stiffness > 0) length = law%force_scale/law%restoring%stiffness
+      if (length > 0) l%log_scale = logarithm(length)
+    end associate
+
+  contains
+
+    pure logical function has_series(exponent)
+      real(wp), intent(in) :: exponent
+      has_series = abs(exponent - 1) <= 0 .or. abs(exponent - 2) <= 0
+    end function has_series
+
+  end subroutine prepare_series
+
   !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin with bounds on its seventh and sixth derivative; not
   !> available at resonance.
   pure subroutine set_response(m, natural, decay, f_cos, f_sin, cosine, sine, seventh, available, sixth)
@@ -385,7 +451,8 @@ contains
     batch%x(lane) = state%x
     batch%v(lane) = state%v
     batch%direction(lane) = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
-    if (flow%machine%several_modes > 0) call find_place(flow%machine, lane, batch)
+    batch%z(lane) = state%z
+    if (flow%machine%several_modes > 0 .or. flow%machine%law%series > 0) call find_place(flow%machine, lane, batch)
     if (.not. new) return
     batch%up_span(lane) = 0.4_wp*flow%machine%period
     batch%down_span(lane) = 0.4_wp*flow%machine%period
@@ -400,13 +467,13 @@ contains
     type(lane_batch_t), intent(inout) :: batch
     integer :: place
     associate (x => batch%x(lane), v => batch%v(lane), up => batch%direction(lane) > 0)
+      if (m%friction_slope*x <= -1) batch%status(lane) = lane_left
       place = 0
-      if (m%mode(0)%leads_to >= 0) then
+      if (m%several_modes > 0 .and. m%mode(0)%leads_to >= 0) then
         if (x > m%upper .or. (up .and. x >= m%upper)) place = 1
         if (x < m%lower .or. (.not. up .and. x <= m%lower)) place = 2
       end if
       batch%place(lane) = place
-      if (m%friction_slope*x <= -1) batch%status(lane) = lane_left
       if (place == 0 .or. (up .eqv. place == 1)) return
       ! On the way out: modes 3 and 4.
       if (merge(x - m%upper, m%lower - x, place == 1) < m%mode(2 + place)%lead*abs(v)) batch%status(lane) = lane_left
@@ -421,6 +488,7 @@ contains
     type(state_t), intent(out) :: state
     state%x = batch%x(lane)
     state%v = batch%v(lane)
+    state%z = batch%z(lane)
     state%time = batch%time(lane)
     state%mode = merge(mode_slip_minus, mode_slip_plus, batch%direction(lane) < 0)
   end subroutine lane_state

@@ -4,9 +4,11 @@
 !> Effects that may be added to a machine of one body: the rows of the catalogue. Any number of them, each once.
 module effect_rows
   use kinds, only: wp
-  use law_row, only: law_row_t, none_above, none_below, parameter_row_t
+  use law_row, only: effect_confusion_t, effect_trait_t, law_row_t, none_above, none_below, parameter_row_t
   implicit none
   private
+
+  public :: acts_at_barrier
 
   character(len=*), parameter :: sum_of_laws = 'sum of two laws'
   character(len=*), parameter :: sensor = 'what a sensor shows; the motion is the same'
@@ -86,5 +88,48 @@ module effect_rows
                     'relative error of the scale'), &
     parameter_row_t('effect', 'sensor_delay', 'delay', 's', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'of the sensor behind the drive; negative if it is ahead')]
+
+  character(len=*), parameter :: over_speed = 'friction over speed', over_impacts = 'restitution over impact speed'
+
+  type(effect_trait_t), parameter, public :: effect_traits(size(effect_laws)) = [ &
+    effect_trait_t('viscous', over_speed, 'flight', 'damping', '', ''), &
+    effect_trait_t('coulomb', over_speed, 'flight', 'force', '', ''), &
+    effect_trait_t('quadratic_drag', over_speed, 'flight', 'coefficient', '', ''), &
+    effect_trait_t('stribeck', over_speed, 'flight', 'excess', 'velocity', ''), &
+    effect_trait_t('static_excess', over_speed, 'flight', '', 'force', ''), &
+    effect_trait_t('dahl', 'friction before sliding', 'flight', '', 'stiffness', 'friction'), &
+    effect_trait_t('asymmetric_friction', 'friction by direction', 'flight', 'coulomb viscous', '', ''), &
+    effect_trait_t('position_dependent_friction', 'friction over place', 'flight', 'slope', '', 'friction'), &
+    effect_trait_t('cubic_spring', 'spring over stretch', 'flight', 'stiffness', '', ''), &
+    effect_trait_t('offset_force', 'constant force', 'flight', 'force', '', ''), &
+    effect_trait_t('restitution_slope', over_impacts, 'barrier', 'slope', '', 'contact.restitution'), &
+    effect_trait_t('compliant_contact', 'contact over penetration', 'barrier', '', 'stiffness damping', 'contact.restitution'), &
+    effect_trait_t('second_barrier', 'contact over place', 'barrier', '', '', 'contact.restitution'), &
+    effect_trait_t('drive_ripple', 'drive over phase', 'flight', 'sine cosine', '', 'drive.ratio'), &
+    effect_trait_t('sensor_bias', 'sensor', 'sensor', 'bias', '', ''), &
+    effect_trait_t('sensor_gain', 'sensor', 'sensor', 'gain', '', ''), &
+    effect_trait_t('sensor_delay', 'sensor', 'sensor', 'delay', '', '')]
+
+  character(len=*), parameter :: sliding = &
+    'while the body slides, friction that differs with the direction by a constant is a constant force'
+  character(len=*), parameter :: shift = 'where the position of the barrier is fitted, a shifted sensor is a constant force'
+  character(len=*), parameter :: scale = &
+    'where friction, barrier and the scale of the drive are fitted, a gain of the sensor is a constant force'
+
+  type(effect_confusion_t), parameter, public :: effect_confusions(6) = [ &
+    effect_confusion_t('asymmetric_friction', 'offset_force', sliding), &
+    effect_confusion_t('asymmetric_friction', 'sensor_bias', shift), &
+    effect_confusion_t('asymmetric_friction', 'sensor_gain', scale), &
+    effect_confusion_t('offset_force', 'sensor_bias', shift), &
+    effect_confusion_t('offset_force', 'sensor_gain', scale), &
+    effect_confusion_t('sensor_bias', 'sensor_gain', scale)]
+
+contains
+
+  !> Whether the effect `name` changes nothing but what happens at the barriers.
+  pure elemental logical function acts_at_barrier(name)
+    character(len=*), intent(in) :: name
+    acts_at_barrier = any(effect_traits%name == name .and. effect_traits%acts == 'barrier')
+  end function acts_at_barrier
 
 end module effect_rows

@@ -19,6 +19,23 @@ module law_row
     character(len=96) :: source
   end type law_row_t
 
+  !> What is known of an effect beyond its law: the function that it is one shape of, and over what; what it changes ('flight',
+  !> 'barrier' or 'sensor'), which decides how its derivatives are found; its parameters in which what it does is linear near
+  !> zero, and those that are positive sizes; the law or parameter that a machine must have for it. Lists are parted by blanks.
+  type, public :: effect_trait_t
+    character(len=law_length) :: name
+    character(len=32) :: family
+    character(len=8) :: acts
+    character(len=20) :: amplitudes, sizes
+    character(len=20) :: needs
+  end type effect_trait_t
+
+  !> Two effects that can be the same motion, and when.
+  type, public :: effect_confusion_t
+    character(len=law_length) :: one, other
+    character(len=112) :: reason
+  end type effect_confusion_t
+
   !> One parameter of one law. Values are in the SI unit given; bounds are closed unless open.
   type, public :: parameter_row_t
     character(len=family_length) :: family

@@ -5,13 +5,14 @@
 !> A new law adds a kind here, a row to `law_table`, a branch to both functions and a test; if it is not
 !> linear in the stretch, `is_linear` stays false and the adaptive flight takes over.
 module restoring_law
+  use constants, only: two_pi
   use elementary, only: sine_cosine
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
   implicit none
   private
 
-  public :: restoring_of, restoring_force, restoring_stiffness, restoring_energy
+  public :: restoring_of, position_is_angle, restoring_force, restoring_stiffness, restoring_energy
 
   integer, parameter :: kind_none = 0, kind_linear = 1, kind_pendulum = 2
 
@@ -22,6 +23,8 @@ module restoring_law
     !> Stretch-free distance between foot and body [m].
     real(wp) :: free_length = 0
     logical :: is_linear = .true.
+    !> The stretch after which the force repeats, where it is an angle [rad]; 0 if it never does.
+    real(wp) :: turn = 0
   end type restoring_t
 
 contains
@@ -30,12 +33,25 @@ contains
   pure function restoring_of(choice) result(law)
     type(law_choice_t), intent(in) :: choice
     type(restoring_t) :: law
-    if (choice%name == 'pendulum') law = restoring_t(kind_pendulum, value_of(choice, 'moment'), 0.0_wp, .false.)
+    if (choice%name == 'pendulum') law = restoring_t(kind_pendulum, value_of(choice, 'moment'), 0.0_wp, .false., two_pi)
     if (choice%name == 'linear') then
       law = restoring_t(kind_linear, value_of(choice, 'stiffness'), &
                         value_of(choice, 'free_length'), .true.)
     end if
   end function restoring_of
+
+  !> Whether the position of a machine of these laws is an angle.
+  pure logical function position_is_angle(choices)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(restoring_t) :: law
+    integer :: i
+    position_is_angle = .false.
+    do i = 1, size(choices)
+      if (choices(i)%family /= 'restoring') cycle
+      law = restoring_of(choices(i))
+      position_is_angle = law%turn > 0
+    end do
+  end function position_is_angle
 
   !> Force on the body [N] at a stretch [m].
   pure elemental real(wp) function restoring_force(law, stretch)

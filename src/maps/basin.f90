@@ -16,12 +16,12 @@ module basin
   use status, only: exit_bad_case
   use text, only: to_text
   use trajectories, only: block_size, describe_all, journey_t, run_trajectories
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: open_slice, points_at_a_time, search_starts, label_slices, basin_points, outcome_values
+  public :: open_slice, open_journey, points_at_a_time, search_starts, label_slices, basin_points, outcome_values
 
   !> Values of a point, in the order of the file.
   integer, parameter, public :: basin_variables = 13
@@ -67,6 +67,7 @@ contains
     call open_slice(grid, span, slice, journey%moving, error)
     if (allocated(error)) return
     journey%span = span
+    call fit_window(journey%moving%machine%period, journey%span)
     journey%describe = describe
     call prepare_lanes(journey%moving, journey%flow)
   end subroutine open_journey

@@ -4,12 +4,13 @@
 !> What a moving machine is between two events (mode and state), what is counted on the way (tally),
 !> and what is written down when asked (log).
 module motion_state
+  use circle, only: nearest_turn
   use kinds, only: int64, wp
   implicit none
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
-    append_word, open_log, record_event, record_sample, put_sample_book, put_column
+    place_of, take_turns, append_word, open_log, record_event, record_sample, put_sample_book, put_column
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -42,6 +43,8 @@ module motion_state
     real(wp) :: z = 0
     !> Speed at which the last contact with a soft barrier began [m/s].
     real(wp) :: touch_speed = 0
+    !> Of an angle: what has been taken off x, whole turns [rad].
+    real(wp) :: turned = 0
   end type state_t
 
   type, public :: options_t
@@ -69,6 +72,8 @@ module motion_state
     real(wp) :: grazing_margin = huge(1.0_wp)
     integer(int64) :: word = 0
     integer :: word_length = 0
+    !> Turns of an angle, upwards.
+    integer(int64) :: turns = 0
     !> The largest velocity costs a search in every flight: only when asked.
     logical :: wants_v_max = .false.
   end type tally_t
@@ -181,6 +186,30 @@ contains
     if (sticks_in(state%mode, two_bodies)) tally%sticks = 1
   end subroutine reset_tally
 
+  !> Position since the start; of an angle with the turns that it has made.
+  pure real(wp) function place_of(state) result(x)
+    type(state_t), intent(in) :: state
+    x = state%x
+    if (abs(state%turned) > 0) x = x + state%turned
+  end function place_of
+
+  !> Takes whole turns off an angle, so that it keeps its digits however often it goes round. The extremes go with it.
+  pure subroutine take_turns(turn, state, tally)
+    real(wp), intent(in) :: turn
+    type(state_t), intent(inout) :: state
+    type(tally_t), intent(inout), optional :: tally
+    real(wp) :: taken
+    if (.not. turn > 0) return
+    taken = state%x - nearest_turn(state%x, 0.0_wp, turn)
+    if (.not. abs(taken) > turn/2) return
+    state%x = state%x - taken
+    state%turned = state%turned + taken
+    if (.not. present(tally)) return
+    tally%x_max = tally%x_max - taken
+    tally%x_min = tally%x_min - taken
+    tally%turns = tally%turns + nint(taken/turn, int64)
+  end subroutine take_turns
+
   !> Extremes of the position are taken at the ends of flights: between them x is monotone.
   pure subroutine note_position(tally, state)
     type(tally_t), intent(inout) :: tally
@@ -232,7 +261,7 @@ contains
     end if
     log%events = log%events + 1
     log%event_kind(log%events) = kind
-    log%event_data(:, log%events) = [log%origin + state%time, state%x, state%v, v_after]
+    log%event_data(:, log%events) = [log%origin + state%time, place_of(state), state%v, v_after]
     if (present(driver)) call put_column(log%event_driver, log%events, driver)
   end subroutine record_event
 
@@ -246,7 +275,7 @@ contains
     log%samples = log%samples + 1
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
-    log%sample_data(:, log%samples) = [log%origin + state%time, state%x, state%v]
+    log%sample_data(:, log%samples) = [log%origin + state%time, place_of(state), state%v]
     if (log%book%kept) call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
     if (present(book)) call put_sample_book(log, log%samples, book)

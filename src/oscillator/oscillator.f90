@@ -5,7 +5,7 @@
 !> fixed positions, crank angle phi = Omega t + phi_0.
 module oscillator
   use constants, only: two_pi
-  use contact_law, only: add_to_contact, compliant_contact, contact_of, contact_t, force_on_body
+  use contact_law, only: add_to_contact, barrier_positions, compliant_contact, contact_of, contact_t, force_on_body
   use drive_law, only: add_ripple, drive_of, drive_t, foot_motion, measured_force
   use effect_check, only: refuse_effects
   use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, replace_friction, sensor_t, &
@@ -44,6 +44,8 @@ module oscillator
     real(wp) :: foot_acceleration_bound = 0
     !> Largest spring force in magnitude that the foot alone can change by [N]; scale of rounding.
     real(wp) :: force_scale = 0
+    !> After this change of x nothing of the machine is different [rad]: x lies on a circle; 0 = on a line.
+    real(wp) :: turn = 0
   end type oscillator_t
 
 contains
@@ -143,10 +145,22 @@ contains
     end if
   end subroutine set_section
 
+  !> The turn of the restoring law, unless a barrier or an effect knows the position.
+  pure real(wp) function turn_of(machine) result(turn)
+    type(oscillator_t), intent(in) :: machine
+    real(wp) :: barriers(2)
+    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
+    barriers = barrier_positions(machine%contact)
+    turn = 0
+    if (abs(machine%effects%cubic) > 0 .or. abs(machine%effects%friction_slope) > 0) return
+    if (barriers(1) >= unreachable .and. barriers(2) <= -unreachable) turn = machine%restoring%turn
+  end function turn_of
+
   !> Bounds on the motion of the foot and the scale of the forces.
   pure subroutine set_bounds(machine)
     type(oscillator_t), intent(inout) :: machine
     integer :: n
+    machine%turn = turn_of(machine)
     machine%extra = machine%effects%present .or. machine%drive%interval > 0
     do n = 1, size(machine%drive%cosine)
       associate (size_n => sqrt(machine%drive%cosine(n)**2 + machine%drive%sine(n)**2))

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from separatrix import basin, style
+from separatrix import style
+from separatrix.figures import basin
 from separatrix.open import open_result
 
 X0 = np.linspace(-1.0, 0.8, 7)

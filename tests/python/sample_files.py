@@ -268,3 +268,5 @@ def _limits(file: h5py.File) -> None:
     middle = np.array([0.871, 1.351, 1.121, 0.869])
     _variable(group, "lower", middle - 0.002, ["limit"], "1")
     _variable(group, "upper", middle + 0.002, ["limit"], "1")
+    for end, seen in (("lower", middle - 0.004), ("upper", middle - 0.003)):
+        _variable(group, f"observed_{end}", seen, ["limit"], "1")

@@ -308,6 +308,7 @@ def test_a_table_that_cannot_be_created(separatrix, tmp_path, name, csv, force):
         (["points", "case.toml", "--list", "starts.csv", "--csv", "o", "-o", "o"], ["--csv", "o"]),
         (["basin", "case.toml", "-o", "case.toml", "--force"], ["-o", "case.toml"]),
         (["verify", "case.h5", "--sample", "-3"], ["--sample", "-3", "from 1"]),
+        (["verify", "case.h5", "--max-changes", "101"], ["--max-changes", "101", "from 0.0 to 100.0"]),
         (["verify", "case.h5", "--sample", "99999999999"], ["--sample", "99999999999"]),
         (["laws", "case.toml"], ["laws", "case.toml"]),
     ],

@@ -395,10 +395,47 @@ def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
     """The numbers of all attractors are exchanged in one piece, which counts to 2**31 - 1."""
     write_case(tmp_path)
     axes = (
-        "axis=[{name='x0', from=0, to=1, count=2}, {name='drive.ratio', from=0.8, to=1.4, count=1300},"
-        " {name='friction.kinetic_coefficient', from=0.1, to=0.3, count=1300}]"
+        "axis=[{name='x0', from=0, to=1, count=2}, {name='drive.ratio', from=0.8, to=1.4, count=8000},"
+        " {name='friction.kinetic_coefficient', from=0.1, to=0.3, count=8000}]"
     )
     ended = run(separatrix, "basin", "case.toml", "--validate", "--set", axes, folder=tmp_path)
     assert ended.code == 65
-    assert "'axis.count': found 1690000" in ended.err
-    assert "allowed at most 1643" in ended.err
+    assert "'axis.count': found 64000000" in ended.err
+    assert "allowed at most 5506" in ended.err
+
+
+def boundary(separatrix, folder):
+    """The x0 at v0 = 0 between 0.4 and 0.8 m up to which a start leads to impacts, to the last bit."""
+    low, high = 0.4, 0.8
+    while high - low > 4e-16:
+        places = np.unique(np.linspace(low, high, 300))
+        rows = [f"{float(place)!r},0" for place in places]
+        (folder / "line.csv").write_text("\n".join(["x0,v0", *rows]))
+        arguments = ["points", "case.toml", "--list", "line.csv", "--force", "-o", "line.h5"]
+        succeed(separatrix, *arguments, folder=folder)
+        with h5py.File(folder / "line.h5") as file:
+            first = int(np.argmax(file["regime"][:] == 1))
+        low, high = float(places[first - 1]), float(places[first])
+        if places.size < 300:
+            break
+    return high
+
+
+def test_verify_fails_where_labels_would_change(separatrix, tmp_path):
+    """Starts on both sides of a basin boundary, nearer to it than rounding carries."""
+    write_case(tmp_path)
+    place = boundary(separatrix, tmp_path)
+    near = [place + k * float(np.spacing(place)) for k in range(-40, 41)]
+    line = ["--set", f"axis[1]={{name='x0', values={near!r}}}", "--set", "axis[2]={name='v0', values=[0]}"]
+    succeed(separatrix, "basin", "case.toml", *line, "-o", "near.h5", folder=tmp_path)
+    outcome = run(separatrix, "verify", "near.h5", "--json", folder=tmp_path)
+    facts = json.loads(outcome.out)
+    assert facts["labels_changing"] == facts["label_flips"] > 0.01 * facts["rerun"]
+    assert outcome.code == 77
+    said = f"{facts['label_flips']} of {facts['rerun']} labels rerun would change"
+    assert len(outcome.messages) == 1
+    assert all(part in outcome.messages[0] for part in ("warning", "near.h5", said, "--max-changes"))
+    succeed(separatrix, "verify", "near.h5", "--max-changes", "100", folder=tmp_path)
+    share = 100 * facts["label_flips"] / facts["rerun"]
+    succeed(separatrix, "verify", "near.h5", "--max-changes", share + 0.01, folder=tmp_path)
+    assert run(separatrix, "verify", "near.h5", "--max-changes", share - 0.01, folder=tmp_path).code == 77

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from separatrix.discovery.measured.condense import whole
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import cut
 from separatrix.discovery.measured.signals import resolution_of
@@ -162,7 +163,7 @@ def test_pieces_shorter_than_a_segment_are_cut_within_their_ends():
     record = of(t[rows], x[rows])
     smoothed = smooth(record.t, record.x, SIGMA)
     smoothed.state[:, 1] = np.where((smoothed.t > 0.79) & (smoothed.t < 0.91), 0.0, smoothed.state[:, 1])
-    segments = cut([record], [smoothed], [400])
+    segments = cut([whole(record)], [smoothed], [400])
     assert (segments.last - segments.first >= 6).all()
     for first, last in zip(segments.first, segments.last, strict=True):
         assert any(a <= first and last <= b for a, b in record.pieces)

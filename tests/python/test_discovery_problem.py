@@ -51,7 +51,7 @@ def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
         prepared[-1].memory = 0.3 * number
     first = np.tile(np.arange(0, t.size, LENGTH), 2)
     record = np.repeat([0, 1], first.size // 2)
-    free = base_parameters(model, measured_force=False) + drive_nuisances(model, [False, False])
+    free = base_parameters(model, measured_force=False) + drive_nuisances(model, prepared)
     free += sensor_zeros(free, 2)
     problem = Problem(model, prepared, padded(record, first, first + LENGTH), free)
     off = {"nuisance:drive_scale": 1.03, "nuisance:clock": 0.015, "nuisance:phase": 0.02}

@@ -161,7 +161,7 @@ def test_the_x_of_a_pendulum_is_an_angle():
 
 
 def test_a_fit_worse_than_the_machine_that_it_contains_is_not_called_converged():
-    fit = SimpleNamespace(converged=True, reduced_chi2=9.0, values=np.array([0.8]))
+    fit = SimpleNamespace(converged=True, reduced_chi2=9.0, sample_chi2=9.0, values=np.array([0.8]))
     free = [Free("effect.viscous.damping", 0.8)]
     fitted = SimpleNamespace(
         names=("viscous",), fit=fit, problem=SimpleNamespace(free=free), added=(0,), tries=1

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from figure_probes import V0, X0, draw, drawn, legend_texts
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from sample_files import write_basin, write_points, write_sweep, write_trajectory
-from separatrix import basin, cli, points, style, sweep, trajectory
+from separatrix import cli, style
+from separatrix.figures import basin, points, sweep, trajectory
+from separatrix.figures.look import Look
+from separatrix.figures.regions import Boundary, boundaries, regions
 from separatrix.open import open_result, table
-from separatrix.regions import Boundary, boundaries, regions
 
 
 def test_runs_and_branches_are_all_drawn(tmp_path: Path) -> None:
@@ -118,7 +121,7 @@ WRITERS = {
     "points": write_points,
 }
 FIGURES = {
-    "basin": ["regime", "attractor"],
+    "basin": ["attractor", "regime"],
     "sweep": ["amplitude", "bifurcation"],
     "trajectory": ["history", "phase"],
     "points": ["regime"],
@@ -144,7 +147,7 @@ def test_every_kind_gives_png_and_pdf(tmp_path: Path, kind: str, capsys: pytest.
 def test_figures_say_what_they_show(tmp_path: Path, kind: str) -> None:
     path = WRITERS[kind](tmp_path / f"{kind}.h5")
     with style.context(), open_result(path) as result:
-        made = cli._figures(path, result, None, "The title")
+        made = cli._figures(path, result, None, "The title", Look())
     for figure in made.values():
         assert figure.texts[0].get_text() == "The title"
         assert "Coulomb friction" in figure.separatrix_caption
@@ -357,8 +360,12 @@ def test_holds_that_failed_are_not_drawn(tmp_path: Path) -> None:
     figure = drawn(path, sweep.amplitude_diagram)
     ups = [line for line in figure.axes[0].lines if line.get_markeredgecolor() == style.RUN_UP]
     assert [int(np.isfinite(line.get_ydata()).sum()) for line in ups] == [22, 22]
-    strobe = drawn(path, sweep.bifurcation_diagram).axes[0].collections[0]
-    assert np.isfinite(strobe.get_offsets().filled(np.nan)).all(axis=1).sum() == 22 * 8
+    figure = drawn(path, sweep.bifurcation_diagram)
+    offsets = {to_hex(one.get_facecolor()[0]): one.get_offsets() for one in figure.axes[0].collections}
+    ups = np.concatenate(
+        [offsets[colour.lower()].filled(np.nan) for colour in (style.RUN_UP, style.BOTH_RUNS)]
+    )
+    assert np.isfinite(ups).all(axis=1).sum() == 22 * 8
 
 
 @pytest.mark.parametrize(("duration", "end"), [(20.0, 20.0), (20.004, 20.004), (40.0, 20.0)])

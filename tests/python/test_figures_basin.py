@@ -12,7 +12,8 @@ import pytest
 from figure_probes import V0, X0, colour_at, draw, legend_texts
 from matplotlib.colors import to_rgb
 from sample_files import write_basin
-from separatrix import basin, reduce, style
+from separatrix import reduce, style
+from separatrix.figures import basin
 from separatrix.labels import share_texts
 
 
@@ -26,7 +27,7 @@ def test_each_point_has_its_colour_at_its_place(tmp_path: Path, order: tuple, de
     figure = draw(path)
     for i, x in enumerate(axes["x0"]):
         for j, v in enumerate(axes["v0"]):
-            expected = to_rgb(style.OKABE_ITO[attractor[i, j] - 1])
+            expected = to_rgb(style.ATTRACTORS[attractor[i, j] - 1])
             assert colour_at(figure, x, v) == pytest.approx(expected, abs=0.01)
 
 
@@ -47,7 +48,7 @@ def test_a_reduced_map_keeps_places_and_extent(tmp_path: Path, monkeypatch: pyte
     figure = draw(write_basin(tmp_path / "b.h5", {"x0": x, "v0": v}, attractor, regime_of=(0, 1, 2, 3)))
     assert figure.axes[0].get_xlim() == pytest.approx((-0.0125, 1.0125))
     for place, identity in (((0.2, 0.5), 1), ((0.9, 0.5), 2), ((0.2, 1.9), 3), ((0.99, 1.95), 3)):
-        assert colour_at(figure, *place) == pytest.approx(to_rgb(style.OKABE_ITO[identity - 1]), abs=0.01)
+        assert colour_at(figure, *place) == pytest.approx(to_rgb(style.ATTRACTORS[identity - 1]), abs=0.01)
     assert "5 by 3 points" in figure.separatrix_caption
 
 
@@ -59,8 +60,8 @@ def test_panels_show_their_own_slice(tmp_path: Path) -> None:
     titles = [ax.get_title() for ax in figure.axes]
     assert [re.search(r"= (\S+)", title).group(1) for title in titles] == ["1.1", "1.2", "1.3"]
     colours = [colour_at(figure, X0[6], V0[0], panel) for panel in range(3)]
-    assert colours[1] == pytest.approx(to_rgb(style.OKABE_ITO[1]), abs=0.01)
-    assert colours[0] == colours[2] == pytest.approx(to_rgb(style.OKABE_ITO[0]), abs=0.01)
+    assert colours[1] == pytest.approx(to_rgb(style.ATTRACTORS[1]), abs=0.01)
+    assert colours[0] == colours[2] == pytest.approx(to_rgb(style.ATTRACTORS[0]), abs=0.01)
 
 
 def test_too_many_slices_are_thinned_and_said(tmp_path: Path) -> None:
@@ -77,8 +78,8 @@ def test_maps_over_other_axes_are_drawn(tmp_path: Path, axes: dict) -> None:
     figure = draw(write_basin(tmp_path / "b.h5", axes, attractor))
     first = next(iter(axes))
     middle = np.mean(figure.axes[0].get_ylim())
-    assert colour_at(figure, axes[first][0], middle) == pytest.approx(to_rgb(style.OKABE_ITO[1]), abs=0.01)
-    assert colour_at(figure, axes[first][1], middle) == pytest.approx(to_rgb(style.OKABE_ITO[0]), abs=0.01)
+    assert colour_at(figure, axes[first][0], middle) == pytest.approx(to_rgb(style.ATTRACTORS[1]), abs=0.01)
+    assert colour_at(figure, axes[first][1], middle) == pytest.approx(to_rgb(style.ATTRACTORS[0]), abs=0.01)
 
 
 def test_legend_names_what_occurs_with_its_share(tmp_path: Path) -> None:
@@ -102,7 +103,7 @@ def test_legend_names_what_occurs_with_its_share(tmp_path: Path) -> None:
 
 def test_the_colour_of_an_attractor_does_not_depend_on_the_others_present(tmp_path: Path) -> None:
     path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, np.full((7, 4), 3), regime_of=(0, 1, 2, 3))
-    assert colour_at(draw(path), X0[2], V0[2]) == pytest.approx(to_rgb(style.OKABE_ITO[2]), abs=0.01)
+    assert colour_at(draw(path), X0[2], V0[2]) == pytest.approx(to_rgb(style.ATTRACTORS[2]), abs=0.01)
 
 
 def test_the_rarest_of_many_attractors_are_one_class(tmp_path: Path) -> None:

@@ -366,3 +366,44 @@ def test_the_library_is_looked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     (tmp_path / "lib" / "libseparatrix.so").touch()
     monkeypatch.setenv("PATH", str(program.parent))
     assert library_path() == tmp_path / "lib" / "libseparatrix.so"
+
+
+def test_the_table_of_effects_says_what_each_is_and_needs() -> None:
+    found = effects()
+    assert found["stribeck"].family == "friction over speed"
+    assert (found["stribeck"].amplitudes, found["stribeck"].sizes) == (("excess",), ("velocity",))
+    assert found["restitution_slope"].acts == "barrier"
+    assert found["compliant_contact"].needs == "contact.restitution"
+    for name, one in found.items():
+        assert one.acts in ("flight", "barrier", "sensor")
+        assert {*one.amplitudes, *one.sizes} <= one.parameters.keys()
+        # confusion is mutual
+        assert all(name in found[other].confused for other in one.confused)
+
+
+def test_a_model_with_an_effect_is_that_of_its_case() -> None:
+    model = Model.from_text(CASE)
+    extended = model.with_effect("cubic_spring", {"stiffness": 12.5})
+    written = Model.from_text(CASE + "\n[effect.cubic_spring]\nstiffness = 12.5\n")
+    assert extended.parameters == written.parameters
+    assert extended.to_text({}) == written.to_text({})
+    # defaults of what is not given
+    both = extended.with_effect("drive_ripple", {"sine": 0.01})
+    assert both.parameters["effect.drive_ripple.cosine"].value == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [
+        ("cubic", {}, "effect 'cubic': unknown; allowed viscous"),
+        ("cubic_spring", {}, "'stiffness' is missing"),
+        ("cubic_spring", {"stifness": 1.0}, "parameter 'stifness': unknown; allowed stiffness"),
+        ("viscous", {"damping": -1.0}, "allowed at least 0"),
+    ],
+)
+def test_an_effect_that_makes_no_case_is_refused(name: str, values: dict, reason: str) -> None:
+    with pytest.raises(CaseError, match=reason):
+        Model.from_text(CASE).with_effect(name, values)
+    viscous = Model.from_text(CASE).with_effect("viscous", {"damping": 0.1})
+    with pytest.raises(CaseError, match="the case has it already"):
+        viscous.with_effect("viscous", {"damping": 0.1})

@@ -3,6 +3,7 @@
 """Motions, sweeps and labels of real runs: what the case asks for is what the files hold."""
 
 import os
+import tomllib
 from pathlib import Path
 
 import h5py
@@ -83,7 +84,8 @@ def test_a_direction_that_was_not_run_is_nan(one_way, way, ran):
 @pytest.mark.parametrize(("way", "text"), [("up", "run-up"), ("down", "run-down")])
 def test_only_the_run_that_was_made_is_drawn(one_way, way, text):
     style = pytest.importorskip("separatrix.style")
-    from separatrix import open_result, sweep
+    from separatrix import open_result
+    from separatrix.figures import sweep
 
     with style.context(), open_result(one_way / f"{way}.h5") as result:
         for figure in sweep.figures(result, "title").values():
@@ -113,8 +115,57 @@ def test_limits_have_the_unit_of_the_swept_parameter(separatrix, tmp_path, one_w
         (one_way / "both.h5", "drive_ratio", "1"),
     ):
         with h5py.File(path) as file:
-            for item in (name, "limits/lower", "limits/upper"):
+            for item in (
+                name,
+                "limits/lower",
+                "limits/upper",
+                "limits/observed_lower",
+                "limits/observed_upper",
+            ):
                 assert file[item].attrs["units"] == unit, item
+
+
+def grazing_ratios(case):
+    """Drive ratios at which the motion of a linear case without impact just reaches the wall."""
+    drive, stiffness = case["drive"], float(case["restoring"]["stiffness"].split()[0])
+    damping = float(case["friction"]["damping"].split()[0])
+    number = np.arange(1, 1 + len(drive["cosine"]))
+    angle = np.radians(float(drive["angle"].split()[0]))
+    series = (np.array(drive["cosine"]) - 1j * np.array(drive["sine"])) * np.exp(1j * number * angle)
+    phase = np.exp(1j * number * np.linspace(0, 2 * np.pi, 20001)[:, np.newaxis])
+
+    def gap(ratio):
+        omega = number * ratio * np.sqrt(stiffness)
+        answer = series * stiffness / (stiffness - omega**2 + 1j * damping * omega)
+        return 0.4 + 0.31055 + (phase @ answer).real.max() - 1.1
+
+    roots = []
+    for low, high in ((0.8, 0.95), (1.05, 1.2)):
+        rises = gap(low) < 0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if (gap(middle) < 0) == rises else (low, middle)
+        roots.append(low)
+    return roots
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-7])
+def test_limits_are_where_the_settled_motion_touches_the_wall(separatrix, source_dir, tmp_path, tolerance):
+    path = source_dir / "examples" / "sweep_viscous.toml"
+    few = options("sweep.starts=[0, 0]", f"sweep.limit_tolerance={tolerance}")
+    said = succeed(separatrix, "sweep", path, *few, "-o", "out.h5", folder=tmp_path).out
+    up, down = grazing_ratios(tomllib.loads(path.read_text()))
+    assert (up, down) == pytest.approx((0.870901, 1.114313), abs=1e-6)
+    with h5py.File(tmp_path / "out.h5") as file:
+        rows = zip(file["limits/name"], file["limits/lower"], file["limits/upper"], strict=True)
+        found = {name.decode().strip(): (lower, upper) for name, lower, upper in rows}
+    for name, place in (("impacts_start_up", up), ("impacts_start_down", down)):
+        lower, upper = found[name]
+        assert lower <= place <= upper
+        assert upper - lower <= 1.01 * tolerance
+    if tolerance < 1e-6:
+        # as many digits as they are worth
+        assert "0.8709006" in said
 
 
 @pytest.mark.parametrize("command", ["basin", "sweep"])
@@ -210,7 +261,8 @@ def test_a_pipe_is_not_replaced(separatrix, tmp_path, command):
 
 def test_the_figures_of_a_plane_say_where_its_motions_start(results):
     style = pytest.importorskip("separatrix.style")
-    from separatrix import basin, open_result
+    from separatrix import open_result
+    from separatrix.figures import basin
 
     captions = {}
     for kind in ("map", "stack", "plane"):

@@ -17,7 +17,7 @@ from separatrix import (
     open_result,
     table,
 )
-from separatrix.case import describe_case, resolved_case
+from separatrix.figures.caption import describe_case, resolved_case
 
 
 @pytest.fixture

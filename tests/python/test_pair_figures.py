@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 from program import succeed
-from separatrix import cli, contact, energy, pair, pair_sweep, style, trajectory
+from separatrix import cli, style
+from separatrix.figures import contact, energy, pair, pair_sweep, trajectory
 from separatrix.open import open_result
 
 

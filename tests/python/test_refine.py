@@ -126,10 +126,12 @@ def test_verify_counts_what_was_inferred_wrongly(separatrix, tmp_path):
     missed = wrong(tmp_path / "whole.h5", tmp_path / "refined.h5")
     with h5py.File(tmp_path / "refined.h5") as file:
         assert 0.01 < missed.mean() <= file["refinement"].attrs["wrong_share_upper_limit"]
-    text = succeed(separatrix, "verify", "refined.h5", "--sample", 100, "--json", folder=tmp_path).out
-    facts = json.loads(text)
+    checking = ["verify", "refined.h5", "--sample", 100, "--json"]
+    facts = json.loads(succeed(separatrix, *checking, "--max-changes", 50, folder=tmp_path).out)
+    assert run(separatrix, *checking, folder=tmp_path).code == 77
     assert facts["differing"] == 0
-    assert 0 < facts["inferred_differing"] < facts["inferred"] <= 100
+    assert 1 < facts["inferred_differing"] < facts["inferred"] <= 100
+    assert facts["labels_changing"] == facts["inferred_differing"]
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 !> What a serial .pf file uses, under the name that pFUnit gives it.
 module funit
   use assertions
+  use funit_names
   use test_outcome, only: anyExceptions, SourceLocation
   implicit none
   public

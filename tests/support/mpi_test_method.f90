@@ -7,8 +7,10 @@ module mpi_test_method
   implicit none
   private
 
+  public :: new_method
+
   type, public :: MpiTestMethod
-    !> The ranks that take part in the test.
+    private
     type(MPI_Comm) :: comm = MPI_COMM_NULL
   contains
     procedure :: getMpiCommunicator
@@ -17,6 +19,12 @@ module mpi_test_method
   end type MpiTestMethod
 
 contains
+
+  !> The argument of a test on the ranks of a communicator.
+  type(MpiTestMethod) function new_method(comm)
+    type(MPI_Comm), intent(in) :: comm
+    new_method%comm = comm
+  end function new_method
 
   !> Handle for the value of a `type(MPI_Comm)`.
   integer function getMpiCommunicator(self)

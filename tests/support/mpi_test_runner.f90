@@ -8,7 +8,7 @@ module mpi_test_runner
   use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Bcast, MPI_Comm, MPI_Comm_free, MPI_Comm_rank, &
     MPI_Comm_size, MPI_Comm_split, MPI_COMM_NULL, MPI_COMM_WORLD, MPI_Finalize, MPI_Ibarrier, MPI_Init, &
     MPI_INTEGER, MPI_Request, MPI_STATUS_IGNORE, MPI_SUM, MPI_Test, MPI_UNDEFINED, MPI_Wait, operator(==)
-  use mpi_test_method, only: MpiTestMethod
+  use mpi_test_method, only: MpiTestMethod, new_method
   use test_outcome, only: anyExceptions, asserted, record_failure, reset_outcome
   implicit none
   private
@@ -62,16 +62,17 @@ contains
     procedure(test_procedure) :: test
     integer, intent(in) :: members
     type(MpiTestMethod) :: method
-    type(MPI_Comm) :: meeting
+    type(MPI_Comm) :: members_only, meeting
     integer :: colour
     colour = merge(1, MPI_UNDEFINED, world_rank < members)
-    call MPI_Comm_split(MPI_COMM_WORLD, colour, world_rank, method%comm)
+    call MPI_Comm_split(MPI_COMM_WORLD, colour, world_rank, members_only)
     call MPI_Comm_split(MPI_COMM_WORLD, colour, world_rank, meeting)
-    if (method%comm == MPI_COMM_NULL) return
+    if (members_only == MPI_COMM_NULL) return
+    method = new_method(members_only)
     call test(method)
     call meet(meeting)
     call MPI_Comm_free(meeting)
-    call MPI_Comm_free(method%comm)
+    call MPI_Comm_free(members_only)
   end subroutine run_on_members
 
   !> Waits for the other members. A rank that failed left the test early, so the others may never

@@ -3,7 +3,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Translates a .pf file into one Fortran file: its module and a program that runs its tests.
 
-pf_to_fortran.py SUITE.pf OUTPUT.f90 [--name PATH]   PATH is what failed assertions print
+Refuses what pFUnit's own translator does not take: it goes by lines, not by statements.
+
+pf_to_fortran.py SUITE.pf OUTPUT.F90 [--name PATH]   PATH is what failed assertions print
 pf_to_fortran.py SUITE.pf --ranks                    prints how many ranks the suite asks for
 """
 
@@ -30,7 +32,7 @@ ANNOTATION = re.compile(r"^\s*@(\w+)\s*(.*)$")
 SUBROUTINE = re.compile(r"^\s*subroutine\s+(\w+)\s*(?:\(\s*(\w*)\s*\))?\s*$", re.IGNORECASE)
 MODULE = re.compile(r"^\s*module\s+(\w+)\s*$", re.IGNORECASE)
 USES_MPI = re.compile(r"^\s*use\s+pfunit\b", re.IGNORECASE)
-NPES = re.compile(r"^\(\s*npes\s*=\s*\[([\d\s,]+)\]\s*\)$", re.IGNORECASE)
+NPES = re.compile(r"^\(\s*npes\s*=\s*\[(\s*\d+\s*(?:,\s*\d+\s*)*)\]\s*\)$", re.IGNORECASE)
 
 
 class PfError(Exception):
@@ -76,29 +78,23 @@ def code_of(line: str) -> str:
     return line.rstrip()
 
 
-def logical_line(lines: list[str], first: int) -> tuple[list[str], int]:
-    """The lines of the statement at index `first`, comments removed, and how many it spans."""
-    parts = [code_of(lines[first])]
-    while parts[-1].endswith("&") or not parts[-1].strip():
-        if first + len(parts) >= len(lines):
-            raise PfError(f"{first + 1}: the line is continued past the end of the file")
-        parts.append(code_of(lines[first + len(parts)]))
-    return [part for part in parts if part.strip()], len(parts)
-
-
-def assertion(parts: list[str], known: str, name: str, line: int, following: int) -> list[str]:
+def assertion(known: str, text: str, name: str, line: int) -> list[str]:
     """The call of an assertion; the line markers keep compiler messages on the .pf's lines."""
-    if not parts[-1].endswith(")"):
+    if code_of(text) != text.rstrip():
+        raise PfError(f"{line}: a comment behind @{known}; allowed on a line of its own")
+    text = text.strip()
+    if text.endswith("&"):
+        raise PfError(f"{line}: @{known} goes on in the next line; allowed on one line")
+    if not text.startswith("("):
+        raise PfError(f"{line}: @{known} has no arguments")
+    if not text.endswith(")"):
         raise PfError(f"{line}: @{known} has no closing parenthesis")
-    first = re.sub(r"@\w+", f"call {known}", parts[0], count=1)
-    call = [first, *parts[1:]]
-    call[-1] = call[-1][:-1].rstrip() + ", &"
     return [
         f'# {line} "{name}"',
-        *call,
+        f"call {known}{text[:-1].rstrip()}, &",
         f"  location=SourceLocation('{name}', {line}))",
         "if (anyExceptions()) return",
-        f'# {following} "{name}"',
+        f'# {line + 1} "{name}"',
     ]
 
 
@@ -109,7 +105,7 @@ def mark(suite: Suite, known: str, rest: str, following: list[str], line: int) -
         match = NPES.match(rest)
         if known != "test" or not match:
             raise PfError(f"{line}: @{known}{rest} is not understood; known: @test(npes=[1,2])")
-        npes = [int(n) for n in match.group(1).split(",") if n.strip()]
+        npes = [int(n) for n in match.group(1).split(",")]
         if min(npes) < 1:
             raise PfError(f"{line}: npes must be 1 or more")
     code = next((c for c in map(code_of, following) if c.strip()), "")
@@ -119,6 +115,8 @@ def mark(suite: Suite, known: str, rest: str, following: list[str], line: int) -
     with_context = bool(match.group(2))
     if npes and not with_context:
         raise PfError(f"{line}: a test with npes needs the argument class(MpiTestMethod)")
+    if known == "test" and with_context and not npes:
+        raise PfError(f"{line}: a test with an argument needs npes: @test(npes=[1,2])")
     procedure = Procedure(match.group(1), with_context, npes or [1])
     if known == "test":
         suite.tests.append(procedure)
@@ -137,7 +135,7 @@ def read_suite(text: str, stem: str, name: str) -> Suite:
     index = 0
     while index < len(lines):
         line = lines[index]
-        if match := MODULE.match(code_of(line)):
+        if match := MODULE.match(line):
             suite.module = match.group(1)
         suite.mpi = suite.mpi or bool(USES_MPI.match(line))
         match = ANNOTATION.match(line)
@@ -152,15 +150,11 @@ def read_suite(text: str, stem: str, name: str) -> Suite:
                 + ", @".join((*MARKS, *ASSERTIONS))
             )
         if known in MARKS:
-            rest = code_of(match.group(2)).strip()
-            mark(suite, known, rest, lines[index + 1 :], index + 1)
+            mark(suite, known, match.group(2).strip(), lines[index + 1 :], index + 1)
             suite.body.append("!" + line)
-            index += 1
         else:
-            parts, count = logical_line(lines, index)
-            following = index + count + 1
-            suite.body.extend(assertion(parts, known, name, index + 1, following))
-            index += count
+            suite.body.extend(assertion(known, match.group(2), name, index + 1))
+        index += 1
     check(suite)
     return suite
 
@@ -178,6 +172,25 @@ def check(suite: Suite) -> None:
     marked = [p for p in (*suite.tests, suite.before, suite.after) if p]
     if not suite.mpi and any(p.with_context for p in marked):
         raise PfError("1: a test with an argument needs `use pfunit`")
+    if suite.before or suite.after:
+        if len({procedure.with_context for procedure in marked}) > 1:
+            raise PfError("1: @before and @after have the argument of the tests, or none")
+        if suite.tests[0].with_context and not (suite.before and suite.after):
+            raise PfError("1: tests with npes need both @before and @after, or neither")
+
+
+def surroundings(suite: Suite) -> list[str]:
+    """What pFUnit writes around a suite refers to these names: a suite that exports others does not compile."""
+    return [
+        f"subroutine {suite.name}_suite()",
+        "  use funit",
+        f"  use {suite.module}",
+        "  implicit none",
+        f"  {'class(MpiTestMethod), pointer' if suite.mpi else 'integer'} :: t",
+        "  integer :: suite",
+        "  suite = test + testmethod + testsuite",
+        f"end subroutine {suite.name}_suite",
+    ]
 
 
 def program(suite: Suite) -> list[str]:
@@ -233,7 +246,7 @@ def main() -> int:
     if arguments.ranks:
         print(suite.ranks)
     else:
-        text = "\n".join([*suite.body, *program(suite)]) + "\n"
+        text = "\n".join([*suite.body, *surroundings(suite), *program(suite)]) + "\n"
         arguments.output.write_text(text, encoding="utf-8")
     return 0
 

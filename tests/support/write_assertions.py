@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes module `assertions`: pFUnit's assertions for every pair of kinds and ranks in use.
+"""Writes module `assertions`: pFUnit's assertions for the kinds and ranks (up to 2) that it takes.
 
 write_assertions.py OUTPUT.f90
 """
@@ -13,7 +13,9 @@ INTEGERS = ("int8", "int16", "int32", "int64")
 REALS = ("real32", "real64")
 SAME_RANK = ((0, 0), (1, 1), (2, 2))
 SCALAR_AGAINST_ARRAY = ((0, 1), (0, 2))
-ARRAY_AGAINST_SCALAR = ((1, 0), (2, 0))
+# The first argument is of the second's kind or of default kind; with a real second also a default integer.
+INTEGER_PAIRS = [(a, b) for b in INTEGERS for a in INTEGERS if a in (b, "int32")]
+REAL_PAIRS = [(a, b) for b in REALS for a in ("int32", *REALS) if a in (b, "int32", "real32")]
 ORDER = {
     "assertLessThan": "<",
     "assertLessThanOrEqual": "<=",
@@ -49,18 +51,24 @@ class Writer:
         self.generics: dict[str, list[str]] = {}
         self.procedures: list[str] = []
 
-    def add(self, generic: str, arguments: list[tuple], call: list[str], guard: str = "") -> None:
-        """arguments: (name, kind, rank) of the dummies before message and location."""
+    def add(
+        self, generic: str, arguments: list[tuple], call: list[str], guard: str = "", keyword: bool = False
+    ) -> None:
+        """arguments: (name, kind, rank) of the dummies before message and location.
+
+        With `keyword` the message can be given by its keyword alone.
+        """
         specifics = self.generics.setdefault(generic, [])
         name = f"{generic}_{len(specifics) + 1}"
         specifics.append(name)
-        names = ", ".join(argument[0] for argument in arguments)
+        names = ", ".join([argument[0] for argument in arguments] + ["keyword"] * keyword)
         self.procedures += [
             f"  subroutine {name}({names}, message, location)",
             *(
                 f"    {declaration(kind)}, intent(in) :: {dummy}{dimensions(rank)}"
                 for dummy, kind, rank in arguments
             ),
+            *(["    class(keyword_t), intent(in), optional :: keyword"] if keyword else []),
             "    character(len=*), intent(in), optional :: message",
             "    type(SourceLocation), intent(in), optional :: location",
             *([guard] if guard else []),
@@ -69,7 +77,9 @@ class Writer:
             "",
         ]
 
-    def pair(self, generic, kinds, ranks, wide, routine, extra=(), names=("expected", "found")):
+    def pair(
+        self, generic, kinds, ranks, wide, routine, extra=(), names=("expected", "actual"), keyword=False
+    ):
         """An assertion about two values; extra = arguments after them: (dummy, kind, expression)."""
         (a, b), (kind_a, kind_b), (rank_a, rank_b) = names, kinds, ranks
         array = b if rank_b else a
@@ -84,7 +94,7 @@ class Writer:
             f"shape({array})",
             *(expression for _, _, expression in extra),
         ]
-        self.add(generic, arguments, call, guard)
+        self.add(generic, arguments, call, guard, keyword)
 
     def text(self) -> str:
         lines = [
@@ -97,6 +107,9 @@ class Writer:
             "  implicit none",
             "  private",
             "",
+            "  type :: keyword_t",
+            "  end type keyword_t",
+            "",
         ]
         for generic, specifics in self.generics.items():
             lines += [f"  public :: {generic}", f"  interface {generic}"]
@@ -106,45 +119,41 @@ class Writer:
 
 
 def write_equal(out: Writer) -> None:
-    ranks = SAME_RANK + SCALAR_AGAINST_ARRAY
-    integer_pairs = [(a, b) for a in INTEGERS for b in INTEGERS if a == b or a == "int32" or b == "int32"]
-    real_pairs = [(a, b) for a in (*REALS, "int32") for b in REALS]
-    for pair in ranks:
-        for kinds in integer_pairs:
+    for pair in SAME_RANK + SCALAR_AGAINST_ARRAY:
+        for kinds in INTEGER_PAIRS:
             out.pair("assertEqual", kinds, pair, "int64", "compare")
-        out.pair("assertEqual", ("logical", "logical"), pair, "", "compare")
-        for kinds in real_pairs:
+        out.pair("assertEqual", ("logical", "logical"), pair, "", "compare", keyword=True)
+        for kinds in REAL_PAIRS:
             out.pair("assertEqual", kinds, pair, "real64", "compare", [("", "", "0.0_real64")])
-            for tolerance in REALS:
+            for tolerance in sorted({"real32", kinds[1]}):
                 extra = [("tolerance", tolerance, "real(tolerance, real64)")]
                 out.pair("assertEqual", kinds, pair, "real64", "compare", extra)
                 out.pair("assertRelativelyEqual", kinds, pair, "real64", "compare_relatively", extra)
-    for pair in ((0, 0), (1, 1)):
-        out.pair("assertEqual", ("character", "character"), pair, "", "compare")
+    for pair in ((0, 0), (0, 1), (1, 1)):
+        kinds = ("character", "character")
+        out.pair("assertEqual", kinds, pair, "", "compare", names=("expected", "found"))
 
 
 def write_order(out: Writer) -> None:
-    integer_pairs = [(a, b) for a in ("int32", "int64") for b in ("int32", "int64")]
-    real_pairs = [(a, b) for a in REALS for b in REALS]
     for generic, relation in ORDER.items():
         extra = [("", "", f"'{relation}'")]
-        for pair in SAME_RANK + SCALAR_AGAINST_ARRAY + ARRAY_AGAINST_SCALAR:
-            for kinds in integer_pairs:
-                out.pair(generic, kinds, pair, "int64", "compare_order", extra, ("a", "b"))
-            for kinds in real_pairs:
-                out.pair(generic, kinds, pair, "real64", "compare_order", extra, ("a", "b"))
+        for pair in SAME_RANK + SCALAR_AGAINST_ARRAY:
+            for kinds in INTEGER_PAIRS:
+                out.pair(generic, kinds, pair, "int64", "compare_order", extra, ("lhs", "rhs"), keyword=True)
+            for kinds in REAL_PAIRS:
+                out.pair(generic, kinds, pair, "real64", "compare_order", extra, ("lhs", "rhs"))
 
 
 def write_conditions(out: Writer) -> None:
-    for rank in (0, 1, 2):
-        values = "[condition]" if rank != 1 else "condition"
+    for rank in (0, 1):
+        values = "condition" if rank else "[condition]"
         for generic, wanted in (("assertTrue", ".true."), ("assertFalse", ".false.")):
             call = [f"check_all({wanted}", values, "shape(condition)"]
             out.add(generic, [("condition", "logical", rank)], call)
-        for kind in REALS:
-            for generic, routine in (("assertIsNaN", "check_nan"), ("assertIsFinite", "check_finite")):
-                call = [f"{routine}([real(x, real64)]", "shape(x)"]
-                out.add(generic, [("x", kind, rank)], call)
+    for kind in REALS:
+        for generic, routine in (("assertIsNaN", "check_nan"), ("assertIsFinite", "check_finite")):
+            call = [f"{routine}([real(x, real64)]", "shape(x)"]
+            out.add(generic, [("x", kind, 0)], call)
 
 
 def main() -> int:

@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.arguments import Parser, list_of, positive, whole_number
-from separatrix.discovery.fitting.catalogue import BY_NAME
+from separatrix.discovery.fitting.catalogue import STARTS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
 from separatrix.discovery.wording import searched, with_error
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import INTERRUPTED, TERMINATED, SeparatrixError
+from separatrix.errors import INTERNAL, INTERRUPTED, NO_MEMORY, TERMINATED, SeparatrixError
 from separatrix.version import __version__
 
 
@@ -33,12 +34,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SeparatrixError as error:
         print(f"separatrix-discover: {error}", file=sys.stderr)
         return error.code
+    except MemoryError as error:
+        print(f"separatrix-discover: not enough memory: {error or 'thin the records'}", file=sys.stderr)
+        return NO_MEMORY
     except _TerminatedError:
         print("separatrix-discover: terminated before the end", file=sys.stderr)
         return TERMINATED
     except KeyboardInterrupt:
         print("separatrix-discover: interrupted before the end", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}:{place.lineno}"
+        said = f"{type(error).__name__} in {where}: {error}"
+        print(f"separatrix-discover: internal error, please report it: {said}", file=sys.stderr)
+        return INTERNAL
     return 0
 
 
@@ -121,6 +131,7 @@ def summary(verdict: dict) -> list[str]:
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"
         )
+    lines += [f"  {one['text']}" for one in verdict["remains"]]
     lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
     lines += [f"  {reason}" for reason in verdict["reasons"]]
     if verdict["separating_experiment"]:
@@ -132,13 +143,19 @@ def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
-        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 73 cannot write, "
-        "130 interrupted, 143 terminated.",
+        epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 70 internal error, "
+        "71 not enough memory, 73 cannot write, 130 interrupted, 143 terminated.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"
     )
-    parser.add_argument("records", metavar="RECORD", nargs="+", type=Path, help="record to fit (CSV or HDF5)")
+    parser.add_argument(
+        "records",
+        metavar="RECORD",
+        nargs="+",
+        type=Path,
+        help="record to fit (CSV, HDF5, .mat, .npz, UFF 58, TDMS)",
+    )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results")
     parser.add_argument(
         "--hold-out",
@@ -157,7 +174,7 @@ def _parser() -> Parser:
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")
     parser.add_argument("--seed", type=whole_number(0), default=1, help="of all random choices [1]")
     parser.add_argument(
-        "--effects", metavar="LIST", type=list_of(BY_NAME), help="only these effects of the catalogue"
+        "--effects", metavar="LIST", type=list_of(STARTS), help="only these effects of the catalogue"
     )
     parser.add_argument(
         "--segment-periods",

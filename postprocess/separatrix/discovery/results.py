@@ -213,7 +213,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
         for number, prepared in enumerate(problem.prepared):
             rows = np.flatnonzero(problem.segments.record == number)
             inside = problem.segments.inside[rows]
-            first = prepared.record.t[problem.segments.first[rows]]
+            first = prepared.samples.t[problem.segments.first[rows]]
             group = file.create_group(f"{use}/{prepared.record.name}/{name}")
             group["t"] = (times[rows] + first[:, None])[inside]
             group["segment"] = np.broadcast_to(np.arange(rows.size)[:, None], inside.shape)[inside]

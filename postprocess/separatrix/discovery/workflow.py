@@ -149,7 +149,7 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         for name in ("v", "force", "phi")
     }
     header = dict(record.header)
-    if first and "phase" in header:
+    if first and "phase" in header and "phase_origin_s" not in header:
         # the header tells the crank angle at the first row of the whole record
         header["phase_origin_s"] = float(record.t[0])
     return Record(

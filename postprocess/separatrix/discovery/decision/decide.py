@@ -15,6 +15,7 @@ from separatrix.discovery.decision.judge import (
     judged,
     lead,
     margin,
+    sizeable,
     stable,
 )
 from separatrix.discovery.decision.misfit import missed
@@ -179,7 +180,7 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     options = bench.options
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.fitted.fit.converged
-    best.gates["detect"] = best.p < options.detection_level
+    best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
         helps = any(low > 0 for low, _ in bounds)
@@ -187,6 +188,14 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     best.gates["separate"] = not rivals
     best.gates["admissible"] = admissible(best, base, options)[0]
     best.gates["stable"] = stable(best, base, options) >= options.inclusion
+
+
+def _of_some_size(best: Judged, options: Options) -> bool:
+    """Whether what an effect explains, where it was fitted or foretold, is no fault of a rig."""
+    seen = sizeable(2 * best.training, best.fitted.fit, options, options.least_effect)
+    if best.prediction is None:
+        return seen
+    return seen or sizeable(2 * best.held_out, best.prediction.fit, options, options.least_effect)
 
 
 def _judge_ceiling(bench: Bench, one: Judged) -> None:
@@ -217,13 +226,13 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     if left:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
-    elif fits[0][1].fit.reduced_chi2 > bench.options.adequate_chi2:
+    elif fits[0][1].fit.sample_chi2 > bench.options.adequate_chi2:
         decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
-    if decision.base_ceiling.p < bench.options.gap_share * bench.options.detection_level:
+    gap = decision.base_ceiling
+    significant = gap.p < bench.options.gap_share * bench.options.detection_level
+    if significant and sizeable(gap.closable, fits[0][1].fit, bench.options):
         decision.outcome = "not-in-catalogue"
-        decision.reasons.append(
-            f"forces that depend on {decision.base_ceiling.best.name} would explain more, no effect does"
-        )
+        decision.reasons.append(f"forces that depend on {gap.best.name} would explain more, no effect does")
     return decision
 
 

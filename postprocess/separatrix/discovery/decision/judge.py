@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.fitting.catalogue import BY_NAME
 from separatrix.discovery.fitting.ceiling import Ceiling
+from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.options import Options
+from separatrix.library import effects
 
 _BLOCKS = 2
 
@@ -130,7 +131,7 @@ def equivalent(one: Judged, other: Judged) -> bool:
     """Whether what two fits do not share is two names of the same motion."""
     mine, theirs = set(one.fitted.names), set(other.fitted.names)
     left, right = mine - theirs, theirs - mine
-    return len(left) == len(right) == 1 and right.pop() in BY_NAME[left.pop()].equivalent
+    return len(left) == len(right) == 1 and right.pop() in effects()[left.pop()].confused
 
 
 def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
@@ -156,9 +157,32 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
 
 
 def adequate(one: Judged, options: Options) -> bool:
-    """Whether what is left is noise, or little of a gap that was closed nearly all."""
+    """Whether what is left is noise, or little of a gap that was closed nearly all.
+
+    Either it is no more than a share of the gap, however significant, or the fit is like noise and a flexible
+    force explains nothing more that is sizeable.
+    """
+    fit = one.fitted.fit
     gained = max(0.0, 2 * one.training)
     share = gained / max(gained + one.ceiling.closable, 1e-300)
-    clean = one.ceiling.p > options.detection_level
+    clean = one.ceiling.p > options.detection_level or not sizeable(one.ceiling.closable, fit, options)
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
-    return bool(one.fitted.fit.reduced_chi2 <= options.adequate_chi2 and (clean or closed))
+    return bool((fit.sample_chi2 <= options.adequate_chi2 and (clean or closed)) or _all_closed(one, options))
+
+
+def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None) -> bool:
+    """Whether a gain of chi^2 is that of a motion of some size beside the noise of a sample."""
+    least = options.least_gap if least is None else least
+    return gain > least**2 * fit.samples
+
+
+def _all_closed(one: Judged, options: Options) -> bool:
+    """Whether the gap is closed but for a share that has another reason, where it was fitted and foretold."""
+    fit = one.fitted.fit
+    left = max(one.ceiling.closable, fit.excess, 0.0)
+    if left > options.remaining * (2 * one.training + left):
+        return False
+    if one.prediction is None:
+        return True
+    left = max(one.prediction.excess, 0.0)
+    return left <= options.remaining * (2 * one.held_out + left)

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from separatrix.discovery.decision.rounds import Bench, Round
-from separatrix.discovery.fitting.catalogue import BY_NAME, Candidate
+from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import screen, signature
 from separatrix.discovery.wording import unit_of, units_of
+from separatrix.library import effects
 
 _LADDER = 4.0 ** np.arange(-3, 4)
 _RATIOS = np.linspace(0.6, 1.5, 19)
@@ -132,7 +133,7 @@ def distance(one: Fitted, other: Fitted, frequency: float) -> float:
     rows = np.arange(0, one.fit.starts.shape[0], max(1, one.fit.starts.shape[0] // 12))
     segments, prepared = one.problem.segments, one.problem.prepared
     angles = [
-        one.problem.crank_angle(r, one.fit.values, float(prepared[r].record.t[first]))
+        one.problem.crank_angle(r, one.fit.values, float(prepared[r].samples.t[first]))
         for r, first in zip(segments.record[rows], segments.first[rows], strict=True)
     ]
     start = np.column_stack([one.fit.starts[rows], angles])
@@ -154,8 +155,8 @@ def distance(one: Fitted, other: Fitted, frequency: float) -> float:
 def equivalents(names: list[str]) -> list[str]:
     """Why effects of the catalogue are the same motion, in words."""
     return [
-        f"{one} and {other}: {BY_NAME[one].equivalent[other]}"
+        f"{one} and {other}: {effects()[one].confused[other]}"
         for i, one in enumerate(names)
         for other in names[i + 1 :]
-        if other in BY_NAME.get(one).equivalent
+        if other in effects()[one].confused
     ]

@@ -31,9 +31,10 @@ def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
     found = {}
     for number in range(len(data.prepared)):
         rows = (record == number) & fit.good
-        freedom = int(fit.counts[rows].sum() - 2 * rows.sum())
+        squares, more = fit.condensed(rows)
+        freedom = int(fit.counts[rows].sum() - 2 * rows.sum() + more)
         if freedom > 0:
-            found[number] = (float(fit.chi2[rows].sum() / freedom), freedom)
+            found[number] = (float((fit.chi2[rows].sum() + squares) / freedom), freedom)
     return found
 
 

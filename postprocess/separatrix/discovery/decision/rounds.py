@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.judge import Judged, judged
-from separatrix.discovery.fitting.catalogue import CATALOGUE, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import blocks_of, eliminate, solve_scaled
-from separatrix.discovery.fitting.heldout import Prediction, predict
+from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
@@ -46,7 +46,8 @@ class Bench:
         free, fit = fitted.problem.free, fitted.fit
         guess = None if other is None else other.fit.starts
         misfit = max(1.0, fit.reduced_chi2)
-        return predict(self.held_out, fitted.model, free, fit.values, fitted.covariance, misfit, guess)
+        known = Known(fit.values, fitted.covariance, fitted.unseen)
+        return predict(self.held_out, fitted.model, free, known, misfit, guess)
 
 
 @dataclass
@@ -126,21 +127,21 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
     absent: dict[str, str] = {}
-    for effect in CATALOGUE:
-        if effect.name in base.names or (options.candidates and effect.name not in options.candidates):
+    for name in STARTS:
+        if name in base.names or (options.candidates and name not in options.candidates):
             continue
-        if any(path.startswith(f"effect.{effect.name}.") for path in base.model.parameters):
+        if any(path.startswith(f"effect.{name}.") for path in base.model.parameters):
             continue
-        made = candidate(base.model, free, base.names, effect.name, bench.scales)
+        made = candidate(base.model, free, base.names, name, bench.scales)
         if isinstance(made, str):
-            absent[effect.name] = made
+            absent[name] = made
         else:
-            candidates[effect.name] = made
+            candidates[name] = made
     options.progress(f"screening {len(candidates)} effects", at)
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
-    absent = {one.name: absent[one.name] for one in CATALOGUE if one.name in absent}
+    absent = {name: absent[name] for name in STARTS if name in absent}
     return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
 
 

@@ -11,6 +11,7 @@ from separatrix.discovery.decision.decoys import decoys
 from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.limits import detectable, equivalents, separating_experiment
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
+from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine
 from separatrix.discovery.decision.where import Map, sentences, where_maps
@@ -52,6 +53,7 @@ def verdict_of(findings: Findings) -> dict:
         "base_parameters": _parameters(findings.base),
         "where": sentences(findings.maps),
         "gap": _gap(findings),
+        "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
         "gates": best.gates if best else {},
         "p_value": best.p if best else None,
         "reasons": decision.reasons,
@@ -76,6 +78,15 @@ def verdict_of(findings: Findings) -> dict:
     }
 
 
+def _remaining(findings: Findings) -> list[Remains]:
+    """What the accepted effect leaves of the gap."""
+    decision = findings.decision
+    if not decision.accepted:
+        return []
+    mass = findings.bench.scales.mass
+    return remains_of(findings.base, decision.foretold, decision.accepted[0], mass)
+
+
 def d_prime(found: Round) -> dict[str, float]:
     """Linearised size of each effect over its standard error, in its direction of largest gain."""
     return {name: float(np.sqrt(max(0.0, 2 * found.screened.gain[name]))) for name in found.screened.names}
@@ -88,7 +99,7 @@ def _candidate(one: Judged) -> dict:
         "training": one.training,
         "held_out": one.held_out,
         "evidence": one.evidence,
-        "reduced_chi2": fit.reduced_chi2,
+        "reduced_chi2": fit.sample_chi2,
         # what is worse than the base has not found its minimum, at which the effect does nothing
         "converged": fit.converged and one.training > -WORSE,
         "starts": one.fitted.tries,
@@ -187,10 +198,10 @@ def _parameters(fitted: Fitted) -> dict:
 def _gap(findings: Findings) -> dict:
     decision = findings.decision
     best = decision.accepted[0] if decision.accepted else None
-    gap = {"training": {"before": findings.base.fit.reduced_chi2, "noise_floor": 1.0}}
-    gap["training"]["after"] = best.fitted.fit.reduced_chi2 if best else gap["training"]["before"]
+    gap = {"training": {"before": findings.base.fit.sample_chi2, "noise_floor": 1.0}}
+    gap["training"]["after"] = best.fitted.fit.sample_chi2 if best else gap["training"]["before"]
     if decision.foretold is not None:
-        before = decision.foretold.reduced_chi2
+        before = decision.foretold.sample_chi2
         gap["held_out"] = {"before": before, "noise_floor": 1.0}
-        gap["held_out"]["after"] = best.prediction.reduced_chi2 if best else before
+        gap["held_out"]["after"] = best.prediction.sample_chi2 if best else before
     return gap

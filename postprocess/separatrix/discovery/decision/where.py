@@ -78,7 +78,7 @@ def _times(problem, inside: np.ndarray) -> list[tuple | None]:
     for number, prepared in enumerate(problem.prepared):
         rows = problem.segments.record == number
         seconds = np.zeros(inside.shape)
-        seconds[rows] = prepared.record.t[problem.segments.index[rows]] - prepared.record.t[0]
+        seconds[rows] = prepared.samples.t[problem.segments.index[rows]] - prepared.record.t[0]
         name = "time" if len(problem.prepared) == 1 else f"time in {prepared.record.name}"
         found.append(_bins(name, "s", seconds, inside & rows[:, None], count))
     return found

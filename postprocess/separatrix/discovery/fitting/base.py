@@ -24,7 +24,7 @@ _SAME_SENSOR = 1.5
 def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can say something about; sets noise and memory of the records."""
     force = any(one.record.force is not None for one in data.prepared)
-    free = base_parameters(model, force) + drive_nuisances(model, [one.phase_known for one in data.prepared])
+    free = base_parameters(model, force) + drive_nuisances(model, data.prepared)
     free += sensor_zeros(free, len(data.prepared))
     find_phases(data, model, free)
     values = np.array([one.value for one in free])

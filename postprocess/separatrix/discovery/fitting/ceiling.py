@@ -142,7 +142,7 @@ def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
     time, phase = np.zeros(inside.shape), None
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        t = prepared.record.t
+        t = prepared.samples.t
         stamps = t[problem.segments.index[rows]]
         time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
         if prepared.frequency is not None:
@@ -171,7 +171,7 @@ def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         rows = np.flatnonzero(problem.segments.record == number)
         if impacts is None or not rows.size:
             continue
-        stamps = problem.prepared[number].record.t[problem.segments.index[rows]]
+        stamps = problem.prepared[number].samples.t[problem.segments.index[rows]]
         times = stamps - stamps[:, :1]
         for segment, time, speed, _, side in impacts:
             i = int(segment)

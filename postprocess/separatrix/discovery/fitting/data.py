@@ -5,12 +5,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from separatrix.discovery.fitting.catalogue import Scales
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.rescue import rescued, suspicious
+from separatrix.discovery.measured.condense import condense, stride
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
 from separatrix.discovery.measured.smoother import Smoothed, smooth
@@ -21,6 +23,10 @@ STAGES = (0.2, 0.5, 1.0)
 _FEWEST = 10
 # share of segments that may be wrong and the others still right
 _FEW = 0.25
+# natural periods that a segment may last where the drive is slow
+_MOST_SWINGS = 1.5
+# standard errors of the speed within which a body may be at rest
+_SLOW = 3.0
 
 
 @dataclass
@@ -39,26 +45,28 @@ class Data:
     def smoothed_starts(self, stage: int) -> np.ndarray:
         """Starts (segments, 2) of a stage from the smoother."""
         segments = self.stages[stage]
-        return np.array(
-            [self.smoothed[r].state[a, :2] for r, a in zip(segments.record, segments.first, strict=True)]
-        ).reshape(-1, 2)
+        starts = np.zeros((segments.count, 2))
+        for r, (one, smoothed) in enumerate(zip(self.prepared, self.smoothed, strict=True)):
+            rows = segments.record == r
+            starts[rows] = smoothed.at(one.samples.t[segments.first[rows]])
+        return starts
 
     def smoothed_errors(self, stage: int) -> np.ndarray:
         """Standard errors of those starts."""
         segments = self.stages[stage]
-        return np.array(
-            [
-                np.sqrt(np.diag(self.smoothed[r].covariance[a])[:2])
-                for r, a in zip(segments.record, segments.first, strict=True)
-            ]
-        ).reshape(-1, 2)
+        errors = np.zeros((segments.count, 2))
+        for r, (one, smoothed) in enumerate(zip(self.prepared, self.smoothed, strict=True)):
+            rows = np.flatnonzero(segments.record == r)
+            near = smoothed.nearest(one.samples.t[segments.first[rows]])
+            errors[rows] = np.sqrt(np.einsum("kii->ki", smoothed.covariance[near])[:, :2])
+        return errors
 
     def carried_starts(self, stage: int, known: int, fit: Fit) -> np.ndarray:
         """Starts of a stage from the motion fitted at stage `known`; from the smoother where it failed."""
         starts = self.smoothed_starts(stage)
         old, new = self.stages[known], self.stages[stage]
         for r, record in enumerate(self.prepared):
-            x = np.full(record.record.t.size, np.nan)
+            x = np.full(record.samples.t.size, np.nan)
             v = x.copy()
             for i in np.flatnonzero((old.record == r) & ~fit.evaluation.failed):
                 inside = old.inside[i]
@@ -76,16 +84,17 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
     smoothed, lengths = [], []
     for one in prepared:
         record = one.record
-        smoothed.append(smooth(record.t, record.x, one.sigma, one.period_samples))
+        swing = 4 * _correlation_samples(record.x)
+        smoothed.append(_smoothed(one, swing))
         if seconds is not None:
             length = seconds / record.interval
         elif one.period_samples is not None:
-            length = periods * one.period_samples
+            length = periods * min(one.period_samples, _MOST_SWINGS * _natural_samples(one))
         else:
-            length = periods * 4 * _correlation_samples(record.x)
+            length = periods * swing
         lengths.append(int(np.clip(length, _FEWEST, record.t.size / 3)))
     stages = [
-        cut([one.record for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
+        cut([one.samples for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
         for share in STAGES
     ]
     for number, one in enumerate(prepared):
@@ -94,11 +103,47 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
     return Data(prepared, smoothed, stages)
 
 
+def _natural_samples(one: Prepared) -> float:
+    """Samples per natural period, infinite where there is none."""
+    return 2 * np.pi / one.natural / one.record.interval if one.natural else np.inf
+
+
+def _smoothed(one: Prepared, swing: float) -> Smoothed:
+    """Smooth a record; one sampled far faster than it moves is seen at fewer samples, and condensed."""
+    record = one.record
+    period = min(one.period_samples or np.inf, _natural_samples(one), swing)
+    every = stride(period)
+    if every == 1:
+        return smooth(record.t, record.x, one.sigma, one.period_samples)
+    at = np.concatenate([np.arange(first, last, every) for first, last in record.pieces])
+    seen = smooth(record.t[at], record.x[at], one.sigma, period / every)
+    one.samples = condense(record, period, one.sigma, _events(record.t.size, at, seen))
+    one.notes.append(
+        f"{record.t.size} samples, {period:.0f} per period of the motion: stretches in which it is "
+        f"smooth are condensed to {one.samples.t.size} values that say as much"
+    )
+    return seen
+
+
+def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.ndarray, float]:
+    """Samples around impacts; those where the body may turn round or stick; the usual acceleration."""
+    hit, slow = np.zeros(at.size, bool), np.zeros(at.size, bool)
+    hit[seen.impacts] = True
+    hit[np.minimum(seen.impacts + 1, at.size - 1)] = True
+    slow |= np.abs(seen.v) < _SLOW * np.sqrt(seen.covariance[:, 1, 1])
+    slow[:-1] |= seen.v[:-1] * seen.v[1:] <= 0
+    for shift in (-1, 1):
+        slow |= np.roll(slow, shift)
+    nearest = np.clip(np.searchsorted(at, np.arange(count)), 1, at.size - 1)
+    nearest -= np.arange(count) - at[nearest - 1] < at[nearest] - np.arange(count)
+    return hit[nearest], slow[nearest], float(np.median(np.abs(seen.state[:, 2])) / 0.6745)
+
+
 def _correlation_samples(x: np.ndarray) -> int:
     """Samples until the autocorrelation of a record first crosses zero: a quarter of a period of a swing."""
     centred = x - x.mean()
-    spectrum = np.abs(np.fft.rfft(centred, 2 * x.size)) ** 2
-    correlation = np.fft.irfft(spectrum)[: x.size]
+    spectrum = np.abs(rfft(centred, next_fast_len(2 * x.size, real=True))) ** 2
+    correlation = irfft(spectrum)[: x.size]
     below = np.flatnonzero(correlation < 0)
     return int(below[0]) if below.size else x.size // 8
 

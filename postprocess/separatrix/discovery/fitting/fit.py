@@ -69,6 +69,8 @@ class Fit:
     caught: bool = False
     # whether steps of every length were tried from there and gained next to nothing
     exhausted: bool = False
+    # what condensed stretches leave over, and its degrees of freedom
+    left_over: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def converged(self) -> bool:
@@ -98,8 +100,31 @@ class Fit:
 
     @property
     def reduced_chi2(self) -> float:
-        """Sum of squares per degree of freedom."""
+        """Sum of squares per degree of freedom of what is fitted, as sizes and errors are scaled by."""
         return self.total / max(1, self.freedom)
+
+    @property
+    def sample_chi2(self) -> float:
+        """Sum of squares per degree of freedom of all samples, those of condensed stretches included."""
+        squares, freedom = self.condensed(self.good)
+        return (self.total + squares) / max(1.0, self.freedom + freedom)
+
+    @property
+    def samples(self) -> float:
+        """Residuals of all samples of the good segments."""
+        return float(self.counts[self.good].sum()) + self.condensed(self.good)[1]
+
+    @property
+    def excess(self) -> float:
+        """What chi^2 of all samples has beyond its degrees of freedom."""
+        squares, freedom = self.condensed(self.good)
+        return self.total + squares - self.freedom - freedom
+
+    def condensed(self, rows: np.ndarray) -> tuple[float, float]:
+        """Sum of squares of what condensed stretches of some segments leave over, degrees of freedom."""
+        if self.left_over is None:
+            return 0.0, 0.0
+        return tuple(float(one[rows].sum()) for one in self.left_over)
 
     def far_off(self, hopeless: float) -> bool:
         """Whether most segments are followed so badly that no wrong minimum of a few can be the reason."""
@@ -261,7 +286,8 @@ def _finished(problem, values, starts, current, movable, iterations) -> Fit:
     reduced, _, _ = eliminate(blocks)
     chi2 = np.sum(current.used * current.residual**2, axis=1)
     counts = current.used.sum(axis=1)
-    return Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound, movable)
+    found = Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound, movable)
+    return replace(found, left_over=problem.left_over())
 
 
 def _open(

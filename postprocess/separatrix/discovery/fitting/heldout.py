@@ -41,34 +41,60 @@ class Prediction:
     @property
     def reduced_chi2(self) -> float:
         """Sum of squares per degree of freedom; the parameters of the machine were not fitted."""
+        return float(self.fit.chi2[self.good].sum() / max(1, self._freedom))
+
+    @property
+    def sample_chi2(self) -> float:
+        """The same per degree of freedom of all samples, those of condensed stretches included."""
+        squares, freedom = self.fit.condensed(self.good)
+        return float((self.fit.chi2[self.good].sum() + squares) / max(1.0, self._freedom + freedom))
+
+    @property
+    def excess(self) -> float:
+        """What chi^2 of all samples has beyond its degrees of freedom."""
+        squares, freedom = self.fit.condensed(self.good)
+        return float(self.fit.chi2[self.good].sum() + squares - self._freedom - freedom)
+
+    @property
+    def _freedom(self) -> int:
         good = self.good
-        freedom = (
-            self.fit.counts[good].sum() - 2 * good.sum() - (len(self.problem.free) - self.covariance.shape[0])
-        )
-        return float(self.fit.chi2[good].sum() / max(1, freedom))
+        own = len(self.problem.free) - self.covariance.shape[0]
+        return int(self.fit.counts[good].sum() - 2 * good.sum() - own)
+
+
+@dataclass
+class Known:
+    """What training records say of the parameters of a machine: values, covariance; which they do not show.
+
+    Those are fitted to the held-out records: without an impact in training, nobody can foretell how one ends.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    unseen: np.ndarray
 
 
 def predict(
     data: Data,
     model,
     free: list[Free],
-    values: np.ndarray,
-    covariance: np.ndarray,
+    known: Known,
     misfit: float = 1.0,
     guess: np.ndarray | None = None,
 ) -> Prediction:
-    """Score held-out records by the machine with `values`, known up to `covariance`, of the given `misfit`.
+    """Score held-out records by a machine as far as it is known, of the given `misfit` in training.
 
     `guess`: starts of segments that another machine found there, tried too.
     """
     shared = [i for i, one in enumerate(free) if one.record is None]
     whole = on_other_records(free, data.prepared)
-    start = np.concatenate([values[shared], np.zeros(len(whole) - len(shared))])
+    start = np.concatenate([known.values[shared], np.zeros(len(whole) - len(shared))])
     fixed = np.arange(len(whole)) < len(shared)
+    fixed[: len(shared)] &= ~known.unseen[shared]
     fit = _fit_own(data, model, whole, start, fixed, guess)
     problem = Problem(model, data.prepared, data.stages[-1], whole)
     fit = again(problem, fit)
-    used = covariance[np.ix_(shared, shared)]
+    used = known.covariance[np.ix_(shared, shared)]
     score = _scores(fit.chi2, fit.reduced.matrix, fit.reduced.gradient, used)
     return Prediction(score, fit.good, problem.segments.record, problem, fit, misfit, used)
 

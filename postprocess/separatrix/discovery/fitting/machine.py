@@ -41,6 +41,8 @@ class Free:
     positive: bool = False
     # each record has its own beside it
     varies: bool = False
+    # standard error of a nuisance about 0 that a measurement of its own leaves
+    error: float | None = None
 
     def physical(self, value: float) -> float:
         """The number itself, from what is fitted."""
@@ -102,22 +104,27 @@ def drive_amplitudes(model) -> dict[str, float]:
     }
 
 
-def drive_nuisances(model, phase_known: list[bool]) -> list[Free]:
+def drive_nuisances(model, prepared: list) -> list[Free]:
     """Scale of the drive; zero of the crank (where phi was not measured) and clock of each record."""
     if "drive.ratio" not in model.parameters or not model.parameters["drive.ratio"].value:
         return []
     free = []
     if drive_amplitudes(model):
         free.append(Free("nuisance:drive_scale", 1.0, 0.2, 5.0, 0.01))
-    return free + record_nuisances(phase_known)
+    return free + record_nuisances(prepared)
 
 
-def record_nuisances(phase_known: list[bool]) -> list[Free]:
-    """What is free for each record by itself."""
+def record_nuisances(prepared: list) -> list[Free]:
+    """What is free for each record by itself: a measured crank angle within its errors."""
     free = [
-        Free("nuisance:phase", 0.0, size=0.01, record=i) for i, known in enumerate(phase_known) if not known
+        Free("nuisance:phase", 0.0, size=0.01, record=i, error=one.phase_error or None)
+        for i, one in enumerate(prepared)
+        if one.phase_error or not one.phase_known
     ]
-    return free + [Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i) for i in range(len(phase_known))]
+    return free + [
+        Free("nuisance:clock", 0.0, -0.02, 0.02, 1e-4, record=i, error=one.clock_error or None)
+        for i, one in enumerate(prepared)
+    ]
 
 
 def sensor_zeros(free: list[Free], count: int) -> list[Free]:
@@ -134,7 +141,7 @@ def on_other_records(free: list[Free], prepared: list) -> list[Free]:
     """What is free on other records: what `free` has for all of them, and what each record has of its own."""
     own = [one for one in free if one.record is None]
     if prepared[0].frequency:
-        own += record_nuisances([one.phase_known for one in prepared])
+        own += record_nuisances(prepared)
     for i, one in enumerate(prepared):
         # a part of a record that was fitted has its zero
         if not one.record.part:

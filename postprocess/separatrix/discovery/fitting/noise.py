@@ -4,14 +4,21 @@
 
 A wrong model does little over half a period that a free start and a force that is constant over quarters of
 it could not undo. What is left is noise, less what these unknowns took away: its power and the product of its
-neighbours are compared with what noise of correlation r^|k| would leave.
+neighbours are compared with what noise of correlation r^|k| would leave. With R its correlation and Q an
+orthonormal basis of the unknowns that is tr(P R P), P = 1 - Q Q', of which no more than R Q is ever formed.
+
+Of a condensed record the same is done with what its smooth stretches leave over; no machine is needed there.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.signal import lfilter
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns
+from separatrix.discovery.measured.condense import Samples, expected_left
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
 _PIECES = 4
@@ -20,38 +27,38 @@ _SURE = 3.5
 _OUTLIER = 2.5
 
 
+@dataclass
+class _Left:
+    """What is left of pieces of records: power, products of neighbours; both of noise by memory (rows)."""
+
+    record: np.ndarray
+    power: np.ndarray
+    product: np.ndarray
+    freedom: np.ndarray
+    powers: np.ndarray
+    products: np.ndarray
+
+
 def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dict[int, float], float]:
     """Factor on the assumed standard deviation by record, and the correlation of neighbours in all."""
-    cleaned, left, record = _cleaned(problem, fit, channel, mass)
-    length = problem.segments.inside.shape[1]
-    if record.size < 4:
+    left = _joined([_of_segments(problem, fit, channel, mass), *_of_stretches(problem, channel)])
+    if left.record.size < 4:
         return {}, 0.0
-    shifted = left[:, 1:].transpose(0, 2, 1) @ left[:, :-1]
-    lags = np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
-    powers, products = [], []
-    for memory in _MEMORIES:
-        covariance = np.sign(memory) ** lags * np.abs(memory) ** lags if memory else np.eye(length)
-        powers.append(np.sum(left * covariance, axis=(1, 2)))
-        products.append(np.sum(shifted * covariance, axis=(1, 2)))
-    power = np.sum(cleaned**2, axis=1)
-    product = np.sum(cleaned[:, 1:] * cleaned[:, :-1], axis=1)
     # each record in its own size
-    size = np.ones(record.size)
-    for number in np.unique(record):
-        size[record == number] = (
-            power[record == number].sum() / np.trace(left, axis1=1, axis2=2)[record == number].sum()
-        )
-    ratio = np.sum(products, axis=1) / np.sum(powers, axis=1)
-    seen = float(np.sum(product / size) / np.sum(power / size))
+    size = np.ones(left.record.size)
+    for number in np.unique(left.record):
+        rows = left.record == number
+        size[rows] = left.power[rows].sum() / left.freedom[rows].sum()
+    ratio = left.products.sum(axis=1) / left.powers.sum(axis=1)
+    seen = float(np.sum(left.product / size) / np.sum(left.power / size))
     memory = float(np.interp(seen, ratio, _MEMORIES))
-    count = float(np.trace(left, axis1=1, axis2=2).sum())
-    if memory < max(_LEAST, _SURE / np.sqrt(count)):
+    if memory < max(_LEAST, _SURE / np.sqrt(left.freedom.sum())):
         memory = 0.0
     factors = {}
-    for number in np.unique(record):
-        rows = record == number
-        expected = float(np.interp(memory, _MEMORIES, np.sum(powers, axis=1, where=rows)))
-        factors[int(number)] = float(np.sqrt(power[rows].sum() / expected))
+    for number in np.unique(left.record):
+        rows = left.record == number
+        expected = float(np.interp(memory, _MEMORIES, left.powers[:, rows].sum(axis=1)))
+        factors[int(number)] = float(np.sqrt(left.power[rows].sum() / expected))
     return factors, memory
 
 
@@ -60,31 +67,84 @@ def white_share(memory: float) -> float:
     return float(np.polyval([2, -16, 56, -112, 70], memory)) / 70
 
 
-def _cleaned(
-    problem: Problem, fit: Fit, channel: int, mass: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Residuals of one channel, starts and forces projected out, the projectors, and their records."""
+def _joined(parts: list[_Left]) -> _Left:
+    names = ("record", "power", "product", "freedom", "powers", "products")
+    return _Left(*(np.concatenate([getattr(one, name) for one in parts], axis=-1) for name in names))
+
+
+def _of_stretches(problem: Problem, channel: int) -> list[_Left]:
+    """What condensed stretches leave over, a row for all stretches of one length in a record."""
+    found = []
+    for number, prepared in enumerate(problem.prepared):
+        samples = prepared.samples
+        if not samples.condensed or (channel == 1 and samples.v is None):
+            continue
+        sigma = prepared.velocity_sigma if channel == 1 else prepared.sigma
+        parts = [_of_length(samples, size, channel, sigma) for size in samples.lengths]
+        columns = [np.array(column) for column in zip(*parts, strict=True)]
+        record = np.full(len(parts), number)
+        found.append(_Left(record, *columns[:3], columns[3].T, columns[4].T))
+    return found
+
+
+def _of_length(samples: Samples, size: int, channel: int, sigma: float) -> tuple:
+    rows = (samples.size == size) & (samples.node == 0)
+    count = rows.sum()
+    squares = (samples.left_v if channel == 1 else samples.left)[rows].sum() / sigma**2
+    expected = np.array([expected_left(size, float(memory)) for memory in _MEMORIES]) * count
+    # products are kept of positions alone; those of velocities are as white noise leaves them
+    white = expected_left(size, 0.0)[1] * count * squares / samples.freedom[rows].sum()
+    product = white if channel == 1 else samples.products[rows].sum() / sigma**2
+    return squares, product, samples.freedom[rows].sum(), expected[:, 0], expected[:, 1]
+
+
+def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left:
+    """What segments of samples leave over once their starts and forces are projected out."""
     segments = problem.segments
     length = segments.inside.shape[1]
     counts = segments.inside.sum(axis=1)
     piece = np.minimum(np.arange(length)[None, :] * _PIECES // counts[:, None], _PIECES - 1)
+    part = slice(channel * length, (channel + 1) * length)
+    fitting = fit.good & (counts >= 2 * (_PIECES + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
+    condensed = np.array([one.samples.condensed for one in problem.prepared])
+    rows = np.flatnonzero(fitting & ~condensed[segments.record])
+    if not rows.size:
+        none = np.zeros(0)
+        return _Left(none.astype(int), none, none, none, *np.zeros((2, _MEMORIES.size, 0)))
     forces = (piece[:, :, None] == np.arange(_PIECES)) * segments.inside[:, :, None].astype(float)
     columns = np.concatenate([fit.evaluation.by_start, force_columns(problem, fit, forces, mass)], axis=2)
-    part = slice(channel * length, (channel + 1) * length)
-    rows = np.flatnonzero(
-        fit.good & (counts >= 2 * (_PIECES + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
-    )
     columns, residual = columns[rows, part], fit.evaluation.residual[rows, part]
     size = np.linalg.norm(columns, axis=1, keepdims=True)
     basis, singular, _ = np.linalg.svd(columns / np.where(size > 0, size, 1), full_matrices=False)
     basis = basis * (singular > 1e-6 * singular[:, :1])[:, None, :]
-    left = np.eye(length)[None] * segments.inside[rows][:, :, None] - basis @ basis.transpose(0, 2, 1)
-    cleaned = (left @ residual[:, :, None])[:, :, 0]
-    share = np.trace(left, axis1=1, axis2=2)
-    kept = np.zeros(rows.size, bool)
+    cleaned = residual * segments.inside[rows]
+    cleaned = cleaned - np.einsum("klq,kq->kl", basis, np.einsum("klq,kl->kq", basis, cleaned))
+    freedom = counts[rows] - np.sum(basis**2, axis=(1, 2))
+    power = np.sum(cleaned**2, axis=1)
     record = segments.record[rows]
+    kept = np.zeros(rows.size, bool)
     for number in np.unique(record):
         # robust against single segments that the model misses altogether
-        power = np.sum(cleaned**2, axis=1) / share
-        kept |= (record == number) & (power < _OUTLIER * np.median(power[record == number]))
-    return cleaned[kept], left[kept], record[kept]
+        share = power / freedom
+        kept |= (record == number) & (share < _OUTLIER * np.median(share[record == number]))
+    product = np.sum(cleaned[:, 1:] * cleaned[:, :-1], axis=1)
+    expected = _expected(basis[kept], counts[rows][kept])
+    return _Left(record[kept], power[kept], product[kept], freedom[kept], *expected)
+
+
+def _expected(basis: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Power and products of neighbours that noise of each memory would leave, (memories, segments)."""
+    inside = (np.arange(basis.shape[1])[None, :] < counts[:, None])[:, :, None]
+    powers, products = [], []
+    for memory in _MEMORIES:
+        # R Q by a filter forth and back
+        forth = lfilter([1.0], [1.0, -memory], basis, axis=1)
+        back = lfilter([1.0], [1.0, -memory], basis[:, ::-1], axis=1)[:, ::-1]
+        carried = (forth + back - basis) * inside
+        inner = basis.transpose(0, 2, 1) @ carried
+        powers.append(counts - np.trace(inner, axis1=1, axis2=2))
+        mixed = np.sum(basis[:, 1:] * carried[:, :-1], axis=(1, 2))
+        mixed += np.sum(carried[:, 1:] * basis[:, :-1], axis=(1, 2))
+        both = np.sum((basis[:, 1:] @ inner) * basis[:, :-1], axis=(1, 2))
+        products.append((counts - 1) * memory - mixed + both)
+    return np.array(powers), np.array(products)

@@ -14,8 +14,8 @@ from separatrix.errors import SeparatrixError
 
 @dataclass
 class Evaluation:
-    """Residuals over their noise (segments, channels*length), derivatives by start (…, 2) and parameters (…,
-    p).
+    """Residuals over their noise (segments, channels*length, then nuisances that were measured), derivatives
+    by start (…, 2) and parameters (…, p).
 
     `used` is 0 where a segment has no sample; `failed` is true where the simulator gave one up (its rows are
     0); `steady` is false where the sequence of impacts would change under a small step, so that the
@@ -56,6 +56,45 @@ class Problem:
         chosen = padded(old.record[rows], old.first[rows], old.last[rows])
         return Problem(self.model, self.prepared, chosen, self.free)
 
+    def left_over(self) -> tuple[np.ndarray, np.ndarray]:
+        """What condensed stretches of each segment leave over, and its degrees of freedom.
+
+        The machine has no part in it: it says how large the noise is beside the one that is assumed.
+        """
+        squares, freedom = np.zeros(self.segments.count), np.zeros(self.segments.count)
+        for number, prepared in enumerate(self.prepared):
+            samples = prepared.samples
+            if not samples.condensed:
+                continue
+            rows = np.flatnonzero(self.segments.record == number)
+            first, last = self.segments.first[rows], self.segments.last[rows]
+            white = samples.left / prepared.sigma**2
+            count = samples.freedom
+            if samples.v is not None:
+                white = white + samples.left_v / prepared.velocity_sigma**2
+                count = 2 * count
+            for table, per_row in ((squares, white), (freedom, count)):
+                total = np.concatenate([[0.0], np.cumsum(per_row)])
+                table[rows] = total[last] - total[first]
+        return squares, freedom
+
+    @property
+    def channels(self) -> int:
+        """How many of x and v are compared."""
+        return 2 if any(part["v"] is not None for part in self._parts) else 1
+
+    def _known_nuisances(self) -> list[tuple[int, float, np.ndarray]]:
+        """Places and errors of nuisances that were measured, and the segments that share what this says.
+
+        Each is one more residual of its record, of which every segment has its part, so that sums and
+        resampled sums over the segments hold it.
+        """
+        return [
+            (place, one.error, rows)
+            for place, one in enumerate(self.free)
+            if one.error is not None and (rows := np.flatnonzero(self.segments.record == one.record)).size
+        ]
+
     @property
     def values(self) -> np.ndarray:
         """Values that the free parameters start from."""
@@ -64,31 +103,33 @@ class Problem:
     def _part(self, number: int) -> dict:
         """The segments of one record as lists for the simulator."""
         record = self.prepared[number].record
+        fitted = self.prepared[number].samples
         rows = np.flatnonzero(self.segments.record == number)
         first, last = self.segments.first[rows], self.segments.last[rows]
         offsets = np.concatenate([[0], np.cumsum(last - first)])
         samples = np.concatenate(
             [np.arange(a, b) for a, b in zip(first, last, strict=True)] or [np.zeros(0, int)]
         )
-        starts = record.t[first]
-        times = record.t[samples] - np.repeat(starts, last - first)
+        starts = fitted.t[first]
+        times = fitted.t[samples] - np.repeat(starts, last - first)
         return {
             "rows": rows,
             "offsets": offsets,
             "times": times,
             "starts": starts,
             "inside": self.segments.inside[rows],
-            "x": record.x[samples],
-            "v": None if record.v is None else record.v[samples],
-            "force": _force_argument(record, first),
+            "x": fitted.x[samples],
+            "v": None if fitted.v is None else fitted.v[samples],
+            "samples": samples,
+            "force": _force_argument(record, fitted.place[first]),
         }
 
     def evaluate(self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True) -> Evaluation:
         """Simulate all segments from `starts` (segments, 2) of x and v."""
         shape = self.segments.inside.shape
-        channels = 2 if any(part["v"] is not None for part in self._parts) else 1
         count, length = shape
-        width = channels * length
+        measured = self._known_nuisances()
+        width = self.channels * length + len(measured)
         out = Evaluation(
             residual=np.zeros((count, width)),
             used=np.zeros((count, width)),
@@ -110,6 +151,11 @@ class Problem:
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
+        for column, (place, error, rows) in enumerate(measured, start=self.channels * length):
+            out.residual[rows, column] = -values[place] / error
+            out.used[rows, column] = 1 / rows.size
+            if derivatives:
+                out.by_parameter[rows, column, place] = 1 / error
         # what was not flown to its end says nothing
         for table in (out.residual, out.by_start, out.by_parameter):
             if table is not None:
@@ -128,12 +174,15 @@ class Problem:
             if memory == 0:
                 continue
             rows = np.flatnonzero(self.segments.record == number)
-            for first in range(0, table.shape[1], length):
+            linked = prepared.samples.linked[self.segments.index[rows]][:, 1:]
+            linked = linked.reshape(linked.shape + (1,) * (table.ndim - 2))
+            for first in range(0, self.channels * length, length):
                 part = table[rows, first : first + length]
-                part[:, 1:] = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
+                freed = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
+                part[:, 1:] = np.where(linked, freed, part[:, 1:])
                 table[rows, first : first + length] = part
-        used = np.tile(self.segments.inside, (1, table.shape[1] // length))
-        table[~used] = 0
+        used = np.tile(self.segments.inside, (1, self.channels))
+        table[:, : used.shape[1]][~used] = 0
         return table
 
     def _evaluate_record(
@@ -169,18 +218,22 @@ class Problem:
             n = len(directions)
             out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
-        for channel, (measured, computed, sigma) in enumerate(
+        spread = prepared.samples.spread(prepared.memory)[part["samples"]]
+        for channel, (measured, computed, size) in enumerate(
             ((part["x"], result.x, prepared.sigma), (part["v"], result.v, prepared.velocity_sigma))
         ):
             if measured is None:
                 continue
             columns = slice(channel * length, (channel + 1) * length)
+            sigma = size * spread
             out.residual[rows, columns] = np.nan_to_num(_padded((measured - computed) / sigma, inside))
             out.used[rows, columns] = inside
             if derivatives:
                 by_start, by_parameter = jacobians[channel]
-                out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma, inside))
-                out.by_parameter[rows, columns] = np.nan_to_num(_padded(by_parameter / sigma, inside))
+                out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma[:, None], inside))
+                out.by_parameter[rows, columns] = np.nan_to_num(
+                    _padded(by_parameter / sigma[:, None], inside)
+                )
 
     def _simulate(
         self,
@@ -295,7 +348,7 @@ def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def _force_argument(record, first: np.ndarray):
-    """Force of a record for segments that begin at the samples `first`.
+    """Force of a record for segments that begin at the places `first`, in samples.
 
     Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
     there are leaves room for the last times, which need not be quite even.

@@ -42,6 +42,11 @@ class Fitted:
     tries: int = 1
 
     @property
+    def unseen(self) -> np.ndarray:
+        """Which free parameters the records say nothing about."""
+        return np.diag(self.fit.reduced.matrix[self.fit.good].sum(axis=0)) <= 0
+
+    @property
     def covariance(self) -> np.ndarray:
         """Of all free parameters, starts projected out, enlarged where the fit is worse than the noise."""
         matrix = self.fit.reduced.matrix[self.fit.good].sum(axis=0)

@@ -54,9 +54,10 @@ def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarr
     columns = np.zeros((count, width, moved.shape[3]))
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        columns[rows, :length] = moved[rows, :, 0] / prepared.sigma
-        if width > length and prepared.record.v is not None:
-            columns[rows, length:] = moved[rows, :, 1] / prepared.velocity_sigma
+        spread = prepared.samples.spread(prepared.memory)[problem.segments.index[rows]][:, :, None]
+        columns[rows, :length] = moved[rows, :, 0] / (prepared.sigma * spread)
+        if problem.channels > 1 and prepared.record.v is not None:
+            columns[rows, length : 2 * length] = moved[rows, :, 1] / (prepared.velocity_sigma * spread)
     return problem.whitened(columns)
 
 
@@ -65,6 +66,6 @@ def sample_times(problem: Problem) -> np.ndarray:
     times = np.zeros(problem.segments.inside.shape)
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        t = prepared.record.t[problem.segments.index[rows]]
+        t = prepared.samples.t[problem.segments.index[rows]]
         times[rows] = t - t[:, :1]
     return times

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
+from separatrix.discovery.measured.condense import Samples, whole
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.discovery.wording import units_of
@@ -20,6 +21,10 @@ _UNEVEN = 1e-2
 _MOST_RATIO = 50.0
 # of the velocity over the slope of the position, beyond which its unit must be wrong
 _UNIT = 2.0
+# error of a crank angle [rad] that is that of its digits
+_EXACT = 1e-9
+# of the scatter of a crank angle over its stated noise that is told
+_DISAGREEMENT = 1.5
 
 
 @dataclass
@@ -35,13 +40,25 @@ class Prepared:
     sigma_stated: bool = False
     velocity_sigma_stated: bool = False
     frequency: float | None = None
+    # of the free machine [rad/s], where it has one
+    natural: float | None = None
     phase: float = 0.0
     # known: measured as a channel; stated: in the header, refined by the fit
     phase_known: bool = False
+    # standard errors of a measured crank angle at the origin [rad], and of its rate, relative
+    phase_error: float = 0.0
+    clock_error: float = 0.0
     phase_stated: bool = True
     drive_scale: float = 1.0
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
+    # what is fitted: all samples, or fewer rows that say as much
+    samples: Samples | None = None
+
+    def __post_init__(self) -> None:
+        """Fit every sample, unless something else is said."""
+        if self.samples is None:
+            self.samples = whole(self.record)
 
     @property
     def period_samples(self) -> float | None:
@@ -120,6 +137,7 @@ def _find_drive(prepared: Prepared, model) -> None:
     ratio = model.parameters.get("drive.ratio")
     if ratio is None or not ratio.value:
         return
+    prepared.natural = model.drive_frequency({"drive.ratio": 1.0})
     if record.phi is not None:
         prepared.frequency, prepared.phase = turning(record)
         if prepared.frequency * record.duration < np.pi:
@@ -127,7 +145,11 @@ def _find_drive(prepared: Prepared, model) -> None:
                 f"{record.file}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
                 "not the angle of a turning crank"
             )
-        prepared.origin, prepared.phase_known = float(record.t[0]), True
+        # the errors of angle and rate are independent in the middle of the record
+        prepared.origin = float(record.t.mean())
+        prepared.phase += prepared.frequency * (prepared.origin - float(record.t[0]))
+        prepared.phase_known = True
+        _measured_angle(prepared)
     else:
         header = record.header
         if "drive_frequency_rad_s" in header:
@@ -175,6 +197,27 @@ def turning(record: Record) -> tuple[float, float]:
         ahead[first:last] -= 2 * np.pi * turns
     more, start = np.polyfit(t, ahead, 1)
     return slope + float(more), float(start)
+
+
+def _measured_angle(prepared: Prepared) -> None:
+    """Standard errors of angle and rate of a measured crank, from its noise: stated, or its scatter."""
+    record = prepared.record
+    t = record.t - prepared.origin
+    scatter = record.phi - prepared.phase - prepared.frequency * t
+    scatter = scatter - 2 * np.pi * np.round(scatter / (2 * np.pi))
+    sigma = float(np.std(scatter))
+    stated = record.header.get("phi_noise_sigma_rad", 0.0)
+    if stated and sigma > _DISAGREEMENT * stated:
+        prepared.notes.append(
+            f"noise of phi is stated as {stated:.3g} rad, it scatters by {sigma:.3g} rad about even turning"
+        )
+    # neighbours that err alike say less
+    memory = float(np.corrcoef(scatter[1:], scatter[:-1])[0, 1]) if sigma > 0 else 0.0
+    memory = min(max(memory, 0.0), 0.99)
+    error = max(sigma, stated) * np.sqrt((1 + memory) / (1 - memory) / t.size)
+    if error > _EXACT:
+        prepared.phase_error = error
+        prepared.clock_error = error / float(np.sqrt(np.mean(t**2))) / prepared.frequency
 
 
 def even_interval(record: Record) -> float:

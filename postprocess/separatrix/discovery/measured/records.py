@@ -4,7 +4,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from itertools import count
 from pathlib import Path
 
@@ -12,15 +11,12 @@ import numpy as np
 
 from separatrix.discovery.measured.clock import pieces_of
 from separatrix.discovery.measured.faults import check_clipping, left_out
-from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, Table, read_table
+from separatrix.discovery.measured.formats import read_table
+from separatrix.discovery.measured.header import numbers_of, to_si
+from separatrix.discovery.measured.tables import CHANNELS, Table
 from separatrix.errors import SeparatrixError
 
-_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
-_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3}
-_ANGLES = ("rad", "deg", "mrad")
 _FEWEST_SAMPLES = 60
-# likeness of a header key to a known one that makes it a misspelling
-_NEAR = 0.7
 
 
 @dataclass
@@ -78,9 +74,8 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         return f"{path}, row {kept[row] + 1}" if table.lines is None else f"{path}:{table.lines[kept[row]]}"
 
     warnings: list[str] = []
-    numbers = _header_numbers(path, header, warnings)
-    _doubt_header(header, numbers, warnings)
-    unit = _scale(path, header, columns, warnings)
+    unit, of_time = to_si(path, header, columns, warnings)
+    numbers = numbers_of(path, header, of_time, warnings)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -114,52 +109,6 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         warnings.append(f"columns that are not used: {', '.join(table.unused)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
     return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, file=str(path), **channels)
-
-
-def _header_numbers(path: Path, header: dict[str, str], warnings: list[str]) -> dict[str, float]:
-    numbers = {}
-    for key in sorted(NUMBERS & header.keys()):
-        try:
-            numbers[key] = float(header[key])
-        except ValueError:
-            raise SeparatrixError(f"{path}: '{key}' is '{header[key]}', expected a number") from None
-        if not np.isfinite(numbers[key]):
-            raise SeparatrixError(f"{path}: '{key}' is {header[key]}")
-    for key in ("sampling_rate_hz", "drive_ratio", "drive_frequency_rad_s", "drive_scale"):
-        if key in numbers and numbers[key] <= 0:
-            raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected more than 0")
-    for key in ("sensor_noise_sigma_m", "sensor_noise_sigma_m_s", "sensor_resolution_m"):
-        if key in numbers and numbers[key] < 0:
-            raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected at least 0")
-        if numbers.get(key) == 0 and key != "sensor_resolution_m":
-            warnings.append(f"{key} is 0: measured instead")
-    return numbers
-
-
-def _doubt_header(header: dict[str, str], numbers: dict[str, float], warnings: list[str]) -> None:
-    """Warn of keys that look like misspelt ones, and of an angle that looks like degrees."""
-    for key in header:
-        near = [] if key in KEYS else get_close_matches(key, sorted(KEYS), 1, _NEAR)
-        if near:
-            warnings.append(f"header key '{key}' is not used: '{near[0]}'?")
-    if abs(numbers.get("phase", 0.0)) > 2 * np.pi:
-        warnings.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
-
-
-def _scale(path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]) -> str:
-    """Turn time and position into SI, as the other channels and the header are; return the unit of x."""
-    if "units" not in header:
-        warnings.append("no 'units': read as s and m (rad of an angle)")
-        return "m"
-    words = [word.strip() for word in header["units"].split(",")]
-    if len(words) < 2 or words[0] not in _TIME or words[1] not in _LENGTH:
-        raise SeparatrixError(
-            f"{path}: units '{header['units']}', expected one of {', '.join(_TIME)} and one of "
-            f"{', '.join(_LENGTH)}"
-        )
-    columns["t"] = columns["t"] * _TIME[words[0]]
-    columns["x"] = columns["x"] * _LENGTH[words[1]]
-    return "rad" if words[1] in _ANGLES else "m"
 
 
 def unique_names(records: Iterable[Record]) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
-from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.condense import Samples
 from separatrix.discovery.measured.smoother import Smoothed
 
 _FEWEST = 6
@@ -35,14 +35,16 @@ class Segments:
         return self.record.size
 
 
-def cut(records: list[Record], smoothed: list[Smoothed], lengths: list[int]) -> Segments:
-    """Cut each record into segments of about `lengths` samples."""
+def cut(records: list[Samples], smoothed: list[Smoothed], lengths: list[int]) -> Segments:
+    """Cut each record into segments that last about `lengths` samples of the sensor."""
     rows: list[tuple[int, int, int]] = []
     for number, (record, smooth, length) in enumerate(zip(records, smoothed, lengths, strict=True)):
-        smoothness = _calm(smooth)
+        smoothness = _calm(smooth)[smooth.nearest(record.t)]
         for first, last in record.pieces:
             if last - first >= max(_FEWEST, min(length, FEWEST_IN_PIECE)):
-                rows += [(number, a, b) for a, b in _cut_piece(first, last, length, smoothness)]
+                piece = slice(first, last)
+                cuts = _cut_piece(record.place[piece], length, smoothness[piece])
+                rows += [(number, first + a, first + b) for a, b in cuts]
     table = np.array(rows, int).reshape(-1, 3)
     return padded(table[:, 0], table[:, 1], table[:, 2])
 
@@ -65,15 +67,21 @@ def _calm(smooth: Smoothed) -> np.ndarray:
     return calm
 
 
-def _cut_piece(first: int, last: int, length: int, calm: np.ndarray) -> list[tuple[int, int]]:
+def _cut_piece(place: np.ndarray, length: int, calm: np.ndarray) -> list[tuple[int, int]]:
+    """Rows at which the segments of a piece begin and end; `place` counts samples of the sensor."""
     # a piece between gaps may be much shorter
-    within = min(max(2, length // 4), (last - first) // 2)
-    starts = [first + int(np.argmax(calm[first : first + within] > _SLOW))]
+    whole = place[-1] - place[0] + 1
+    within = min(max(2, length // 4), whole // 2)
+    begin = int(np.searchsorted(place, place[0] + within))
+    starts = [int(np.argmax(calm[:begin] > _SLOW))]
     reach = max(1, length // 3)
-    while last - starts[-1] > 1.5 * length:
-        aim = starts[-1] + length
-        near = np.arange(aim - reach, aim + reach + 1)
-        near = near[np.argsort(np.abs(near - aim), kind="stable")]
+    while place[-1] + 1 - place[starts[-1]] > 1.5 * length:
+        aim = place[starts[-1]] + length
+        near = np.arange(np.searchsorted(place, aim - reach), np.searchsorted(place, aim + reach, "right"))
+        near = near[near > starts[-1] + _FEWEST]
+        if not near.size:
+            near = np.array([min(starts[-1] + _FEWEST + 1, place.size - 1)])
+        near = near[np.argsort(np.abs(place[near] - aim), kind="stable")]
         good = near[calm[near] > _SLOW]
         starts.append(int(good[0] if good.size else near[np.argmax(calm[near])]))
-    return list(zip(starts, [*starts[1:], last], strict=True))
+    return list(zip(starts, [*starts[1:], place.size], strict=True))

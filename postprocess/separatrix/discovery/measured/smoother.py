@@ -35,6 +35,17 @@ class Smoothed:
         """Velocity [m/s]."""
         return self.state[:, 1]
 
+    def nearest(self, t: np.ndarray) -> np.ndarray:
+        """Places of the states next to times `t` [s]."""
+        after = np.clip(np.searchsorted(self.t, t), 1, self.t.size - 1)
+        return after - (t - self.t[after - 1] < self.t[after] - t)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Position and velocity at times `t` [s], (times, 2)."""
+        near = self.nearest(t)
+        ahead, (x, v, a) = t - self.t[near], self.state[near].T
+        return np.column_stack([x + v * ahead + a * ahead**2 / 2, v + a * ahead])
+
 
 def smooth(t: np.ndarray, x: np.ndarray, sigma: float, period_samples: float | None = None) -> Smoothed:
     """Smooth positions of noise `sigma` [m]; the drive period sets the window of detection."""

@@ -3,13 +3,14 @@
 """Tables of numbers with a header of keys, from CSV or HDF5."""
 
 import codecs
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.errors import SeparatrixError
 from separatrix.trial import try_first
 
 CHANNELS = ("x", "v", "force", "phi")
@@ -26,8 +27,13 @@ NUMBERS = {
     "x0_m",
     "v0_m_s",
     "phase",
+    "phi_noise_sigma_rad",
 }
 """Header keys with one number."""
+MOST_SAMPLES = 10_000_000
+"""Samples of a record that are read."""
+# lines of a header; bytes of a row with two numbers
+_MOST_HEADER, _FEWEST_BYTES = 1000, 8
 KEYS = NUMBERS | {"units"}
 """All header keys that mean something."""
 
@@ -42,25 +48,64 @@ class Table:
     unused: list[str] = field(default_factory=list)
 
 
-def read_table(path: Path) -> Table:
-    """Read one file; what cannot be read is refused with the line and the reason."""
-    if path.is_dir():
-        raise SeparatrixError(f"{path}: a folder, expected a record (CSV or HDF5)", NO_INPUT)
-    if not path.is_file():
-        raise SeparatrixError(f"{path}: no such file", NO_INPUT)
-    with path.open("rb") as file:
-        is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
-    return _read_hdf5(path) if is_hdf5 else _read_csv(path)
+def read_csv(path: Path) -> Table:
+    """Read a text: comments with keys, a row of names, rows of numbers."""
+    return _read_plain(path) or _read_by_lines(path)
 
 
-def _read_csv(path: Path) -> Table:
+def _read_plain(path: Path) -> Table | None:
+    """A well-formed file at once; None where anything in it needs a closer look."""
+    begun: list[str] = []
+    with path.open(encoding="utf-8", errors="surrogateescape") as file:
+        for line in file:
+            begun.append(line)
+            if line.strip() and not line.startswith("#"):
+                break
+            if len(begun) > _MOST_HEADER:
+                return None
+        first = file.readline()
+    names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
+    if "t" not in names or "x" not in names or not first.strip():
+        return None
+    check_length(path, path.stat().st_size // max(1, len(first)))
+    used = [name for name in names if name in ("t", *CHANNELS)]
+    try:
+        # any comment, blank line or short row among the numbers is left to the closer look
+        table = np.loadtxt(path, delimiter=",", comments=None, skiprows=len(begun), ndmin=2)
+    except ValueError:
+        return None
+    if table.shape[1] != len(names) or len(set(names)) != len(names):
+        return None
+    head = _parsed(path, begun)
+    lines = np.arange(len(begun) + 1, len(begun) + 1 + len(table))
+    if sum(1 for _ in path.open("rb")) != lines[-1]:
+        return None
+    columns = {name: table[:, names.index(name)].copy() for name in used}
+    return Table(head.header, columns, lines, [name for name in names if name not in used])
+
+
+def check_length(path: Path, samples: int) -> None:
+    """Refuse a record of more samples than fit into the memory of a usual machine."""
+    if samples > MOST_SAMPLES:
+        raise SeparatrixError(
+            f"{path}: about {samples:.3g} samples, at most {MOST_SAMPLES:.0e} a record are read: keep a "
+            f"part of it, or every {int(-(-samples // MOST_SAMPLES))}th row"
+        )
+
+
+def _read_by_lines(path: Path) -> Table:
+    return _parsed(path, _lines(path), whole=True)
+
+
+def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
+    """Header, names and (of a `whole` file) rows, line by line."""
     header: dict[str, str] = {}
     stands: dict[str, int] = {}
     names: list[str] | None = None
     separator = ","
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(_lines(path), start=1):
+    for number, line in enumerate(text_lines, start=1):
         text = line.strip(" \r\n")
         if not text.strip():
             continue
@@ -79,9 +124,12 @@ def _read_csv(path: Path) -> Table:
             separator = next((mark for mark in ";,\t" if _has_t_and_x(text, mark)), ",")
             names = _names(path, number, text, separator)
             used = [name for name in names if name in ("t", *CHANNELS)]
+            _units_of_names(header, text, separator, used)
         else:
             lines.append(number)
             rows.append(_numbers(path, number, text, separator, names, used))
+    if not whole:
+        return Table(header, {})
     if names is None or not rows:
         raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
     table = np.array(rows)
@@ -91,6 +139,7 @@ def _read_csv(path: Path) -> Table:
 
 def _lines(path: Path) -> list[str]:
     """Lines of a text; bytes that are no UTF-8 are kept, because comments may hold anything."""
+    check_length(path, path.stat().st_size // _FEWEST_BYTES)
     content = path.read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise SeparatrixError(f"{path}: text in UTF-16, expected UTF-8")
@@ -114,11 +163,25 @@ def _check_place(path: Path, number: int, key: str, stands: dict[str, int], belo
 
 
 def _has_t_and_x(text: str, separator: str) -> bool:
-    return {"t", "x"} <= {name.strip() for name in text.split(separator)}
+    return {"t", "x"} <= {_named(name)[0] for name in text.split(separator)}
+
+
+def _named(text: str) -> tuple[str, str]:
+    """Name of a column and its unit, '' where there is none, from `x`, `x [mm]` or `x (mm)`."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", text.strip())
+    return (found.group(1), found.group(2)) if found else (text.strip(), "")
+
+
+def _units_of_names(header: dict[str, str], text: str, separator: str, used: list[str]) -> None:
+    """Units beside the names of columns count as if the header had them."""
+    units = [_named(name) for name in text.split(separator)]
+    told = [f"{name} {unit}" for name, unit in units if unit and name in used]
+    if told:
+        header.setdefault("units", ", ".join(told))
 
 
 def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
-    names = [name.strip() for name in text.split(separator)]
+    names = [_named(name)[0] for name in text.split(separator)]
     if "t" not in names or "x" not in names:
         raise SeparatrixError(f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]'")
     if len(set(names)) != len(names):
@@ -142,11 +205,14 @@ def _numbers(
         raise SeparatrixError(f"{path}:{number}: '{text}' is not a row of numbers") from None
 
 
-def _read_hdf5(path: Path) -> Table:
+def read_hdf5(path: Path) -> Table:
+    """Read datasets with the names of the columns; keys are attributes."""
     try_first(path, lambda: _texts(h5py.File(path)))
     try:
         with h5py.File(path) as file:
             header, units = _texts(file)
+            if isinstance(file.get("t"), h5py.Dataset):
+                check_length(path, file["t"].size)
             columns = {
                 name: np.asarray(file[name][()], float)
                 for name in ("t", *CHANNELS)

@@ -3,8 +3,6 @@
 """What an added effect changes: sweeps and motions of the base and of the extended case, by the program."""
 
 import csv
-import os
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
@@ -22,8 +20,9 @@ from separatrix.discovery.report.figures import AFTER, BEFORE, MEASURED
 from separatrix.discovery.report.pages import Picture, Section
 from separatrix.discovery.wording import Units
 from separatrix.errors import SeparatrixError
-from separatrix.library import SOURCE_TREE, Model
+from separatrix.library import Model
 from separatrix.open import open_result
+from separatrix.program import program_path
 
 _HOLDS = 81
 _ROOM = 0.08
@@ -43,22 +42,16 @@ class Start:
     speeds: np.ndarray
 
 
-def program_path() -> Path | None:
-    """The program: SEPARATRIX_PROGRAM, else on the path, else in build/bin of this source tree, else None."""
-    asked = os.environ.get("SEPARATRIX_PROGRAM")
-    found = asked or shutil.which("separatrix") or SOURCE_TREE / "build" / "bin" / "separatrix"
-    return Path(found) if Path(found).is_file() else None
-
-
 def compare(
     base: Path, extended: Path, verdict: dict, details: h5py.File, progress: Callable[[str, float], None]
 ) -> Section:
     """The section with both figures, or with the sentence that says why they are missing."""
     section = Section("motion", "What it means for the motion")
     reason = _reason(verdict)
-    program = program_path()
-    if not reason and program is None:
-        reason = "the program separatrix was not found; SEPARATRIX_PROGRAM may name it"
+    try:
+        program = program_path()
+    except SeparatrixError:
+        reason = reason or "the program separatrix was not found; SEPARATRIX_PROGRAM may name it"
     if reason:
         section.body = [f"No maps before and after: {reason}."]
         return section

@@ -74,6 +74,7 @@ def _summary(verdict: dict) -> Section:
             f"The gap on {_records_of(use)}: reduced chi^2 {change}; noise alone gives "
             f"{number(one['noise_floor'])}."
         )
+    lines += [f"{one['text'][0].upper()}{one['text'][1:]}." for one in verdict["remains"]]
     body: list = [lines[0], lines[1:]]
     if verdict["reasons"]:
         body += ["What kept the verdict from being firmer:", list(verdict["reasons"])]

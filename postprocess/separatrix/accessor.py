@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`result.separatrix`: what a result knows beyond its arrays, and its figures."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from separatrix.cases import Case
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.open import decode_flags, decode_words, flag_names, table
+from separatrix.variables import REGIMES
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+    from separatrix.figures.look import Look
+
+
+@xr.register_dataset_accessor("separatrix")
+class Accessor:
+    """The result of `basin`, `sweep`, `points` or `trajectory`, or of `open_result`."""
+
+    def __init__(self, result: xr.Dataset) -> None:
+        """Take any Dataset; what is no result is refused when it is asked."""
+        self._result = result
+
+    @property
+    def kind(self) -> str:
+        """The kind of result: basin, sweep, points or trajectory."""
+        kind = self._result.attrs.get("kind")
+        if kind is None:
+            raise SeparatrixError("this Dataset is no result of Separatrix (no attribute kind)", USAGE)
+        return str(kind)
+
+    @property
+    def case(self) -> Case:
+        """The resolved case that the result was computed from."""
+        if "resolved_case" not in self._result.attrs:
+            raise SeparatrixError("this Dataset does not say of which case it is", USAGE)
+        return Case.from_text(str(self._result.attrs["resolved_case"]))
+
+    @property
+    def attractors(self) -> "pandas.DataFrame":
+        """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ..."""
+        self._require("basin")
+        catalogue = table(self._result, "catalogue")
+        if "attractor" not in catalogue:
+            raise SeparatrixError("this map has no catalogue: none of its axes is a start", USAGE)
+        frame = catalogue.to_dataframe()
+        frame["regime"] = [REGIMES[code] for code in catalogue["regime"].values]
+        frame["event_word"] = decode_words(catalogue["event_word"]).values
+        slices = np.unique(catalogue["slice"].values).size
+        frame.insert(2, "share", frame["count"] * slices / self._result["attractor"].size)
+        return frame.set_index(["slice", "attractor"] if slices > 1 else "attractor")
+
+    def shares(self, field: str = "attractor") -> "pandas.Series":
+        """Return the share of the points in each class: attractor, regime, reason, period."""
+        if field not in self._result:
+            raise SeparatrixError(f"no field '{field}'", USAGE)
+        codes, counts = np.unique(self._result[field].values, return_counts=True)
+        names = flag_names(self._result[field]) if "flag_values" in self._result[field].attrs else {}
+        import pandas
+
+        index = pandas.Index([names.get(int(code), int(code)) for code in codes], name=field)
+        return pandas.Series(counts / counts.sum(), index, name="share")
+
+    def decoded(self, field: str) -> xr.DataArray:
+        """Return a coded field as text."""
+        if field == "event_word":
+            return decode_words(self._result[field])
+        return decode_flags(self._result[field])
+
+    def trajectory(
+        self,
+        x0: float | None = None,
+        v0: float | None = None,
+        crank_angle: float | None = None,
+        *,
+        duration: float | None = None,
+        samples: int | None = None,
+        **parameters: float,
+    ) -> xr.Dataset:
+        """Return the motion from a start; `drive__ratio=...` puts other values into the machine."""
+        from separatrix.motions import trajectory
+
+        case = self.case.with_(parameters) if not parameters else self.case.with_(**parameters)
+        return trajectory(case, x0, v0, crank_angle, duration=duration, samples=samples)
+
+    def plot(
+        self,
+        name: str | None = None,
+        *,
+        title: str | None = None,
+        style_sheet: str | Path | None = None,
+        **wishes: object,
+    ) -> "Figure":
+        """Return a figure of this result, the first if no `name` is given.
+
+        Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
+        "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
+        "phase", "energy" and "contact", of points "regime". Notebooks show the figure; `savefig` writes it,
+        `save` in several formats.
+
+        `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
+        slice={"drive.ratio": 1.2}, axes=("v0", "x0"), units=["mm"], shade=True, attractors=False,
+        colours=[...], colour_map, limits, size=(120, 90), caption="short".
+        """
+        from separatrix import style
+        from separatrix.figures import basin, points, sweep, trajectory
+        from separatrix.labels import plain
+
+        kind = self.kind
+        heading = plain(title or str(self._result.attrs.get("title", "")))
+        look = _look(wishes)
+        with style.context(style_sheet):
+            if kind == "basin":
+                made = basin.figures(None, self._result, name, heading, look)
+            else:
+                modules = {"sweep": sweep, "trajectory": trajectory, "points": points}
+                made = modules[kind].figures(self._result, heading, look)
+        if name is not None and name not in made:
+            raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)
+        return made[name] if name else next(iter(made.values()))
+
+    def save(
+        self,
+        stem: str | Path,
+        name: str | None = None,
+        *,
+        formats: Sequence[str] = ("png", "pdf"),
+        dpi: int = 300,
+        **wishes: object,
+    ) -> list[Path]:
+        """Write a figure as STEM.png, STEM.pdf, ...; return the paths. `wishes` as for `plot`."""
+        from separatrix import style
+        from separatrix.save import save
+
+        figure = self.plot(name, **wishes)
+        with style.context():
+            return save(figure, Path(stem), formats, dpi)
+
+    def animate(
+        self,
+        parameter: str,
+        path: str | Path,
+        field: str = "attractor",
+        *,
+        title: str | None = None,
+        frames_per_second: float = 5.0,
+        dpi: int = 150,
+        **wishes: object,
+    ) -> Path:
+        """Write a map moving through one of its parameters, as .gif or, with ffmpeg, as .mp4."""
+        from separatrix.figures.animation import animate
+        from separatrix.labels import plain
+
+        self._require("basin")
+        heading = plain(title or str(self._result.attrs.get("title", "")))
+        look = _look(wishes)
+        return animate(self._result, parameter, Path(path), heading, field, look, frames_per_second, dpi)
+
+    def _require(self, kind: str) -> None:
+        if self.kind != kind:
+            raise SeparatrixError(f"this is a {self.kind}, not a {kind}", USAGE)
+
+
+def _look(wishes: dict[str, object]) -> "Look":
+    """The wishes as a Look; unknown ones are named."""
+    from dataclasses import fields
+
+    from separatrix.figures.look import Look
+
+    known = [one.name for one in fields(Look)]
+    for name in wishes:
+        if name not in known:
+            raise SeparatrixError(f"found '{name}', allowed {', '.join(known)}", USAGE)
+    return Look(**wishes)

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much of a gap a machine closes, and what remains: sizes, which do not change with the rate of sampling.
+
+A gap is what chi^2 has beyond its degrees of freedom. Over the samples it is the mean square of the
+difference of motion and machine over that of the noise, however fast the motion was sampled; a test of
+significance sees any gap once there are samples enough.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.refit import Fitted
+
+# size over the noise of a sample from which on it is worth to say what the remaining gap depends on
+_WORTH_WORDS = 0.2
+# share of what free forces close from which on a force of one thing closes most of it
+_MOST = 0.5
+
+
+@dataclass
+class Remains:
+    """Of one use of records: share of the gap that is closed, and what remains over the noise of a sample."""
+
+    use: str
+    closed: float | None
+    size: float
+    # what a force that closes most of the rest depends on; '' where nothing remains or nothing does
+    depends_on: str
+
+    def text(self) -> str:
+        """In words."""
+        where = {"training": "in training", "held_out": "on held-out records"}[self.use]
+        done = (
+            "there was no gap" if self.closed is None else f"{share_text(self.closed)} of the gap is closed"
+        )
+        left = (
+            "what remains is below the noise of a sample"
+            if self.size < _WORTH_WORDS
+            else (f"what remains is {self.size:.2g} times the noise of a sample")
+        )
+        rest = f", mostly a force that depends on {self.depends_on}" if self.depends_on else ""
+        return f"{where}, {done}; {left}{rest}"
+
+
+def share_text(share: float) -> str:
+    """A share in per cent, with as many digits as it takes to see what it lacks to the whole."""
+    lacking = 100 * (1 - share)
+    if lacking <= 0:
+        return "100 %"
+    digits = int(np.clip(-np.floor(np.log10(lacking)), 0, 4))
+    return f"{np.floor(100 * share * 10**digits) / 10**digits:.{digits}f} %"
+
+
+def remains_of(base: Fitted, foretold: Prediction | None, best: Judged, mass: float) -> list[Remains]:
+    """What an accepted effect leaves of the gap, in training and on held-out records."""
+    found = [_remains("training", base, best.fitted, mass, best.ceiling)]
+    if best.prediction is not None and foretold is not None:
+        found.append(_remains("held_out", foretold, best.prediction, mass))
+    return found
+
+
+def _remains(
+    use: str,
+    before: Fitted | Prediction,
+    after: Fitted | Prediction,
+    mass: float,
+    known: Ceiling | None = None,
+) -> Remains:
+    gap, left = (max(0.0, _sample_chi2(one) - 1) for one in (before, after))
+    closed = None if gap == 0 else max(0.0, 1 - left / gap)
+    size = float(np.sqrt(left))
+    if size < _WORTH_WORDS:
+        return Remains(use, closed, size, "")
+    families = (known or ceiling(after.problem, after.fit, mass)).families
+    free = max(one.gain for one in families)
+    best = max((one for one in families if one.name != "pieces"), key=lambda one: one.gain)
+    return Remains(use, closed, size, best.name if best.gain > _MOST * free else "")
+
+
+def _sample_chi2(one: Fitted | Prediction) -> float:
+    fit: Fit | Prediction = one.fit if isinstance(one, Fitted) else one
+    return fit.sample_chi2

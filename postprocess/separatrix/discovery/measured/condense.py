@@ -1,0 +1,301 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is fitted of a record: its samples, and in place of smooth stretches a few values that hold all they
+say.
+
+A stretch of b samples that a polynomial of degree n - 1 follows down to the noise is replaced by the values
+of its least-squares polynomial at the n zeros of the discrete orthogonal (Gram) polynomial of degree n. There
+the errors of the values are independent (Gauss quadrature: Golub and Welsch, Calculation of Gauss quadrature
+rules, Math. Comp. 23 (1969)), and a term of degree n leaves them as they are. What the polynomial leaves over
+is noise; its size is kept.
+
+Samples stay where the motion is not smooth: around impacts, where the body turns round or sticks (friction
+jumps there), and wherever the noise does not hide a term of degree n or n + 1.
+"""
+
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+
+import numpy as np
+from scipy.linalg import toeplitz
+
+from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.signals import white_noise
+from separatrix.errors import SeparatrixError
+
+# samples per period of the motion from which a record is condensed, and as many as are smoothed then
+_MANY, _ENOUGH = 450.0, 200.0
+# values in place of a stretch, its shortest and, as a share of the period, longest length
+NODES = 4
+_SHORTEST = 16
+_LONGEST = 1 / 16
+# chi^2 of two terms that noise exceeds in one of a hundred stretches
+_UNSEEN = 9.2
+# a jump of the acceleration may shift the values by this share of their noise; the share of such a jump that
+# terms above degree n have in a stretch
+_SHIFT, _HIDDEN = 0.1, 0.004
+_MOST_MEMORY = 0.9
+# length of the stretches that the memory of the noise is measured in
+_SOUNDED = 32
+MOST_ROWS = 200_000
+"""Values and samples that a record may keep."""
+
+
+@dataclass
+class Samples:
+    """What is fitted of a record, row by row."""
+
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray | None
+    # stretches of rows without gaps as (first, last + 1)
+    pieces: list[tuple[int, int]]
+    # samples of the stretch that a row stands for (1: it is a sample), and which of its values
+    size: np.ndarray
+    node: np.ndarray
+    # place in the record in samples
+    place: np.ndarray
+    # sums of squares that stretches leave over, and of products of neighbours, at their first rows
+    left: np.ndarray
+    left_v: np.ndarray
+    products: np.ndarray
+    _spreads: dict[float, np.ndarray] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def lengths(self) -> list[int]:
+        """Lengths of the stretches that rows stand for [samples]."""
+        return [int(size) for size in np.unique(self.size) if size > 1]
+
+    @property
+    def condensed(self) -> bool:
+        """Whether any row stands for more than a sample."""
+        return bool(self.lengths)
+
+    @cached_property
+    def freedom(self) -> np.ndarray:
+        """Degrees of freedom of what stretches leave over, at their first rows."""
+        return np.where((self.node == 0) & (self.size > 1), self.size - NODES, 0)
+
+    @cached_property
+    def linked(self) -> np.ndarray:
+        """Whether the noise of a row remembers that of the row before: both are samples, and neighbours."""
+        single = self.size == 1
+        found = single & np.concatenate([[False], single[:-1]])
+        found[1:] &= np.diff(self.place) < 1.5
+        return found
+
+    def spread(self, memory: float) -> np.ndarray:
+        """Standard deviation of each row over that of a sample, of noise with correlation memory^|k|."""
+        if memory not in self._spreads:
+            found = np.ones(self.size.size)
+            for size in self.lengths:
+                rows = self.size == size
+                found[rows] = _spread(size, round(memory, 3))[self.node[rows]]
+            # noise is measured again now and then
+            self._spreads.clear()
+            self._spreads[memory] = found
+        return self._spreads[memory]
+
+
+def whole(record: Record) -> Samples:
+    """Every sample as a row."""
+    n = record.t.size
+    none = np.zeros(n)
+    return Samples(
+        record.t,
+        record.x,
+        record.v,
+        list(record.pieces),
+        np.ones(n, int),
+        np.zeros(n, int),
+        np.arange(n, dtype=float),
+        none,
+        none,
+        none,
+    )
+
+
+def stride(period: float) -> int:
+    """Every how many samples are enough to see a motion of `period` samples."""
+    return 1 if period < _MANY else max(1, round(period / _ENOUGH))
+
+
+@cache
+def _basis(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orthonormal polynomials (size, NODES + 2) on a stretch; its nodes [samples]; values at nodes by
+    coefficient.
+    """
+    u = np.linspace(-1, 1, size)
+    q, r = np.linalg.qr(np.polynomial.legendre.legvander(u, NODES + 1))
+    q *= np.sign(np.diag(r))
+    jacobi = q[:, :NODES].T @ (u[:, None] * q[:, :NODES])
+    nodes, vectors = np.linalg.eigh(jacobi)
+    # the polynomial of degree 0 is positive
+    values = (vectors / (vectors[0] * np.sqrt(size))).T
+    return q, 0.5 * (nodes + 1) * (size - 1), values
+
+
+@cache
+def _spread(size: int, memory: float) -> np.ndarray:
+    """Standard deviations of the values of a stretch over that of a sample."""
+    q, _, values = _basis(size)
+    weights = values @ q[:, :NODES].T
+    lags = [np.sum(weights[:, k:] * weights[:, : size - k], axis=1) for k in range(min(size, 200))]
+    powers = memory ** np.arange(len(lags))
+    return np.sqrt(np.maximum(lags[0] + 2 * powers[1:] @ np.array(lags[1:]), 1e-12))
+
+
+@cache
+def expected_left(size: int, memory: float) -> tuple[float, float]:
+    """Sum of squares, and of products of neighbours, that noise of size 1 leaves in a stretch."""
+    q = _basis(size)[0][:, :NODES]
+    noise = toeplitz(memory ** np.arange(size))
+    carried = noise @ q
+    inner = q.T @ carried
+    # tr(P R P) and the sum beside its diagonal, P = 1 - q q'
+    beside = (size - 1) * memory - np.sum(q[1:] * carried[:-1]) - np.sum(carried[1:] * q[:-1])
+    return float(size - np.trace(inner)), float(beside + np.sum((q[1:] @ inner) * q[:-1]))
+
+
+def condense(
+    record: Record, period: float, sigma: float, events: tuple[np.ndarray, np.ndarray, float]
+) -> Samples:
+    """Rows of a record whose motion has `period` samples per oscillation and noise of `sigma`.
+
+    `events`: flags of samples that must stay, flags of those near which friction may jump, and the usual
+    acceleration.
+    """
+    kept, slow, acceleration = events
+    noise = max(sigma, white_noise(record.x)) * _inflation(record)
+    longest = _power(period * _LONGEST)
+    # where friction jumps the hidden part of the jump stays below the noise of the values
+    jump = _HIDDEN * max(acceleration, 1e-300) * record.interval**2
+    at_jumps = (_SHIFT * noise / jump) ** 0.4
+    unseen = _UNSEEN
+    while True:
+        taken = _taken(record, (kept, slow), longest, at_jumps, noise * np.sqrt(unseen / _UNSEEN))
+        rows = sum(NODES * first.size for _, first in taken) + int(
+            record.t.size - sum(size * first.size for size, first in taken)
+        )
+        if rows <= MOST_ROWS:
+            break
+        if unseen > 1e12:
+            raise SeparatrixError(
+                f"{record.file}: {rows} of {record.t.size} samples are around impacts or where the body "
+                f"turns round, at most {MOST_ROWS} can be fitted: keep every "
+                f"{-(-rows // MOST_ROWS)}th row, or a part of the record"
+            )
+        unseen *= 4
+        at_jumps *= 2
+    if unseen > _UNSEEN:
+        record.warnings.append(
+            f"{record.t.size} samples: stretches that are smooth within {np.sqrt(unseen / _UNSEEN):.0f} "
+            "times the noise are condensed"
+        )
+    return _rows(record, taken)
+
+
+def _power(samples: float) -> int:
+    """Longest stretch of at most so many samples: the shortest one times a power of two."""
+    return int(_SHORTEST * 2 ** np.floor(np.log2(max(1.0, samples / _SHORTEST))))
+
+
+def _inflation(record: Record) -> float:
+    """Noise of slow terms over that of white noise of the same size, from short stretches."""
+    blocks = _blocks(record.pieces, np.zeros(record.t.size, bool), _SOUNDED)
+    if not blocks.size:
+        return 1.0
+    q = _basis(_SOUNDED)[0][:, :NODES]
+    at = blocks[:: max(1, blocks.size // 2000), None] + np.arange(_SOUNDED)
+    y = record.x[at] - record.x[at].mean(axis=1, keepdims=True)
+    y = y - (y @ q) @ q.T
+    power, product = np.sum(y**2, axis=1), np.sum(y[:, 1:] * y[:, :-1], axis=1)
+    quiet = power <= 2 * np.median(power)
+    seen = product[quiet].sum() / max(power[quiet].sum(), 1e-300)
+    memories = np.linspace(0, _MOST_MEMORY, 19)
+    ratios = [two / one for one, two in (expected_left(_SOUNDED, memory) for memory in memories)]
+    memory = float(np.interp(seen, ratios, memories))
+    return float(np.sqrt((1 + memory) / (1 - memory)))
+
+
+def _blocks(pieces: list[tuple[int, int]], taken: np.ndarray, size: int) -> np.ndarray:
+    """First samples of stretches of `size` on a grid in each piece, of which nothing is taken."""
+    first = np.concatenate(
+        [np.arange(a, b - size + 1, size) for a, b in pieces if b - a >= size] or [np.zeros(0, int)]
+    ).astype(int)
+    total = np.concatenate([[0], np.cumsum(taken)])
+    return first[total[first + size] == total[first]]
+
+
+def _taken(
+    record: Record, events: tuple[np.ndarray, np.ndarray], longest: int, at_jumps: float, noise: float
+) -> list[tuple[int, np.ndarray]]:
+    """Stretches to condense, as their length and first samples; the longest that are smooth."""
+    kept, slow = events
+    taken = kept.copy()
+    slow_before = np.concatenate([[0], np.cumsum(slow)])
+    found = []
+    size = longest
+    while size >= _SHORTEST:
+        first = _blocks(record.pieces, taken, size)
+        if size > at_jumps:
+            first = first[slow_before[first + size] == slow_before[first]]
+        for part in np.array_split(first, max(1, first.size * size // 1_000_000)):
+            smooth = part[_smooth(record, part, size, noise)]
+            taken[(smooth[:, None] + np.arange(size)).ravel()] = True
+            if smooth.size:
+                found.append((size, smooth))
+        size //= 2
+    return found
+
+
+def _smooth(record: Record, first: np.ndarray, size: int, noise: float) -> np.ndarray:
+    """Whether the next two terms of each stretch are hidden by the noise, in x and v, at even times."""
+    at = first[:, None] + np.arange(size)
+    q = _basis(size)[0][:, NODES:]
+    smooth = np.sum((record.x[at] @ q) ** 2, axis=1) < _UNSEEN * noise**2
+    if record.v is not None:
+        smooth &= np.sum((record.v[at] @ q) ** 2, axis=1) < _UNSEEN * white_noise(record.v) ** 2
+    span = record.t[first + size - 1] - record.t[first]
+    off = np.abs(record.t[at] - record.t[first, None] - span[:, None] * np.linspace(0, 1, size))
+    return smooth & (off.max(axis=1, initial=0) < 1e-3 * record.interval)
+
+
+def _rows(record: Record, taken: list[tuple[int, np.ndarray]]) -> Samples:
+    """The rows in order: values of the stretches, samples elsewhere."""
+    single = np.ones(record.t.size, bool)
+    parts = []
+    for size, first in taken:
+        at = first[:, None] + np.arange(size)
+        single[at.ravel()] = False
+        q, nodes, values = _basis(size)
+        q = q[:, :NODES]
+        channels = []
+        for y in (record.x, record.v):
+            if y is None:
+                channels.append((np.zeros((first.size, NODES)), *np.zeros((2, first.size))))
+                continue
+            middle = y[at].mean(axis=1, keepdims=True)
+            centred = y[at] - middle
+            terms = centred @ q
+            rest = centred - terms @ q.T
+            products = np.sum(rest[:, 1:] * rest[:, :-1], axis=1)
+            channels.append((middle + terms @ values.T, np.sum(rest**2, axis=1), products))
+        place = first[:, None] + nodes
+        span = (record.t[first + size - 1] - record.t[first]) / (size - 1)
+        begun = np.arange(NODES) == 0
+        (x, left, products), (v, left_v, _) = channels
+        columns = (place, record.t[first][:, None] + nodes * span[:, None], x, v)
+        columns = (*columns, *(one[:, None] * begun for one in (left, left_v, products)))
+        flat = [one.ravel() for one in columns]
+        parts.append([*flat, np.full(place.size, size), np.tile(np.arange(NODES), first.size)])
+    rows = np.flatnonzero(single)
+    none = np.zeros(rows.size)
+    v = none if record.v is None else record.v[rows]
+    samples = [rows.astype(float), record.t[rows], record.x[rows], v, none, none, none]
+    parts.append([*samples, np.ones(rows.size, int), np.zeros(rows.size, int)])
+    whole_ = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    order = np.argsort(whole_[0], kind="stable")
+    place, t, x, v, left, left_v, products, size, node = (column[order] for column in whole_)
+    edges = [(int(np.searchsorted(place, a)), int(np.searchsorted(place, b - 0.5))) for a, b in record.pieces]
+    return Samples(t, x, None if record.v is None else v, edges, size, node, place, left, left_v, products)

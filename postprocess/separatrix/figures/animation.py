@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A map moving through one of its parameters, as a GIF or an MP4."""
+
+import io
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from PIL import Image
+
+from separatrix import style
+from separatrix.classes import CLASS_FIELDS
+from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
+from separatrix.figures import basin
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.labels import value_label
+
+FORMATS = (".gif", ".mp4")
+
+
+def animate(
+    result: xr.Dataset,
+    parameter: str,
+    path: Path,
+    title: str,
+    field: str = "attractor",
+    look: Look = DEFAULT,
+    frames_per_second: float = 5.0,
+    dpi: int = 150,
+) -> Path:
+    """Write the maps over the values of a parameter one after the other; the suffix of `path` says how.
+
+    Colours and legend are the same in all frames; shares are those of all. Other parameters are fixed by
+    `look.slice`.
+    """
+    if path.suffix not in FORMATS:
+        raise SeparatrixError(f"{path}: allowed are {' and '.join(FORMATS)}", USAGE)
+    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
+        raise SeparatrixError(f"{path}: needs ffmpeg, which was not found; .gif needs nothing", USAGE)
+    if field not in CLASS_FIELDS:
+        allowed = ", ".join(CLASS_FIELDS)
+        raise SeparatrixError(f"animation: found the field '{field}', allowed {allowed}", USAGE)
+    dim = parameter.replace(".", "_")
+    fixed = [name.replace(".", "_") for name in look.slice]
+    varying = [name for name in result[field].dims if result.sizes[name] > 1 and name not in fixed]
+    if dim not in varying or len(varying) != 3:
+        found = ", ".join(varying)
+        raise SeparatrixError(
+            f"animation over {parameter}: found the axes {found}, allowed it and two more", USAGE
+        )
+    frames = [image.convert("RGB") for image in _frames(result, dim, title, field, look, dpi)]
+    size = tuple(max(image.size[k] for image in frames) // 2 * 2 for k in (0, 1))
+    frames = [_on_page(image, size) for image in frames]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.suffix == ".gif":
+            first, *rest = (image.quantize(128) for image in frames)
+            first.save(
+                path, save_all=True, append_images=rest, duration=round(1000 / frames_per_second), loop=0
+            )
+        else:
+            _film(frames, path, frames_per_second)
+    except OSError as error:
+        raise SeparatrixError(
+            f"{path}: cannot be written ({error.strerror or error})", CANNOT_CREATE
+        ) from error
+    return path
+
+
+def _frames(
+    result: xr.Dataset, dim: str, title: str, field: str, look: Look, dpi: int
+) -> Iterator[Image.Image]:
+    codes, numbers = np.unique(look.selected(result)[field].values, return_counts=True)
+    totals = dict(zip(codes.tolist(), numbers.tolist(), strict=True))
+    # Marks come from the catalogue, which counts the slices of the whole result.
+    for value in result[dim].values:
+        one = look.at(dim, float(value))
+        heading = f"{title}, {value_label(result[dim], float(value))}"
+        with style.context():
+            figure = basin.basin_map(None, result, field, heading, one, totals)
+            page = io.BytesIO()
+            figure.savefig(page, format="png", dpi=dpi)
+        yield Image.open(page)
+
+
+def _on_page(image: Image.Image, size: tuple[int, int]) -> Image.Image:
+    """All frames on pages of one size: captions may differ by a line."""
+    page = Image.new("RGB", size, "white")
+    page.paste(image, (0, 0))
+    return page
+
+
+def _film(frames: list[Image.Image], path: Path, frames_per_second: float) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        for number, frame in enumerate(frames):
+            frame.save(Path(folder) / f"{number:06d}.png")
+        command = ["ffmpeg", "-y", "-loglevel", "error", "-framerate", str(frames_per_second)]
+        command += ["-i", str(Path(folder) / "%06d.png"), "-pix_fmt", "yuv420p", str(path)]
+        ended = subprocess.run(command, capture_output=True, text=True)
+        if ended.returncode:
+            raise OSError(ended.stderr.strip().splitlines()[-1] if ended.stderr.strip() else "ffmpeg failed")

@@ -1,0 +1,342 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Basin maps: which motion each starting point leads to."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import h5py
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from separatrix import style
+from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes, recoloured
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.figures import marks, shares
+from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
+from separatrix.layout import compose
+from separatrix.open import table
+from separatrix.reduce import Plane, majority_plane, scalar_plane
+
+MOST_PANELS = 12
+_PANEL = 42.0  # mm, height of a panel where three stand side by side
+
+
+@dataclass
+class _Panel:
+    """One slice of the map: its position on the other axes and what was read of it."""
+
+    heading: str
+    plane: Plane
+
+
+def figures(
+    path: str | Path | None, result: xr.Dataset, field: str | None, title: str, look: Look = DEFAULT
+) -> dict[str, Figure]:
+    """Return the maps of a basin file by name: attractor and regime, or the one field that is asked for.
+
+    Without any label there is no map of the attractors, unless it is asked for; "shares" is their share over
+    the parameter of a stack of maps. `path`: the file, which is read by slabs; None: the result is in memory.
+    """
+    if field == "shares":
+        return {"shares": shares.diagram(result, title, look)}
+    names = [field] if field else [*(["attractor"] if _labelled(result) else []), "regime"]
+    for name in names:
+        if name not in result or result[name].dims != result["regime"].dims:
+            known = ", ".join(
+                key for key, var in result.data_vars.items() if var.dims == result["regime"].dims
+            )
+            where = "" if path is None else f"{path}: "
+            raise SeparatrixError(f"{where}no field '{name}'; known fields: {known}, shares", USAGE)
+    return {name: basin_map(path, result, name, title, look) for name in names}
+
+
+def basin_map(
+    path: str | Path | None,
+    result: xr.Dataset,
+    field: str,
+    title: str,
+    look: Look = DEFAULT,
+    totals: dict[int, int] | None = None,
+) -> Figure:
+    """Return the map of one field over the initial conditions, one panel per value of the other axes.
+
+    `totals`: the points of each class in the legend, where it is to be that of more than is drawn.
+    """
+    whole, result = result, look.selected(result)
+    path = path if look.whole else None
+    down, across = plane_axes(result, look)
+    others = [name for name in result[field].dims if name not in (down, across)]
+    places = list(product(*(range(result.sizes[name]) for name in others)))
+    chosen = _spread(places, MOST_PANELS)
+    panels = _read_panels(path, result, field, (down, across), others, chosen)
+
+    figure, grid = _grid(len(panels), 62.0 if down else 22.0, look)
+    caption = caption_pieces(result, look, [*describe_case(result), *start_pieces(result)])
+    handles = []
+    if field in CLASS_FIELDS:
+        shades = None
+        if look.shade and "settle_time" in result:
+            shades = _read_panels(path, result, "settle_time", (down, across), others, chosen)
+        handles = _draw_classes(grid, result, field, (down, across), panels, look, shades, totals)
+    else:
+        _draw_scalar(figure, grid, result, field, (down, across), panels, look)
+    if look.attractors and field in ("attractor", "regime", "settle_time") and {down, across} == {"x0", "v0"}:
+        marked = marks.draw(grid, whole, result, across, others, chosen, look)
+        handles = [marks.on_legend(handle, marked) for handle in handles]
+        caption += ["markers: points of the attractors on the section"] if marked else []
+    caption += _count_caption(result, field, panels, len(places), look)
+    compose(figure, title, shown([*caption, plain(version_text(result))], look), handles)
+    return figure
+
+
+def plane_axes(result: xr.Dataset, look: Look = DEFAULT) -> tuple[str | None, str]:
+    """Return the axes of the image, vertical and horizontal: v0 over x0, or else the first two that vary.
+
+    A map with one axis has no vertical one: it is returned as (None, axis).
+    """
+    dims = list(result["regime"].dims)
+    if look.axes is not None:
+        asked = [name.replace(".", "_") for name in look.axes]
+        if len(set(asked)) != 2 or not set(asked) <= set(dims):
+            raise SeparatrixError(
+                f"axes: found {', '.join(look.axes)}, allowed two of {', '.join(dims)}", USAGE
+            )
+        return asked[1], asked[0]
+    varying = [name for name in dims if result.sizes[name] > 1]
+    if {"x0", "v0"} <= set(varying):
+        return "v0", "x0"
+    candidates = varying + [name for name in dims if name not in varying]
+    return (candidates[1], candidates[0]) if len(candidates) > 1 else (None, candidates[0])
+
+
+def cell_edges(centres: np.ndarray) -> np.ndarray:
+    """Return the edges of cells around points: half way between neighbours, as far beyond the ends."""
+    centres = np.asarray(centres, dtype=np.float64)
+    if centres.size == 1:
+        return centres[0] + np.array([-0.5, 0.5])
+    middle = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+
+
+def _labelled(result: xr.Dataset) -> bool:
+    """Whether the catalogue has an attractor that captured a point."""
+    catalogue = table(result, "catalogue")
+    return "count" in catalogue and bool(catalogue["count"].values.any())
+
+
+def _read_panels(
+    path: str | Path | None,
+    result: xr.Dataset,
+    field: str,
+    axes: tuple,
+    others: list[str],
+    places: list[tuple],
+) -> list[_Panel]:
+    dims = result[field].dims
+    panels = []
+    with _source(path, result, field) as dataset:
+        if axes[0] is None:
+            dataset = _Strip(dataset)
+        plane = (dims.index(axes[0]), dims.index(axes[1])) if axes[0] else (1, 0)
+        for place in places:
+            heading = ", ".join(
+                value_label(result[name], float(result[name].values[k]))
+                for name, k in zip(others, place, strict=True)
+            )
+            if field in CLASS_FIELDS:
+                data = majority_plane(dataset, plane, place)
+            else:
+                data = scalar_plane(dataset, plane, place, smallest=field == "grazing_margin")
+            panels.append(_Panel(heading, data))
+    return panels
+
+
+@contextmanager
+def _source(path: str | Path | None, result: xr.Dataset, field: str) -> Iterator[h5py.Dataset | np.ndarray]:
+    """The field in its file, which is read by slabs, or without a path in memory."""
+    if path is None:
+        yield result[field].values
+    else:
+        with h5py.File(path, "r") as file:
+            yield file[field]
+
+
+class _Strip:
+    """A dataset with one axis seen as one with a second axis of length 1."""
+
+    ndim = 2
+    chunks = None
+
+    def __init__(self, dataset: h5py.Dataset | np.ndarray) -> None:
+        self._dataset = dataset
+        self.shape = (*dataset.shape, 1)
+        self.dtype = dataset.dtype
+
+    def __getitem__(self, selection: tuple) -> np.ndarray:
+        return self._dataset[selection[0]][:, np.newaxis][:, selection[1]]
+
+
+def _spread(places: list, most: int) -> list:
+    """Return at most `most` of the places, evenly spread, first and last among them."""
+    if len(places) <= most:
+        return places
+    return [places[k] for k in np.linspace(0, len(places) - 1, most).round().astype(int)]
+
+
+def _grid(number: int, height: float, look: Look) -> tuple[Figure, list[Axes]]:
+    """Return a figure with axes for so many panels; a single one has the given height in mm."""
+    if number == 1:
+        figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, height)))
+        return figure, [figure.add_subplot()]
+    columns = min(number, 2 if number in (2, 4) else 3)
+    rows = -(-number // columns)
+    usual = (style.DOUBLE_COLUMN, (_PANEL if columns == 3 else 1.4 * _PANEL) * rows + 8.0)
+    figure = style.new_figure(*(look.size or usual))
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for spare in axes[number:]:
+        spare.remove()
+    for above in axes[max(0, number - columns) : number]:
+        above.xaxis.set_tick_params(labelbottom=True)
+    return figure, list(axes[:number])
+
+
+def _draw_classes(
+    grid: list[Axes],
+    result: xr.Dataset,
+    field: str,
+    axes: tuple,
+    panels: list[_Panel],
+    look: Look,
+    shades: list[_Panel] | None,
+    totals: dict[int, int] | None,
+) -> list[Patch]:
+    if totals is None:
+        totals = {}
+        for panel in panels:
+            for code, count in panel.plane.counts.items():
+                totals[code] = totals.get(code, 0) + count
+    entries = recoloured(classes(result, field, totals), look.colours)
+    colours = ListedColormap([entry.colour for entry in entries])
+    for place, (ax, panel) in enumerate(zip(grid, panels, strict=True)):
+        index = class_index(panel.plane.image, entries)
+        if shades is not None:
+            _draw_image(ax, result, axes, panel, marks.shaded(index, entries, shades[place].plane.image))
+        else:
+            image = _draw_image(ax, result, axes, panel, index)
+            image.set_cmap(colours)
+            image.set_clim(-0.5, len(entries) - 0.5)
+        if len(panels) > 1:
+            shares = share_texts(class_counts(entries, panel.plane.counts))
+            ax.set_title(f"{panel.heading}\n{_short_shares(shares)}", linespacing=1.3)
+    _label(grid, result, axes)
+    shares = share_texts(class_counts(entries, totals))
+    return [_patch(entry, share) for entry, share in zip(entries, shares, strict=True)]
+
+
+def _short_shares(shares: list[str]) -> str:
+    """Shares in the order of the legend; many of them do not fit over a panel."""
+    return " / ".join(share.removesuffix(" %") for share in shares) + " %" if len(shares) <= 4 else ""
+
+
+def _patch(entry: Class, share: str) -> Patch:
+    return Patch(facecolor=entry.colour, edgecolor="#555555", linewidth=0.3, label=f"{entry.text} ({share})")
+
+
+def _draw_scalar(
+    figure: Figure,
+    grid: list[Axes],
+    result: xr.Dataset,
+    field: str,
+    axes: tuple,
+    panels: list[_Panel],
+    look: Look,
+) -> None:
+    values = np.concatenate([panel.plane.image.ravel() for panel in panels])
+    values = values[np.isfinite(values)]
+    low, high = np.quantile(values, [0.005, 0.995]) if values.size else (0.0, 1.0)
+    if not low < high:
+        low, high = low - 0.5, high + 0.5
+    low, high = look.limits or (low, high)
+    colour_map = _colour_map(look)
+    norm = Normalize(low, high)
+    for ax, panel in zip(grid, panels, strict=True):
+        image = _draw_image(ax, result, axes, panel, np.ma.masked_invalid(panel.plane.image))
+        image.set_cmap(colour_map)
+        image.set_norm(norm)
+        ax.set_facecolor(style.NOTHING)
+        ax.set_title(panel.heading if len(panels) > 1 else "")
+    _label(grid, result, axes)
+    below = values.size > 0 and values.min() < low
+    above = values.size > 0 and values.max() > high
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
+    mappable = ScalarMappable(norm, colour_map)
+    figure.colorbar(mappable, ax=grid, label=axis_label(result[field]), extend=extend, pad=0.02)
+
+
+def _colour_map(look: Look) -> str:
+    name = look.colour_map or style.SCALAR_MAP
+    if name not in matplotlib.colormaps:
+        raise SeparatrixError(f"colour map: found '{name}', which matplotlib does not have", USAGE)
+    return name
+
+
+def _draw_image(ax: Axes, result: xr.Dataset, axes: tuple, panel: _Panel, image: np.ndarray) -> object:
+    """Draw an image over the axes of the map, ascending, each cell centred on its point."""
+    edges = []
+    for dimension, (name, starts) in enumerate(
+        zip(axes, (panel.plane.row_starts, panel.plane.column_starts), strict=True)
+    ):
+        whole = cell_edges(result[name].values) if name else np.array([0.0, 1.0])
+        edge = np.append(whole[starts], whole[-1])
+        if edge[0] > edge[-1]:
+            edge, image = edge[::-1], np.flip(image, dimension)
+        edges.append(edge)
+    return ax.pcolorfast(edges[1], edges[0], image)
+
+
+def _label(grid: list[Axes], result: xr.Dataset, axes: tuple) -> None:
+    down, across = axes
+    for ax in grid:
+        ax.xaxis.set_major_locator(MaxNLocator(6 if len(grid) == 1 else 5))
+        place = ax.get_subplotspec()
+        if place.is_last_row() or ax.xaxis.get_tick_params().get("labelbottom"):
+            ax.set_xlabel(axis_label(result[across]))
+        if down is None:
+            ax.set_yticks([])
+        elif place.is_first_col():
+            ax.set_ylabel(axis_label(result[down]))
+
+
+def _count_caption(
+    result: xr.Dataset, field: str, panels: list[_Panel], slices: int, look: Look
+) -> list[str]:
+    rows, columns = panels[0].plane.factors
+    headings = [panels[0].heading] if len(panels) == 1 and panels[0].heading else []
+    number = result[field].size // slices
+    pieces = [*headings, f"$N$ = {count_text(number)} points" + (" per panel" if len(panels) > 1 else "")]
+    if len(panels) < slices:
+        pieces.append(f"{len(panels)} of {slices} slices shown")
+    if len(panels) > 1 and field in CLASS_FIELDS:
+        pieces.append("shares over the panels in the order of the legend")
+    if rows * columns > 1:
+        what = "most frequent class" if field in CLASS_FIELDS else "mean"
+        what = "smallest value" if field == "grazing_margin" else what
+        pieces.append(f"a pixel shows the {what} of {columns} by {rows} points, shares count all points")
+    if field not in CLASS_FIELDS:
+        pieces.append("grey: no value")
+    elif look.shade and "settle_time" in result:
+        pieces.append("light: settles early, dark: late, by rank in each basin")
+    return pieces

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The force of a soft barrier over its penetration, a closed loop, and over time."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from separatrix import style
+from separatrix.figures import pair
+from separatrix.figures.caption import describe_case, resolved_case, version_text
+from separatrix.labels import plain
+from separatrix.layout import compose
+
+MOST_LOOPS = 8
+_LEAST_SAMPLES = 5
+
+
+def loops(result: xr.Dataset, title: str) -> Figure:
+    """Return force over penetration and over time of the contacts, one colour each, at most `MOST_LOOPS`.
+
+    Of more contacts those with the most different speeds are shown.
+    """
+    figure, axes = _panels()
+    found = contacts(result)
+    order = np.argsort([-speed for _, speed, _, _, _ in found])
+    if len(found) > MOST_LOOPS:
+        order = order[np.linspace(0, len(found) - 1, MOST_LOOPS).round().astype(int)]
+    handles = []
+    for place, index in enumerate(order):
+        colour = style.OKABE_ITO[place]
+        _draw(axes, found[index], colour)
+        handles.append(Line2D([], [], color=colour, label=f"{found[index][1]:.3g} m/s"))
+    caption = [f"{len(order)} of {len(found)} contacts, by impact speed", *describe_case(result)]
+    compose(figure, title, [*caption, plain(version_text(result))], handles, columns=max(1, len(handles)))
+    return figure
+
+
+def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
+    """Return the fastest contact of each trajectory over penetration and time, one colour for each."""
+    figure, axes = _panels()
+    handles, captions = [], []
+    for place, result in enumerate(results):
+        found = contacts(pair.relative_to_stop(result))
+        if not found:
+            continue
+        colour = style.OKABE_ITO[place % len(style.OKABE_ITO)]
+        fastest = max(found, key=lambda item: item[1])
+        _draw(axes, fastest, colour)
+        law = resolved_case(result)["contact"]["law"].replace("_", " ")
+        handles.append(Line2D([], [], color=colour, label=f"{law}, {fastest[1]:.3g} m/s"))
+        captions += describe_case(result)
+    compose(figure, title, [*captions, plain(version_text(results[0]))], handles, columns=2)
+    return figure
+
+
+def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
+    figure = style.new_figure(style.DOUBLE_COLUMN, 68.0)
+    over_depth, over_time = figure.subplots(1, 2)
+    over_depth.set_xlabel("penetration (m)")
+    over_time.set_xlabel("time since first touch (s)")
+    for letter, ax in zip("ab", (over_depth, over_time), strict=True):
+        ax.set_ylabel("force of the barrier (N)")
+        ax.axhline(0, color="#BBBBBB", linewidth=0.5, zorder=0)
+        ax.set_title(f"{letter})", loc="left")
+    return figure, (over_depth, over_time)
+
+
+def _draw(axes: tuple[Axes, Axes], contact: tuple, colour: str) -> None:
+    """Draw a contact from no force to no force: what lies between that and its ends is a jump."""
+    start, _, time, depth, force = contact
+    over_depth, over_time = axes
+    # the force at first touch follows from the first two samples
+    early = time[:2] - start
+    touch = force[0] - early[0] * (force[1] - force[0]) / (early[1] - early[0])
+    force = np.concatenate([[0.0, touch], force, [0.0]])
+    over_depth.plot(np.concatenate([[0.0, 0.0], depth, depth[-1:]]), force, color=colour)
+    over_time.plot(np.concatenate([[0.0, 0.0], time - start, time[-1:] - start]), force, color=colour)
+
+
+def contacts(result: xr.Dataset) -> list[tuple[float, float, np.ndarray, np.ndarray, np.ndarray]]:
+    """Return time of touch, impact speed, and samples of time, penetration and force of every contact."""
+    time, x, v, force = (result[name].values for name in ("time", "x", "v", "contact_force"))
+    found = []
+    for name, side in (("barrier_upper", 1), ("barrier_lower", -1)):
+        if name not in result.attrs:
+            continue
+        depth = side * (x - float(result.attrs[name]))
+        pressed = depth > 0
+        edges = np.flatnonzero(np.diff(pressed.astype(int)))
+        for first, last in pairwise(edges):
+            if not pressed[first + 1] or last - first < _LEAST_SAMPLES:
+                continue
+            inside = slice(first + 1, last + 1)
+            # the surface is met between two samples
+            start = time[first + 1] - depth[first + 1] / (side * v[first + 1])
+            speed = side * v[first]
+            found.append((start, speed, time[inside], depth[inside], -side * force[inside]))
+    return found

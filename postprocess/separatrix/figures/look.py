@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a figure is to look: what of the result it shows, in which units, colours and size."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import xarray as xr
+from matplotlib.colors import is_color_like
+
+from separatrix.errors import USAGE, SeparatrixError
+
+# unit: SI unit and what one of it is
+UNITS = {
+    "mm": ("m", 1e-3), "um": ("m", 1e-6), "cm": ("m", 1e-2), "km": ("m", 1e3),
+    "mm/s": ("m/s", 1e-3), "cm/s": ("m/s", 1e-2), "km/h": ("m/s", 1 / 3.6),
+    "ms": ("s", 1e-3), "us": ("s", 1e-6), "min": ("s", 60.0), "deg": ("rad", np.pi / 180),
+}  # fmt: skip
+CAPTIONS = ("full", "short", "none")
+
+
+@dataclass(frozen=True)
+class Look:
+    """Wishes for a figure; the defaults are those of `separatrix-figures`."""
+
+    #: ranges of axes to show, by name
+    region: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    #: values of axes to show, by name; the nearest of the result is taken
+    slice: Mapping[str, float] = field(default_factory=dict)
+    #: which axis is horizontal and which vertical
+    axes: tuple[str, str] | None = None
+    #: units in the place of the SI units, each for all that has its SI unit
+    units: Sequence[str] = ()
+    #: the settling time as lightness under the colours of a map
+    shade: bool = False
+    #: the points of the attractors on the section, in a map over x0 and v0
+    attractors: bool = True
+    #: colours of the classes, in their order
+    colours: Sequence[str] = ()
+    #: colour map of a field that is a number, and its range
+    colour_map: str | None = None
+    limits: tuple[float, float] | None = None
+    #: width of the page and height of the axes [mm]
+    size: tuple[float, float] | None = None
+    #: "full": all that is needed to repeat the run; "short": what differs; "none"
+    caption: str = "full"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be drawn."""
+        for unit in self.units:
+            if unit not in UNITS:
+                raise SeparatrixError(f"units: found '{unit}', allowed {', '.join(UNITS)}", USAGE)
+        for colour in self.colours:
+            if not is_color_like(colour):
+                raise SeparatrixError(f"colours: found '{colour}', which is no colour", USAGE)
+        if self.caption not in CAPTIONS:
+            raise SeparatrixError(f"caption: found '{self.caption}', allowed {', '.join(CAPTIONS)}", USAGE)
+        if self.size is not None and not all(10 <= length <= 1000 for length in self.size):
+            raise SeparatrixError(f"size: found {self.size}, allowed 10 to 1000 mm", USAGE)
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of the result is shown, in SI units."""
+        return not (self.region or self.slice or self.units)
+
+    def require(self, kind: str, *served: str) -> None:
+        """Refuse wishes that the figures of a kind do not serve."""
+        for name in ("region", "slice", "axes", "units", "shade", "colours", "colour_map", "limits"):
+            if getattr(self, name) and name not in served:
+                raise SeparatrixError(
+                    f"{name.replace('_', ' ')}: not served by the figures of a {kind}", USAGE
+                )
+
+    def at(self, name: str, value: float) -> "Look":
+        """Return this look at one value of an axis."""
+        return replace(self, slice={**self.slice, name: value})
+
+    def selected(self, result: xr.Dataset) -> xr.Dataset:
+        """Return what is to be shown of a result, in the units asked for."""
+        places = {}
+        for name, value in self.slice.items():
+            dim = _axis(result, name)
+            nearest = int(np.abs(result[dim].values - value).argmin())
+            places[dim] = slice(nearest, nearest + 1)
+        for name, (low, high) in self.region.items():
+            dim = _axis(result, name)
+            inside = np.flatnonzero((result[dim].values >= low) & (result[dim].values <= high))
+            if inside.size == 0:
+                ends = f"{result[dim].values.min():g} to {result[dim].values.max():g}"
+                raise SeparatrixError(f"region {name}: found {low:g} to {high:g}, allowed {ends}", USAGE)
+            places[dim] = slice(int(inside[0]), int(inside[-1]) + 1)
+        return self._in_units(result.isel(places))
+
+    def factor(self, unit: str) -> float:
+        """Return by what a number in an SI unit is multiplied."""
+        return next((1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit), 1.0)
+
+    def _in_units(self, result: xr.Dataset) -> xr.Dataset:
+        for name in self.units:
+            si, worth = UNITS[name]
+            for key, variable in list(result.variables.items()):
+                if variable.attrs.get("units") != si or str(key).startswith(("catalogue_", "limits_")):
+                    continue
+                changed = (variable.dims, variable.values / worth, {**variable.attrs, "units": name})
+                result = (
+                    result.assign_coords({key: changed})
+                    if key in result.coords
+                    else result.assign({key: changed})
+                )
+        return result
+
+
+def _axis(result: xr.Dataset, name: str) -> str:
+    dim = name.replace(".", "_")
+    dim = "drive_ratio" if dim == "ratio" else dim
+    if dim not in result.dims:
+        raise SeparatrixError(f"no axis '{name}'; there are {', '.join(map(str, result.dims))}", USAGE)
+    return dim
+
+
+DEFAULT = Look()

@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn into the classes of a map: attractors on the section, settling time as lightness."""
+
+import re
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from separatrix.classes import Class
+from separatrix.figures import section
+from separatrix.figures.look import Look
+
+_MARKS = "osD^vP*X"
+
+
+def shaded(index: np.ndarray, entries: list[Class], settle_time: np.ndarray) -> np.ndarray:
+    """Return the colour of each pixel: that of its class, light where it settles early, dark where late.
+
+    The lightness goes by rank within each class, so that every class uses all of it.
+    """
+    image = np.empty((*index.shape, 3))
+    for place, entry in enumerate(entries):
+        mine = index == place
+        times = settle_time[mine]
+        _, ranks, numbers = np.unique(times, return_inverse=True, return_counts=True)
+        rank = (np.cumsum(numbers) - 0.5 * numbers)[ranks] / max(1, times.size)
+        rank = np.where(np.isfinite(times), rank, 0.5)[:, np.newaxis]
+        light, dark = np.clip(0.5 - rank, 0, None) * 2 * 0.6, np.clip(rank - 0.5, 0, None) * 2 * 0.5
+        image[mine] = (np.array(to_rgb(entry.colour)) * (1 - light) + light) * (1 - dark)
+    return image
+
+
+def draw(
+    grid: list[Axes],
+    whole: xr.Dataset,
+    result: xr.Dataset,
+    across: str,
+    others: list[str],
+    places: list[tuple],
+    look: Look,
+) -> dict[int, dict]:
+    """Mark the points of each attractor on the section of the map; return how, by label."""
+    marked: dict[int, dict] = {}
+    for ax, place in zip(grid, places, strict=True):
+        # The place in the whole result: the catalogue counts its slices.
+        at = {}
+        for name, k in zip(others, place, strict=True):
+            old = whole[name].values
+            at[name] = int(
+                np.abs(old - result[name].values[k] / look.factor(whole[name].attrs.get("units"))).argmin()
+            )
+        limits = ax.get_xlim(), ax.get_ylim()
+        for identity, x, v in section.points(whole, at):
+            mark = _MARKS[(identity - 1) % len(_MARKS)]
+            drawn = {
+                "marker": mark,
+                "markersize": 3.6,
+                "markerfacecolor": "white",
+                "markeredgecolor": "black",
+            }
+            drawn |= {"linestyle": "", "markeredgewidth": 0.6, "zorder": 5}
+            x, v = x * look.factor("m"), v * look.factor("m/s")
+            ax.plot(*((x, v) if across == "x0" else (v, x)), **drawn)
+            marked[identity] = drawn
+        ax.set_xlim(limits[0])
+        ax.set_ylim(limits[1])
+    return marked
+
+
+def on_legend(handle: Patch, marked: dict[int, dict]) -> Patch | Line2D:
+    """Return an entry of the legend with the mark of its attractor on its colour."""
+    found = re.match(r"attractor (\d+):", handle.get_label())
+    mark = marked.get(int(found[1])) if found else None
+    if mark is None:
+        return handle
+    line = {"color": handle.get_facecolor(), "linewidth": 5.5, "linestyle": "-", "solid_capstyle": "butt"}
+    return Line2D([], [], **{**mark, **line, "markersize": 3.0}, label=handle.get_label())

@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sweep of two bodies coupled by dry friction: the regimes along the parameter and where each gives way."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from separatrix import style
+from separatrix.figures.caption import describe_case, version_text
+from separatrix.figures.regions import brackets, limit_texts
+from separatrix.labels import axis_label, flag_text, plain
+from separatrix.layout import compose
+from separatrix.open import flag_names, table
+
+_COLOURS = {0: style.RUN_UP, 1: style.RUN_DOWN}
+_NAMES = {0: "run-up", 1: "run-down"}
+
+
+def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
+    """Return the largest and the stroboscopic velocities of the driven body, with the regimes as bands."""
+    figure = style.new_figure(style.DOUBLE_COLUMN, 105.0)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    values = result[name].values
+    handles = []
+    for place, code in enumerate(result["direction"].values):
+        if not np.any(result["reason"].isel(direction=place).values):
+            continue
+        largest = result["v_max"].isel(direction=place).values
+        strobe = result["strobe_v"].isel(direction=place).transpose(name, "sample").values
+        marks = {"linestyle": "", "marker": "o", "color": _COLOURS[int(code)], "markeredgewidth": 0.6}
+        shape = {"markersize": 3.4, "markerfacecolor": "none"} if code == 0 else {"markersize": 1.5}
+        top.plot(values, largest, **marks, **shape)
+        bottom.plot(
+            np.repeat(values, strobe.shape[1]),
+            strobe.ravel(),
+            **marks,
+            **shape,
+            rasterized=strobe.size > 2000,
+        )
+        handles.append(Line2D([], [], **marks, **shape, label=_NAMES[int(code)]))
+    edges = spans(result, name)
+    for lower, upper, regime in edges:
+        for ax in (top, bottom):
+            ax.axvspan(lower, upper, color=style.REGIMES[regime], alpha=0.18, linewidth=0, zorder=0)
+    seen = dict.fromkeys(regime for _, _, regime in edges)
+    handles += [Patch(color=style.REGIMES[regime], alpha=0.18, label=flag_text(regime)) for regime in seen]
+    top.set_ylabel("largest velocity\nof the driven body (m/s)")
+    bottom.set_ylabel("velocity (m/s)\nonce per drive period")
+    bottom.set_xlabel(axis_label(result[name]))
+    top.set_xlim(values.min(), values.max())
+    for letter, ax in zip("ab", (top, bottom), strict=True):
+        ax.set_title(f"{letter})", loc="left")
+    caption = [*describe_case(result), *_limits_caption(result), plain(version_text(result))]
+    compose(figure, title, caption, handles, columns=min(5, len(handles)))
+    return figure
+
+
+def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:
+    """Return intervals of the parameter and the regime of the first run in them, bounded by the limits."""
+    values = result[name].values
+    place = int(np.flatnonzero(result["reason"].transpose("direction", name).values.any(axis=1))[0])
+    codes = result["regime"].isel(direction=place).values
+    names = flag_names(result["regime"])
+    order = np.argsort(values)
+    values, codes = values[order], codes[order]
+    middles = np.sort(brackets(table(result, "limits"), in_steps=True).mean(axis=1))
+    found = []
+    start = values[0]
+    for k in range(1, values.size + 1):
+        if k < values.size and codes[k] == codes[k - 1]:
+            continue
+        end = values[-1]
+        if k < values.size:
+            between = middles[(middles >= values[k - 1]) & (middles <= values[k])]
+            end = float(between[0]) if between.size else (values[k - 1] + values[k]) / 2
+        found.append((float(start), float(end), names[int(codes[k - 1])]))
+        start = end
+    return found
+
+
+def _limits_caption(result: xr.Dataset) -> list[str]:
+    return limit_texts(table(result, "limits")) or ["one regime throughout"]

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The points of the attractors of a map on its section, flown by the library."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import xarray as xr
+
+from separatrix import simulate
+from separatrix.errors import CaseError
+from separatrix.figures.caption import resolved_case
+from separatrix.library import Model
+from separatrix.open import table
+
+# Attractors of a slice, and points of one, beyond which marks hide the map.
+_MOST, _LONGEST = 12, 64
+_STARTS = ("x0", "v0", "crank_angle")
+
+
+def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Yield label, positions and velocities of each periodic attractor of one slice.
+
+    They are those at the crank angle of the starts. `place`: the position on the axes that are not x0 and v0.
+    Nothing comes of two bodies, whose section has more coordinates, of a file without a case, and without the
+    library.
+    """
+    catalogue = table(result, "catalogue")
+    case = resolved_case(result)
+    if "attractor" not in catalogue or not case or "driven_mass" in case.get("body", {}):
+        return
+    parameters = [name for name in result["regime"].dims if name not in _STARTS]
+    shape = tuple(result.sizes[name] for name in parameters)
+    number = int(np.ravel_multi_index([place[name] for name in parameters], shape)) if parameters else 0
+    rows = np.flatnonzero((catalogue["slice"].values == number) & (catalogue["count"].values > 0))
+    angle = float(case.get("start", {}).get("crank_angle", 0.0))
+    if "crank_angle" in place:
+        angle = float(result["crank_angle"].values[place["crank_angle"]])
+    try:
+        model = Model.from_text(str(result.attrs["resolved_case"]))
+        paths = {path.replace(".", "_"): path for path in model.parameters}
+        values = {paths[name]: float(result[name].values[place[name]]) for name in parameters}
+        for row in rows[:_MOST]:
+            entry = {name: catalogue[name].values[row] for name in ("attractor", "period", "x", "v")}
+            if 0 < entry["period"] <= _LONGEST:
+                yield (int(entry["attractor"]), *_flown(model, values, entry, angle))
+    except (CaseError, KeyError):
+        return
+
+
+def _flown(
+    model: Model, values: dict[str, float], entry: Mapping, angle: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """All points of an attractor at a crank angle [rad] from its point at 0."""
+    period = 2 * np.pi / model.drive_frequency(values)
+    state = float(entry["x"]), float(entry["v"])
+    turn = angle % (2 * np.pi)
+    if turn > 0:
+        state = _next(model, values, (*state, 0.0), period * turn / (2 * np.pi))
+    found = [state]
+    for _ in range(int(entry["period"]) - 1):
+        found.append(_next(model, values, (*found[-1], turn), period))
+    x, v = np.array(found).T
+    return x, v
+
+
+def _next(model: Model, values: dict[str, float], start: tuple, duration: float) -> tuple[float, float]:
+    end = simulate.trajectory(model, start, values, duration, samples_per_period=-1).summary
+    return end["x"], end["v"]

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shares of the attractors of a stack of maps over its parameter."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from separatrix import style
+from separatrix.classes import classes, recoloured
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.labels import axis_label, count_text, plain
+from separatrix.layout import compose
+
+_STARTS = ("x0", "v0", "crank_angle")
+
+
+def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the share of each attractor over the one parameter of a map that varies, stacked to 100 %."""
+    result = look.selected(result)
+    labels = result["attractor"]
+    varying = [name for name in labels.dims if name not in _STARTS and result.sizes[name] > 1]
+    if len(varying) != 1:
+        raise SeparatrixError(
+            f"shares: found {len(varying)} parameters that vary, allowed one; choose values of the others",
+            USAGE,
+        )
+    name = varying[0]
+    slices = labels.transpose(name, ...).values.reshape(result.sizes[name], -1)
+    codes, numbers = np.unique(slices, return_counts=True)
+    totals = dict(zip(codes.tolist(), numbers.tolist(), strict=True))
+    entries = recoloured(classes(result, "attractor", totals), look.colours)
+    parts = [np.isin(slices, entry.codes).mean(axis=1) for entry in entries]
+    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 50.0)))
+    ax = figure.add_subplot()
+    values = result[name].values
+    below = np.zeros(values.size)
+    for entry, part in zip(entries, parts, strict=True):
+        # A value stands for its surroundings: steps, not slopes that nobody has computed.
+        ax.fill_between(
+            values, 100 * below, 100 * (below + part), step="mid", color=entry.colour, linewidth=0
+        )
+        below = below + part
+    ax.set_xlim(values.min(), values.max())
+    ax.set_ylim(0, 100)
+    ax.set_xlabel(axis_label(result[name]))
+    ax.set_ylabel("share of the starts (%)")
+    handles = [
+        Patch(facecolor=entry.colour, edgecolor="#555555", linewidth=0.3, label=entry.text)
+        for entry in entries
+    ]
+    caption = caption_pieces(result, look, [*describe_case(result), *start_pieces(result)])
+    caption += [
+        f"{count_text(slices.shape[1])} starts at each of {values.size} values",
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), handles)
+    return figure

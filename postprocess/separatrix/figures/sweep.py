@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sweeps: amplitude-frequency diagram with its regions, bifurcation diagram with impact speeds."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from separatrix import style
+from separatrix.figures import pair_sweep
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
+from separatrix.figures.look import DEFAULT, UNITS, Look
+from separatrix.figures.regions import Boundary, Region, boundaries, limit_texts, regions
+from separatrix.labels import axis_label, count_text, plain, unit
+from separatrix.layout import compose
+from separatrix.open import table
+
+_UP, _DOWN = 0, 1
+_NOT_RUN = 0
+
+
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+    """Return the figures of a sweep file by name."""
+    if "driven_mass" in resolved_case(result).get("body", {}):
+        return {"regimes": pair_sweep.regimes(result, swept_axis(result), title)}
+    look.require("sweep", "region", "units")
+    result = look.selected(result)
+    return {
+        "amplitude": amplitude_diagram(result, title, look),
+        "bifurcation": bifurcation_diagram(result, title, look),
+    }
+
+
+def swept_axis(result: xr.Dataset) -> str:
+    """Return the name of the swept parameter."""
+    return next(name for name in result["x_max"].dims if name != "direction")
+
+
+def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return extreme positions against the swept parameter, both runs, with the regions of motion."""
+    name = swept_axis(result)
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
+    ax = figure.add_subplot()
+    handles = _draw_branches(ax, result, name)
+    handles += _draw_runs(ax, result, name)
+    handles += _draw_barriers(ax, result)
+    handles += _draw_regions(ax, result, name)
+    ax.set_xlabel(axis_label(result[name]))
+    ax.set_ylabel(rf"extreme positions $x_\mathrm{{max}}$, $x_\mathrm{{min}}$ ({unit(result['x_max'])})")
+    caption = [*_caption(result, name, look), *_limits_caption(result), plain(version_text(result))]
+    compose(figure, title, shown(caption, look), handles, columns=5)
+    return figure
+
+
+def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return stroboscopic positions and mean impact speeds against the swept parameter."""
+    name = swept_axis(result)
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 105.0)))
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    values = result[name].values
+    strobe = result["strobe_x"].transpose("direction", name, "sample").values
+    speed = result["mean_impact_speed"].transpose("direction", name).values
+    runs = _directions(result)
+    agree = _runs_agree(strobe) if len(runs) == 2 else np.zeros(values.size, bool)
+    colours = {code: (style.RUN_UP, style.RUN_DOWN)[code] for _, code in runs}
+    for place, code in runs:
+        _thin_points(top, values, strobe[place], ~agree, colours[code])
+        _thin_points(bottom, values, speed[place][:, np.newaxis], ~agree, colours[code])
+    _thin_points(top, values, strobe[0], agree, style.BOTH_RUNS)
+    _thin_points(bottom, values, speed[0][:, np.newaxis], agree, style.BOTH_RUNS)
+    _draw_barriers(top, result)
+    top.set_ylabel(f"position $x$ ({unit(result['strobe_x'])})\nonce per drive period")
+    bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
+    bottom.set_xlabel(axis_label(result[name]))
+    bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
+    top.set_xlim(values.min(), values.max())
+    for letter, ax in zip("ab", (top, bottom), strict=True):
+        ax.set_title(f"{letter})", loc="left")
+    caption = [
+        f"last {result.sizes['sample']} stroboscopic points of each hold",
+        *_caption(result, name, look),
+    ]
+    caption.append(plain(version_text(result)))
+    dots = [_dot(colour, ("run-up", "run-down")[code]) for code, colour in colours.items()]
+    dots += [_dot(style.BOTH_RUNS, "both alike")] if agree.any() else []
+    compose(figure, title, shown(caption, look), [*dots, *_barrier_handles(result)], columns=4)
+    return figure
+
+
+def _dot(colour: str, label: str) -> Line2D:
+    return Line2D(
+        [], [], linestyle="", marker="o", markersize=2.5, markeredgewidth=0, color=colour, label=label
+    )
+
+
+def _thin_points(ax: Axes, values: np.ndarray, points: np.ndarray, chosen: np.ndarray, colour: str) -> None:
+    """Draw points so small that a band shows where the motion is often; where there are few, larger ones."""
+    if not chosen.any():
+        return
+    along = np.broadcast_to(values[:, np.newaxis], points.shape)
+    size = float(np.clip(250.0 / values.size, 0.25, 2.5))
+    rasterized = points.size > 2000
+    ax.scatter(along[chosen], points[chosen], s=size, c=colour, linewidths=0, rasterized=rasterized, zorder=3)
+
+
+def _runs_agree(strobe: np.ndarray) -> np.ndarray:
+    """Where both runs show the same motion: extremes of the points that differ by at most 5 % of all."""
+    finite = np.isfinite(strobe)
+    room = 0.05 * (np.ptp(strobe[finite]) if finite.any() else 0.0)
+    low, high = strobe.min(axis=2), strobe.max(axis=2)
+    with np.errstate(invalid="ignore"):
+        return (np.abs(low[0] - low[1]) <= room) & (np.abs(high[0] - high[1]) <= room)
+
+
+def _draw_branches(ax: Axes, result: xr.Dataset, name: str) -> list[Line2D]:
+    if "branch_x_max" not in result:
+        return []
+    for key in ("branch_x_max", "branch_x_min"):
+        values = result[key].transpose(name, "start").values
+        along = np.broadcast_to(result[name].values[:, np.newaxis], values.shape)
+        ax.scatter(
+            along,
+            values,
+            s=2.2,
+            c=style.BRANCH,
+            marker="o",
+            linewidths=0,
+            rasterized=values.size > 2000,
+            zorder=1,
+        )
+    label = f"brute force, {result.sizes['start']} starts"
+    return [Line2D([], [], linestyle="", marker="o", markersize=2.2, color=style.BRANCH, label=label)]
+
+
+def _draw_runs(ax: Axes, result: xr.Dataset, name: str) -> list[Line2D]:
+    values = result[name].values
+    for key in ("x_max", "x_min"):
+        _draw_run_pair(ax, values, result[key].transpose("direction", name).values, result)
+    ax.set_xlim(values.min(), values.max())
+    return _run_handles(result)
+
+
+def _draw_run_pair(ax: Axes, values: np.ndarray, runs: np.ndarray, result: xr.Dataset) -> None:
+    """Draw run-up as open circles and run-down as dots inside them: both stay visible where they agree."""
+    for (place, code), handle in zip(_directions(result), _run_handles(result), strict=True):
+        ax.plot(
+            values,
+            runs[place],
+            linestyle="",
+            marker=handle.get_marker(),
+            markersize=handle.get_markersize(),
+            markerfacecolor=handle.get_markerfacecolor(),
+            markeredgecolor=handle.get_markeredgecolor(),
+            markeredgewidth=handle.get_markeredgewidth(),
+            zorder=3 + code,
+        )
+
+
+def _run_handles(result: xr.Dataset) -> list[Line2D]:
+    common = {"linestyle": "", "marker": "o"}
+    up = {
+        "markersize": 3.4,
+        "markerfacecolor": "none",
+        "markeredgecolor": style.RUN_UP,
+        "markeredgewidth": 0.6,
+    }
+    down = {"markersize": 1.5, "markerfacecolor": style.RUN_DOWN, "markeredgewidth": 0.0}
+    handles = {_UP: ({**common, **up}, "run-up"), _DOWN: ({**common, **down}, "run-down")}
+    return [Line2D([], [], **handles[code][0], label=handles[code][1]) for _, code in _directions(result)]
+
+
+def _directions(result: xr.Dataset) -> list[tuple[int, int]]:
+    """Return position and code of the directions that were run; a sweep may have been one-way."""
+    done = (np.isfinite(result["x_max"]) & (result["reason"] != _NOT_RUN)).any(swept_axis(result)).values
+    return [(place, int(code)) for place, code in enumerate(result["direction"].values) if done[place]]
+
+
+def _barriers(result: xr.Dataset) -> list[float]:
+    """Their places in the unit of the positions."""
+    one = UNITS.get(unit(result["x_max"]), ("m", 1.0))[1]
+    return [
+        float(result.attrs[key]) / one for key in ("barrier_upper", "barrier_lower") if key in result.attrs
+    ]
+
+
+def _draw_barriers(ax: Axes, result: xr.Dataset) -> list[Line2D]:
+    for level in _barriers(result):
+        ax.axhline(level, color=style.BARRIER, linewidth=1.2, zorder=2)
+    return _barrier_handles(result)
+
+
+def _barrier_handles(result: xr.Dataset) -> list[Line2D]:
+    label = "barrier" if len(_barriers(result)) == 1 else "barriers"
+    return [Line2D([], [], color=style.BARRIER, linewidth=1.2, label=label)] if _barriers(result) else []
+
+
+def _draw_regions(ax: Axes, result: xr.Dataset, name: str) -> list[Patch]:
+    """Draw the bracketed limits as vertical lines and name the regions between them."""
+    lines = boundaries(table(result, "limits"))
+    low, high = ax.get_xlim()
+    for line in lines:
+        ax.axvspan(line.lower, line.upper, color="#999999", alpha=0.35, linewidth=0, zorder=0)
+        ax.axvline(line.middle, color="black", linewidth=0.7, zorder=2)
+    for region in regions(result, name, lines):
+        _name_region(ax, region, (region.upper - region.lower) / (high - low))
+    for place, line in enumerate(lines):
+        gaps = [other.middle - line.middle for k, other in enumerate(lines) if k != place]
+        _name_limit(ax, line, min(gaps, key=abs, default=high - low) / (high - low))
+    if not lines:
+        return []
+    return [Line2D([], [], color="black", linewidth=0.7, label="limit of a region")]
+
+
+def _name_limit(ax: Axes, line: Boundary, gap: float) -> None:
+    """Write the value of a limit above it, with as many digits as its bracket is worth.
+
+    `gap` is the way to the nearest limit as a share of the axis; two close ones are turned and moved apart.
+    """
+    digits = int(np.clip(-np.floor(np.log10(max(line.upper - line.lower, 1e-6))), 0, 6))
+    text = f"{line.middle:.{digits}f}"
+    if abs(gap) > 0.05:
+        _write_above(ax, line.middle, text, (0.0, 2.0), fontsize=6.0)
+    else:
+        _write_above(ax, line.middle, text, (-2.0 if gap > 0 else 5.0, 2.0), rotation=60, fontsize=6.0)
+
+
+def _name_region(ax: Axes, region: Region, share: float) -> None:
+    if share < 0.01:
+        return
+    centre = (region.lower + region.upper) / 2
+    if share > 0.08:
+        text = region.text if share > 0.14 else region.text.replace(" ", "\n")
+        _write_above(ax, centre, text, (0.0, 10.0))
+    else:
+        # beyond the turned values of the limits on both sides
+        _write_above(ax, centre, region.text.replace(" ", "\n"), (13.0, 22.0), rotation=60)
+
+
+def _write_above(
+    ax: Axes, place: float, text: str, offset: tuple[float, float], rotation: float = 0, **options: float
+) -> None:
+    """Write text `offset` points from a place; turned text starts there instead of straddling it."""
+    ax.annotate(
+        text,
+        (place, 1.0),
+        xycoords=("data", "axes fraction"),
+        xytext=offset,
+        textcoords="offset points",
+        ha="left" if rotation else "center",
+        va="bottom",
+        rotation=rotation,
+        rotation_mode="anchor",
+        annotation_clip=False,
+        **options,
+    )
+
+
+def _caption(result: xr.Dataset, name: str, look: Look) -> list[str]:
+    return [
+        *caption_pieces(result, look, describe_case(result)),
+        f"{count_text(result.sizes[name])} values of the swept parameter",
+    ]
+
+
+def _limits_caption(result: xr.Dataset) -> list[str]:
+    texts = limit_texts(table(result, "limits"))
+    return ["brackets: " + ", ".join(texts)] if texts else []

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A map computed in this process by the library, in threads: the values of the program to the bit."""
+
+import itertools
+import math
+from collections.abc import Mapping
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+
+import numpy as np
+import xarray as xr
+
+import separatrix.accessor  # noqa: F401  (results have their accessor)
+from separatrix.cases import Case
+from separatrix.errors import BAD_DATA, CaseError, Interrupted
+from separatrix.progress import Progress, Report
+from separatrix.simulate import LABEL_VARIABLES, Catalogue, StopFlag, StoppedError, search_slices
+from separatrix.variables import CATALOGUE, MAP, STARTS, attributes
+from separatrix.version import __version__
+
+# Starts of one call: enough for the lanes, few enough to be stopped soon.
+_PIECE = 1024
+
+
+def can_label(case: Case) -> bool:
+    """Whether the library does it: one body, every point of the grid, an axis of starts."""
+    resolved = case.resolved
+    starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
+    return starts and "refine" not in resolved and "driven_mass" not in resolved["body"]
+
+
+class Labelling:
+    """A map under way: its axes, its catalogues, and the points that are done."""
+
+    def __init__(self, case: Case, threads: int, asked: bool | Report | None) -> None:
+        """Lay out the grid."""
+        self.case, self.threads, self.asked = case, threads, asked
+        self.axes = {str(axis["name"]): axis_values(axis) for axis in case.resolved.get("axis", [])}
+        if len(self.axes) < 2:
+            raise CaseError(f"{case.name}: found {len(self.axes)} axes, allowed two or more", BAD_DATA)
+        self.parameters = [name for name in self.axes if name not in STARTS]
+        self.shape = tuple(len(self.axes[name]) for name in self.parameters)
+        self.starts = self._starts()
+        self.catalogues: list[Catalogue] = []
+        count = math.prod(self.shape)
+        self.values = {
+            name: np.zeros((count, len(self.starts)), kind) for name, kind in LABEL_VARIABLES.items()
+        }
+        pieces = range(0, len(self.starts), _PIECE)
+        self.left = [(number, first) for number in range(count) for first in pieces]
+        self.done = 0
+
+    def __call__(self) -> xr.Dataset:
+        """Compute what is left; Interrupted can go on."""
+        stop = StopFlag()
+        with Progress(self.asked) as told:
+            try:
+                self._search(stop)
+                self._label(stop, told)
+            except (KeyboardInterrupt, StoppedError):
+                stop.set()
+                done = self.done / max(1, self._total())
+                raise Interrupted(f"stopped at {100 * done:.0f} %; resume() goes on", done, self) from None
+        return self._dataset()
+
+    def _total(self) -> int:
+        return len(self.starts) * math.prod(self.shape)
+
+    def _starts(self) -> np.ndarray:
+        """The starts of a slice, the last axis fastest: x [m], v [m/s], crank angle [rad]."""
+        fixed = self.case.resolved["start"]
+        names = [name for name in self.axes if name in STARTS]
+        grid = np.meshgrid(*(self.axes[name] for name in names), indexing="ij")
+        columns = dict(zip(names, (part.ravel() for part in grid), strict=True))
+        number = max(1, math.prod(len(self.axes[name]) for name in names))
+        return np.column_stack(
+            [columns.get(name, np.full(number, float(fixed[name]))) for name in ("x0", "v0", "crank_angle")]
+        )
+
+    def _slices(self) -> list[Mapping[str, float]]:
+        places = itertools.product(*(self.axes[name] for name in self.parameters))
+        return [dict(zip(self.parameters, place, strict=True)) for place in places]
+
+    def _search(self, stop: StopFlag) -> None:
+        if self.catalogues:
+            return
+        slices = self._slices()
+        with ThreadPoolExecutor(1) as helper:
+            # A wait can be interrupted, a call of the library cannot.
+            future = helper.submit(search_slices, self.case.model, slices, self.shape or (1,), stop)
+            try:
+                while not future.done():
+                    wait([future], timeout=0.2)
+            except KeyboardInterrupt:
+                stop.set()
+                raise
+            self.catalogues = future.result()
+
+    def _label(self, stop: StopFlag, told: Progress) -> None:
+        todo = list(self.left)
+        with ThreadPoolExecutor(self.threads) as helpers:
+            futures = {helpers.submit(self._piece, *place, stop): place for place in todo}
+            try:
+                waiting = set(futures)
+                while waiting:
+                    finished, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                    for future in finished:
+                        self.done += future.result()
+                        self.left.remove(futures[future])
+                    told("points", self.done, self._total())
+            except BaseException:
+                stop.set()
+                helpers.shutdown(wait=True, cancel_futures=True)
+                raise
+
+    def _piece(self, number: int, first: int, stop: StopFlag) -> int:
+        last = min(first + _PIECE, len(self.starts))
+        found = self.catalogues[number].labels(self.starts[first:last], stop)
+        for name, values in found.items():
+            self.values[name][number, first:last] = values
+        return last - first
+
+    def _dataset(self) -> xr.Dataset:
+        dims = [name.replace(".", "_") for name in self.axes]
+        # Parameters may stand between the starts: the slices are in their order, the starts in theirs.
+        order = [*self.parameters, *(name for name in self.axes if name in STARTS)]
+        shape = [len(self.axes[name]) for name in order]
+        back = [order.index(name) for name in self.axes]
+        data = {
+            name: (dims, np.transpose(values.reshape(shape), back), attributes(MAP[name]))
+            for name, values in self.values.items()
+        }
+        coordinates = {
+            dim: (dim, values, self._axis_attributes(name))
+            for (name, values), dim in zip(self.axes.items(), dims, strict=True)
+        }
+        resolved = self.case.to_toml()
+        about = {
+            "format": "separatrix", "format_version": 1, "kind": "basin", "complete": 1,
+            "title": self.case.title, "source": f"Separatrix {__version__}", "resolved_case": resolved,
+        }  # fmt: skip
+        return xr.Dataset({**data, **self._catalogue()}, coordinates, about)
+
+    def _axis_attributes(self, name: str) -> dict[str, object]:
+        if name in STARTS:
+            return attributes(STARTS[name])
+        unit = self.case.parameters[name].unit
+        return {"units": unit or "1", "long_name": name.replace(".", " ").replace("_", " ")}
+
+    def _catalogue(self) -> dict[str, tuple]:
+        rows = []
+        for number, catalogue in enumerate(self.catalogues):
+            labels, counts = np.unique(self.values["attractor"][number], return_counts=True)
+            captured = dict(zip(labels.tolist(), counts.tolist(), strict=True))
+            for one in catalogue.attractors:
+                count = captured.get(int(one.numbers["attractor"]), 0)
+                margin = min(one.numbers["grazing_margin"], np.finfo(float).max)
+                rows.append({**one.numbers, "grazing_margin": margin, "slice": number, "count": count})
+        return {
+            f"catalogue_{name}": (
+                "entry",
+                np.array([row[name] for row in rows], kind),
+                {"units": unit, "long_name": meaning},
+            )
+            for name, (kind, unit, meaning) in CATALOGUE.items()
+        }
+
+
+def axis_values(axis: Mapping[str, object]) -> np.ndarray:
+    """Return the values of an axis, with the bits of the program."""
+    if "values" in axis:
+        return np.array(axis["values"], float)
+    first, last, count = float(axis["from"]), float(axis["to"]), int(axis["count"])
+    if count == 1:
+        return np.array([last])
+    values = first + (last - first) * (np.arange(count) / (count - 1))
+    values[-1] = last
+    return values

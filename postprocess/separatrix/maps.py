@@ -1,0 +1,384 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`basin`, `sweep`, `points`, `run`: what the program computes, as Datasets."""
+
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from separatrix.cases import Case, as_case, linspace
+from separatrix.errors import USAGE, CaseError, Interrupted, SeparatrixError
+from separatrix.labelling import Labelling, axis_values, can_label
+from separatrix.open import open_result
+from separatrix.progress import Progress, Report
+from separatrix.runner import StoppedError, cores, run
+
+__all__ = ["basin", "points", "sweep"]
+
+Values = linspace | tuple[float, float, int] | Sequence[float] | np.ndarray | int | float | None
+
+# Below so many points a second process takes longer to start than it saves.
+_FEW_POINTS = 50_000
+# What is computed without a file of its own is kept in memory.
+_MOST_IN_MEMORY = 50_000_000
+_STARTS = ("x0", "v0", "crank_angle")
+
+
+@dataclass
+class _Work:
+    """One call: what to run, with how many, where to, and who is told."""
+
+    command: str
+    case: Case
+    output: Path | None
+    workers: int
+    ranks: int | None
+    progress: bool | Report | None
+    resume: bool
+    overwrite: bool
+    time_limit: float | None
+    extra: Callable[[Path], list[str]]
+
+    def __call__(self, folder: tempfile.TemporaryDirectory | None = None) -> xr.Dataset:
+        """Run it; `folder` holds what an earlier, stopped run of it has done."""
+        own = folder or tempfile.TemporaryDirectory(prefix="separatrix-")
+        place = Path(own.name)
+        target = (self.output or place / f"{self.command}.h5").absolute()
+        if self.output and target.exists() and not self.overwrite:
+            raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", 73)
+        try:
+            with Progress(self.progress) as told:
+                self._compute(place, target, told, resume=self.resume or folder is not None)
+        except StoppedError as stop:
+            again = "; resume() goes on" + (", and so does resume=True" if self.output else "")
+            raise Interrupted(
+                f"stopped at {100 * stop.done:.0f} %{again}", stop.done, lambda: self(own)
+            ) from None
+        if self.output:
+            return open_result(target)
+        with open_result(target) as result:
+            return kept_in_memory(result)
+
+    def _compute(self, place: Path, target: Path, told: Progress, resume: bool) -> None:
+        named = self.case.on_command_line(place)
+        rename = {named[0]: self.case.name, f"'{target}'": f"'{target.name}'"}
+        base = [self.command, *named, *self.extra(place), "--json"]
+        if self.workers == 1:
+            how = ["--resume"] if resume else ["--force"] if self.overwrite else []
+            command = [*base, *how, "-o", str(target)]
+            run([command], told, self.ranks, rename, time_limit=self.time_limit)
+            return
+        self._in_shares(base, target, told, rename, resume)
+
+    def _in_shares(
+        self, base: list[str], target: Path, told: Progress, rename: dict[str, str], resume: bool
+    ) -> None:
+        """Serial processes, each with a share of the tiles; joined they have the bits of one run."""
+        count = self.workers
+        shares = [Path(f"{target}.shard-{i}-of-{count}.part") for i in range(1, count + 1)]
+        if not resume:
+            for share in shares:
+                share.unlink(missing_ok=True)
+        # A share that another process writes is read without a lock.
+        unlocked = {"HDF5_USE_FILE_LOCKING": "FALSE"}
+        first = [*base, "-o", str(target), "--shard", f"1/{count}"]
+        found = []
+        if self.command == "basin":
+            if not shares[0].exists():
+                run([[*first, "--search-only"]], told, None, rename, time_limit=self.time_limit)
+            found = ["--catalogue", str(shares[0])]
+        commands = [[*first, "--resume"]]
+        for i in range(2, count + 1):
+            commands.append([*base, "-o", str(target), "--shard", f"{i}/{count}", "--resume", *found])
+        run(commands, told, None, rename, unlocked, self.time_limit)
+        joined = ["merge", str(target), *map(str, shares), "--json"]
+        run([[*joined, *(["--force"] if self.overwrite else [])]], told, None, rename)
+        for share in shares:
+            share.unlink()
+            Path(f"{share}.lock").unlink(missing_ok=True)
+
+
+def basin(
+    case: Case | str | Path,
+    axes: Mapping[str, Values] | None = None,
+    /,
+    *,
+    output: str | Path | None = None,
+    threads: int | None = None,
+    workers: int | None = None,
+    ranks: int | None = None,
+    progress: bool | Report | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    time_limit: float | None = None,
+    **more: Values,
+) -> xr.Dataset:
+    """Return where every point of a grid ends up, and the attractors.
+
+    Parameters
+    ----------
+    case
+        The machine, as a Case or the file of one.
+    axes, **more
+        Axes by name: `x0`, `v0`, `crank_angle`, or the path of a parameter (`{"drive.ratio": ...}`, as a
+        keyword `drive__ratio=...`). Values are `sx.linspace(first, last, count)`, the same as a tuple
+        `(first, last, count)`, an ascending list or array, or a whole number: that many values over the range
+        of the case. None takes an axis away. Axes of the case that are not named stay; new ones come first,
+        as the slowest.
+    output
+        The result file. Without one the result is kept in memory and computed in this process.
+    threads, workers, ranks
+        Choose one: threads of this process (the default without `output`); serial processes on this machine,
+        each with a share of the tiles (the default with `output`); ranks of MPI, where the program has been
+        built with it. How many: by default one for each core, or one for small maps. The result does not
+        depend on it, to the bit.
+    progress
+        True, False, None (a bar in a terminal or a notebook), or a function of (things, done, total).
+    resume
+        Go on with a run into `output` that was stopped, with the same number of workers.
+    overwrite
+        Replace an `output` that exists.
+    time_limit
+        Seconds after which the run is stopped, to be resumed.
+
+    Ctrl-C raises `Interrupted`, a KeyboardInterrupt whose `resume()` goes on. What is wrong in the case is a
+    `CaseError` with the message of the program.
+    """
+    case = _with_axes(as_case(case), {**(axes or {}), **_paths(more)})
+    sizes = [_size(axis) for axis in case.resolved.get("axis", [])]
+    number = int(np.prod(sizes)) if sizes else 0
+    if output is None and number > _MOST_IN_MEMORY:
+        raise SeparatrixError(f"{number} points are kept in a file: give output=FILE", USAGE)
+    here = output is None and workers is None and ranks is None and time_limit is None
+    if threads is not None and not here:
+        raise SeparatrixError("threads: allowed without output, workers, ranks and time_limit", USAGE)
+    if here and can_label(case):
+        return Labelling(case, _workers(threads, None, number, "threads"), progress)()
+    work = _Work(
+        "basin", case, _path(output), _workers(workers, ranks, number), ranks, progress, resume, overwrite,
+        time_limit, lambda place: [],
+    )  # fmt: skip
+    return work()
+
+
+def sweep(
+    case: Case | str | Path,
+    parameter: str | None = None,
+    values: Values = None,
+    *,
+    directions: str | None = None,
+    starts: tuple[int, int] | None = None,
+    x0: tuple[float, float] | None = None,
+    v0: tuple[float, float] | None = None,
+    samples: int | None = None,
+    limit_tolerance: float | None = None,
+    output: str | Path | None = None,
+    ranks: int | None = None,
+    progress: bool | Report | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    time_limit: float | None = None,
+) -> xr.Dataset:
+    """Return how the motion changes with a parameter: run up, run down, from many starts, and the limits.
+
+    Parameters
+    ----------
+    case
+        The machine, as a Case or the file of one. What is not given is that of its table [sweep].
+    parameter, values
+        The path of what is swept and its values, evenly spaced: `sx.linspace(first, last, count)`, a tuple
+        of the same, or an array.
+    directions
+        "both", "up" or "down".
+    starts, x0, v0
+        How many brute-force starts over x0 and v0, and their ranges; (0, 0) for none.
+    samples
+        Stroboscopic samples kept per value.
+    limit_tolerance
+        Width to which the limits of a region are bracketed.
+    output, ranks, progress, resume, overwrite, time_limit
+        As for `basin`. A sweep runs on one core, or on `ranks` of MPI: each value begins where the one
+        before ended.
+    """
+    case = as_case(case)
+    table = dict(case.resolved.get("sweep", {}))
+    if parameter is not None and parameter != table.get("parameter"):
+        table = {key: value for key, value in table.items() if key not in ("from", "to", "count", "values")}
+        table["parameter"] = parameter
+        if values is None:
+            raise CaseError(f"sweep over {parameter}: values are missing", USAGE)
+    if values is not None:
+        table = {key: value for key, value in table.items() if key not in ("from", "to", "count", "values")}
+        table |= _even(_axis_values(table["parameter"], values, None))
+    given = {
+        "directions": directions, "starts": starts, "x0": x0, "v0": v0, "samples": samples,
+        "limit_tolerance": limit_tolerance,
+    }  # fmt: skip
+    table |= {key: value for key, value in given.items() if value is not None}
+    case = case.with_({"sweep": table})
+    work = _Work(
+        "sweep", case, _path(output), 1, ranks, progress, resume, overwrite, time_limit, lambda place: []
+    )
+    return work()
+
+
+def points(
+    case: Case | str | Path,
+    starts: object = None,
+    *,
+    output: str | Path | None = None,
+    workers: int | None = None,
+    ranks: int | None = None,
+    progress: bool | Report | None = None,
+    overwrite: bool = False,
+    time_limit: float | None = None,
+    **columns: Iterable[float] | float,
+) -> xr.Dataset:
+    """Return the state at the end of the duration of many starts.
+
+    `starts` has the columns x0 [m], v0 [m/s] and optionally the drive ratio: a mapping, a DataFrame, a
+    Dataset, or an array with two or three columns; or each as a keyword, `points(case, x0=[...], v0=0.0)`.
+    The rest is as for `basin`.
+    """
+    case = as_case(case)
+    table = _starts(starts, columns)
+
+    def listed(place: Path) -> list[str]:
+        path = place / "starts.csv"
+        rows = [",".join(repr(float(value)) for value in row) for row in zip(*table.values(), strict=True)]
+        path.write_text("\n".join([",".join(table), *rows, ""]))
+        return ["--list", str(path)]
+
+    number = len(table["x0"])
+    work = _Work(
+        "points", case, _path(output), _workers(workers, ranks, number), ranks, progress, False, overwrite,
+        time_limit, listed,
+    )  # fmt: skip
+    return work()
+
+
+def kept_in_memory(result: xr.Dataset) -> xr.Dataset:
+    """Return a result that needs its file no more."""
+    kept = result.load().copy()
+    kept.encoding = {}
+    for variable in kept.variables.values():
+        variable.encoding = {}
+    return kept
+
+
+def _with_axes(case: Case, asked: Mapping[str, Values]) -> Case:
+    """Return the case with other axes."""
+    if not asked:
+        return case
+    old = {str(axis["name"]): dict(axis) for axis in case.resolved.get("axis", [])}
+    asked = {"drive.ratio" if name == "ratio" else name: values for name, values in asked.items()}
+    # The fastest axes are the starts; what is new and no start comes first.
+    names = [name for name in asked if name not in old and name not in _STARTS]
+    names += [*old, *(name for name in asked if name not in old and name in _STARTS)]
+    axes = []
+    for name in names:
+        if name not in asked:
+            axes.append(old[name])
+        elif asked[name] is not None:
+            axes.append({"name": name} | _axis_values(name, asked[name], old.get(name)))
+    try:
+        return case.with_({"axis": axes})
+    except CaseError as error:
+        # "axis=[...]: key 'axis[1]': found ..."
+        text = re.sub(r"^axis(=\[.*\])?: ", "", str(error), flags=re.MULTILINE)
+        text = re.sub(
+            r"key 'axis\[(\d+)\](?:\.name)?", lambda found: f"axis '{axes[int(found[1]) - 1]['name']}", text
+        )
+        raise CaseError(f"{case.name}: {text}", error.code) from None
+
+
+def _axis_values(name: str, values: Values, old: Mapping[str, object] | None) -> dict[str, object]:
+    """Return the keys of an axis."""
+    if isinstance(values, int | np.integer) and not isinstance(values, bool):
+        if old is None:
+            raise CaseError(
+                f"axis {name}: found a count alone, allowed where the case has such an axis", USAGE
+            )
+        first, last = (old["from"], old["to"]) if "from" in old else (old["values"][0], old["values"][-1])
+        return {"from": first, "to": last, "count": int(values)}
+    if isinstance(values, float | np.floating):
+        return {"values": [float(values)]}
+    if isinstance(values, tuple) and len(values) == 3 and isinstance(values[2], int | np.integer):
+        values = linspace(*values)
+    if isinstance(values, linspace):
+        return {"from": values.first, "to": values.last, "count": values.count}
+    array = np.asarray(values, float)
+    if array.ndim != 1 or array.size == 0:
+        raise CaseError(f"axis {name}: found shape {array.shape}, allowed a list of numbers", USAGE)
+    return {"values": array.tolist()}
+
+
+def _even(axis: dict[str, object]) -> dict[str, object]:
+    """Return first, last and count of values that have to be evenly spaced."""
+    if "values" not in axis:
+        return axis
+    values = np.array(axis["values"])
+    even = {"from": float(values[0]), "to": float(values[-1]), "count": values.size}
+    if not np.allclose(axis_values(even), values, rtol=1e-12, atol=1e-12 * np.abs(values).max()):
+        raise CaseError("values: found unevenly spaced ones, allowed for a sweep is sx.linspace(...)", USAGE)
+    return even
+
+
+def _size(axis: Mapping[str, object]) -> int:
+    return int(axis["count"]) if "count" in axis else len(axis["values"])
+
+
+def _paths(keywords: Mapping[str, Values]) -> dict[str, Values]:
+    return {name.replace("__", "."): values for name, values in keywords.items()}
+
+
+def _path(output: str | Path | None) -> Path | None:
+    return None if output is None else Path(output).expanduser()
+
+
+def _workers(workers: int | None, ranks: int | None, number: int, name: str = "workers") -> int:
+    if ranks is not None:
+        if workers not in (None, 1):
+            raise SeparatrixError("workers and ranks: choose one", USAGE)
+        if ranks < 1:
+            raise SeparatrixError(f"ranks: found {ranks}, allowed 1 or more", USAGE)
+        return 1
+    if workers is None:
+        return 1 if number < _FEW_POINTS else cores()
+    if workers < 1:
+        raise SeparatrixError(f"{name}: found {workers}, allowed 1 or more", USAGE)
+    return int(workers)
+
+
+def _starts(starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarray]:
+    """Return the columns of a table of starts, equally long."""
+    if starts is None:
+        given = dict(columns)
+    elif hasattr(starts, "keys"):
+        # a table may have further columns, a mapping is written for this
+        further = hasattr(starts, "to_dict")
+        given = {
+            str(key): starts[key]
+            for key in starts.keys()  # noqa: SIM118
+            if not further or str(key) in ("x0", "v0", "ratio")
+        }
+    else:
+        array = np.asarray(starts, float)
+        if array.ndim != 2 or array.shape[1] not in (2, 3):
+            raise SeparatrixError(f"starts: found shape {array.shape}, allowed (n, 2) or (n, 3)", USAGE)
+        given = dict(zip(("x0", "v0", "ratio"), array.T, strict=False))
+    unknown = set(given) - {"x0", "v0", "ratio"}
+    if unknown or not {"x0", "v0"} <= set(given):
+        raise SeparatrixError(
+            f"starts: found the columns {', '.join(given) or 'none'}, allowed x0, v0 and optionally ratio",
+            USAGE,
+        )
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in given.values()))
+    if arrays[0].ndim != 1:
+        raise SeparatrixError(f"starts: found columns of shape {arrays[0].shape}, allowed lists", USAGE)
+    return dict(zip(given, arrays, strict=True))

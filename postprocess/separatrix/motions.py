@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`trajectory`: one motion with all its events, computed in this process."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+import separatrix.accessor  # noqa: F401  (results have their accessor)
+from separatrix import simulate
+from separatrix.cases import Case, as_case
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.variables import EVENTS, REASONS, REGIMES, SAMPLES, attributes
+from separatrix.version import __version__
+
+_BOOK = (
+    "energy_start", "energy_end", "energy_lost_to_friction", "energy_lost_to_damping",
+    "energy_lost_to_contacts", "energy_put_in", "energy_closing_error",
+)  # fmt: skip
+_STEADY = ("amplitude", "x_max", "x_min", "v_max", "impacts_per_period", "mean_impact_speed")
+_HUGE = 1e308
+
+
+def trajectory(
+    case: Case | str | Path,
+    x0: float | None = None,
+    v0: float | None = None,
+    crank_angle: float | None = None,
+    *,
+    duration: float | None = None,
+    samples: int | None = None,
+) -> xr.Dataset:
+    """Return one motion, equidistant samples and every event, as a file of `separatrix trajectory` has it.
+
+    Parameters
+    ----------
+    case
+        The machine, as a Case or the file of one.
+    x0, v0, crank_angle
+        The start [m, m/s, rad]; what is not given is that of the case.
+    duration
+        Seconds; that of the case if not given.
+    samples
+        Samples per drive period, two or more; those of the case if not given.
+    """
+    case = as_case(case)
+    if duration is not None and not 0 < duration < np.inf:
+        raise SeparatrixError(f"duration: found {duration}, allowed more than 0", USAGE)
+    if samples is not None and samples < 2:
+        raise SeparatrixError(f"samples: found {samples}, allowed 2 or more", USAGE)
+    fixed = case.resolved["start"]
+    given = {"x0": x0, "v0": v0, "crank_angle": crank_angle}
+    start = {name: float(fixed[name] if value is None else value) for name, value in given.items()}
+    motion = simulate.trajectory(
+        case.model, tuple(start.values()), duration=duration or 0.0, samples_per_period=samples or 0
+    )
+    asked = {f"start.{name}": value for name, value in start.items()}
+    if duration is not None:
+        window = min(float(case.resolved["run"]["window"]), duration)
+        asked |= {"run.duration": float(duration), "run.window": window}
+    if samples is not None:
+        asked["trajectory.samples_per_period"] = int(samples)
+    return _dataset(case.with_(asked), motion)
+
+
+def _dataset(case: Case, motion: simulate.Motion) -> xr.Dataset:
+    summary = motion.summary
+    two_bodies = bool(summary["two_bodies"])
+    columns = dict(motion.samples)
+    columns["potential_energy"] = columns["energy"] - columns["kinetic_energy"]
+    if not two_bodies:
+        columns["drive"] = columns.pop("driver_x")
+        del columns["driver_v"]
+    if not summary["soft"]:
+        del columns["contact_force"]
+    time = columns.pop("time")
+    columns["mode"] = columns["mode"].astype(np.int8)
+    events = dict(motion.events)
+    events["kind"] = events["kind"].astype(np.int8)
+    if not two_bodies:
+        del events["driver_x"], events["driver_v"]
+    data = {name: ("time", columns[name], attributes(SAMPLES[name])) for name in SAMPLES if name in columns}
+    data |= {
+        f"event_{name}": ("event", events[name], attributes(EVENTS[name]))
+        for name in EVENTS
+        if name in events
+    }
+    return xr.Dataset(data, {"time": ("time", time, attributes(SAMPLES["time"]))}, _about(case, summary))
+
+
+def _about(case: Case, summary: dict[str, float]) -> dict[str, object]:
+    resolved = case.resolved
+    about: dict[str, object] = {
+        "format": "separatrix", "format_version": 1, "kind": "trajectory", "complete": 1, "title": case.title,
+        "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
+        "drive_period": summary["drive_period"], "drive_ratio": float(resolved["drive"].get("ratio", 0.0)),
+        "window": float(resolved["run"]["window"]), "reason": REASONS[int(summary["trajectory_reason"])],
+        "regime": REGIMES[int(summary["regime"])],
+    }  # fmt: skip
+    about |= {name: summary[name] for name in _STEADY}
+    about |= {name: summary[name] for name in _BOOK if np.isfinite(summary[name])}
+    for name in ("barrier_upper", "barrier_lower"):
+        if abs(summary[name]) < _HUGE:
+            about[name] = summary[name]
+    return about

@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole motions and labels of starts by the library, without files: as `trajectory`, `points`, `basin`."""
+
+import contextlib
+import ctypes
+import weakref
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.library import CaseError, Model, _call, _library, _pointer
+
+__all__ = [
+    "LABEL_VARIABLES",
+    "Attractor",
+    "Catalogue",
+    "Motion",
+    "StopFlag",
+    "StoppedError",
+    "number",
+    "search_slices",
+    "trajectory",
+]
+
+SAMPLE_COLUMNS = (
+    "time", "x", "v", "mode", "driver_x", "driver_v", "contact_force", "energy", "kinetic_energy",
+    "friction_loss", "damping_loss", "contact_loss", "drive_work",
+)  # fmt: skip
+EVENT_COLUMNS = ("kind", "time", "x", "v_before", "v_after", "driver_x", "driver_v")
+SUMMARY = (
+    "x", "v", "impacts", "last_impact_speed", "regime", "reason", "amplitude", "x_max", "x_min", "v_max",
+    "impacts_per_period", "mean_impact_speed", "drive_period", "barrier_upper", "barrier_lower", "soft",
+    "two_bodies",
+    "trajectory_reason", "energy_start", "energy_lost_to_friction", "energy_lost_to_damping",
+    "energy_lost_to_contacts", "energy_put_in", "energy_end", "energy_closing_error",
+)  # fmt: skip
+ATTRACTOR = (
+    "attractor", "regime", "period", "event_word", "x", "v", "driver_x", "driver_v", "multiplier",
+    "capture_radius", "amplitude", "x_max", "x_min", "v_max", "impacts_per_period", "mean_impact_speed",
+    "grazing_margin", "rests", "any_place", "coordinates", "two_bodies",
+)  # fmt: skip
+#: Variables of a label in the order of the library, with the types that a file has.
+LABEL_VARIABLES = {
+    "regime": np.int8, "attractor": np.int32, "reason": np.int8, "period": np.int16, "event_word": np.int64,
+    "impacts_per_period": np.float32, "mean_impact_speed": np.float32, "amplitude": np.float32,
+    "x_max": np.float32, "x_min": np.float32, "v_max": np.float32, "settle_time": np.float32,
+    "grazing_margin": np.float32,
+}  # fmt: skip
+_SECTION = (64, 16)
+_WHOLE = {
+    "impacts",
+    "regime",
+    "reason",
+    "trajectory_reason",
+    "attractor",
+    "period",
+    "event_word",
+    "coordinates",
+}
+_STOPPED = 75
+
+
+class StoppedError(CaseError):
+    """A search or a labelling that was asked to stop."""
+
+
+class StopFlag:
+    """What ends a search or a labelling from another thread: `flag.set()`."""
+
+    def __init__(self) -> None:
+        """A flag that is not set."""
+        self._value = ctypes.c_int(0)
+
+    def set(self) -> None:
+        """Ask to stop."""
+        self._value.value = 1
+
+    def is_set(self) -> bool:
+        """Whether it was asked to stop."""
+        return self._value.value != 0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One motion: columns of its samples and events, and numbers of the motion as a whole.
+
+    `samples` and `events` have the columns `SAMPLE_COLUMNS` and `EVENT_COLUMNS` (m, s, rad, N, J).
+    `driver_x` is the foot of the spring where there is one body. The `summary` has the state at the end with
+    the bits of the command `points`, the rest with those of `trajectory`.
+    """
+
+    samples: dict[str, np.ndarray]
+    events: dict[str, np.ndarray]
+    summary: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """An attractor: its numbers as in a file's catalogue, and its points on the section (rows)."""
+
+    numbers: dict[str, float]
+    points: np.ndarray
+
+
+def trajectory(
+    model: Model,
+    start: tuple[float, float, float],
+    values: Mapping[str, float] | None = None,
+    duration: float = 0.0,
+    samples_per_period: int = 0,
+    room: tuple[int, int] = (20000, 1000),
+) -> Motion:
+    """Fly one motion from `start` = x [m], v [m/s], crank angle [rad], with other `values` by path.
+
+    `duration` in s and `samples_per_period` are those of the case if 0; no samples if negative. `room` for
+    samples and events is only where to begin.
+    """
+    start = np.array(start, float)
+    if start.shape != (3,):
+        raise CaseError(f"start: found shape {start.shape}, allowed (3,)")
+    chosen = model._chosen(values or {})
+    counts = (ctypes.c_int(), ctypes.c_int())
+    summary = np.empty(len(SUMMARY))
+    while True:
+        samples, events = np.empty((room[0], len(SAMPLE_COLUMNS))), np.empty((room[1], len(EVENT_COLUMNS)))
+        _call(
+            "separatrix_trajectory",
+            model._handle,
+            *chosen,
+            _pointer(start),
+            ctypes.c_double(duration),
+            int(samples_per_period),
+            room[0],
+            ctypes.byref(counts[0]),
+            _pointer(samples),
+            room[1],
+            ctypes.byref(counts[1]),
+            _pointer(events),
+            _pointer(summary),
+        )
+        found = (counts[0].value, counts[1].value)
+        if found[0] <= room[0] and found[1] <= room[1]:
+            break
+        room = found
+    return Motion(
+        _columns(SAMPLE_COLUMNS, samples[: found[0]]),
+        _columns(EVENT_COLUMNS, events[: found[1]]),
+        _numbers(SUMMARY, summary),
+    )
+
+
+class Catalogue:
+    """A machine and its attractors; labels starts with them."""
+
+    def __init__(self, model: Model, values: Mapping[str, float] | None = None) -> None:
+        """Prepare the machine of a model with other `values` of parameters by path; no attractors yet."""
+        self._handle = ctypes.c_void_p()
+        _call(
+            "separatrix_catalogue_open",
+            model._handle,
+            *model._chosen(values or {}),
+            ctypes.byref(self._handle),
+        )
+        self._free = weakref.finalize(self, _library().separatrix_catalogue_free, self._handle)
+
+    def search(self, starts: np.ndarray | None = None, stop: StopFlag | None = None) -> "Catalogue":
+        """Add the attractors to which `starts` (n, 3) lead; None: the sample of `basin`."""
+        count, starts = (-1, None) if starts is None else _starts(starts)
+        with _stoppable():
+            _call("separatrix_catalogue_search", self._handle, count, _pointer(starts), _flag(stop))
+        return self
+
+    @property
+    def attractors(self) -> list[Attractor]:
+        """The attractors, in the order of their numbers within the machine."""
+        return [self._attractor(index) for index in range(_library().separatrix_catalogue_size(self._handle))]
+
+    def _attractor(self, index: int) -> Attractor:
+        numbers, points = np.empty(len(ATTRACTOR)), np.empty(_SECTION)
+        count = ctypes.c_int()
+        arrays = (_pointer(numbers), ctypes.byref(count), _pointer(points))
+        _call("separatrix_catalogue_attractor", self._handle, index, *arrays)
+        named = _numbers(ATTRACTOR, numbers)
+        if named["grazing_margin"] > 1e308:
+            named["grazing_margin"] = np.inf
+        return Attractor(named, points[: count.value, : named["coordinates"]])
+
+    def labels(self, starts: np.ndarray, stop: StopFlag | None = None) -> dict[str, np.ndarray]:
+        """Where `starts` (n, 3) end up: the variables of a map in the types of its file.
+
+        `reason` is 0 where a start is not allowed. Several threads may ask at once.
+        """
+        count, starts = _starts(starts)
+        values = np.empty((count, len(LABEL_VARIABLES)))
+        with _stoppable():
+            _call("separatrix_labels", self._handle, count, _pointer(starts), _pointer(values), _flag(stop))
+        with np.errstate(over="ignore"):
+            columns = zip(LABEL_VARIABLES.items(), values.T, strict=True)
+            return {name: column.astype(kind) for (name, kind), column in columns}
+
+
+def search_slices(
+    model: Model, slices: list[Mapping[str, float]], shape: tuple[int, ...], stop: StopFlag | None = None
+) -> list[Catalogue]:
+    """Find and number the attractors of all slices of a map as `basin` does.
+
+    `slices` are the values of the parameters, by path, over `shape` values of each, the last fastest.
+    """
+    catalogues = [Catalogue(model, values).search(stop=stop) for values in slices]
+    if len(catalogues) > 1:
+        sections = [_sections(catalogue) for catalogue in catalogues]
+        for i, catalogue in enumerate(catalogues):
+            starts = [sections[j] for j in _neighbours(i, shape)]
+            catalogue.search(np.concatenate(starts), stop)
+    number(catalogues, shape)
+    return catalogues
+
+
+def _sections(catalogue: Catalogue) -> np.ndarray:
+    """Return starts on the attractors of one body: a start has no place for the driving body of two."""
+    found = [one for one in catalogue.attractors if not (one.numbers["rests"] or one.numbers["two_bodies"])]
+    return np.array([(*one.points[0], 0.0) for one in found]).reshape(-1, 3)
+
+
+def _neighbours(position: int, shape: tuple[int, ...]) -> list[int]:
+    """Return the slices next to one along each axis, the last axis first."""
+    found, stride = [], 1
+    for length in reversed(shape):
+        place = position // stride % length
+        found += [position - stride] * (place > 0) + [position + stride] * (place < length - 1)
+        stride *= length
+    return found
+
+
+def number(catalogues: Iterable[Catalogue], shape: tuple[int, ...]) -> None:
+    """Number the attractors of the slices of a map so that branches keep their labels; last axis fastest."""
+    handles = [catalogue._handle for catalogue in catalogues]
+    given = (ctypes.c_void_p * len(handles))(*(handle.value for handle in handles))
+    _call("separatrix_catalogue_number", len(handles), given, len(shape), (ctypes.c_int * len(shape))(*shape))
+
+
+def _starts(starts: np.ndarray) -> tuple[int, np.ndarray]:
+    starts = np.ascontiguousarray(starts, float)
+    if starts.ndim != 2 or starts.shape[1] != 3:
+        raise CaseError(f"starts: found shape {starts.shape}, allowed (n, 3)")
+    return len(starts), starts
+
+
+@contextlib.contextmanager
+def _stoppable() -> Iterable[None]:
+    try:
+        yield
+    except CaseError as error:
+        if error.code == _STOPPED:
+            raise StoppedError(str(error), _STOPPED) from None
+        raise
+
+
+def _flag(stop: StopFlag | None) -> object:
+    return None if stop is None else ctypes.byref(stop._value)
+
+
+def _columns(names: tuple[str, ...], rows: np.ndarray) -> dict[str, np.ndarray]:
+    return dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
+
+
+def _numbers(names: tuple[str, ...], values: np.ndarray) -> dict[str, float]:
+    return {
+        name: int(value) if name in _WHOLE and np.isfinite(value) else float(value)
+        for name, value in zip(names, values, strict=True)
+    }

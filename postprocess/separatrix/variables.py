@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names, types, units and meanings of what a map and a trajectory hold, as their files have them.
+
+A test compares them with the files of the program.
+"""
+
+import numpy as np
+
+_REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
+_REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget"
+_EVENTS = (
+    "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release "
+    "touch_upper touch_lower separation blow"
+)
+_MODES = "slip_plus slip_minus stick upper_barrier lower_barrier held"
+
+
+def _flags(meanings: str, first: int = 0) -> dict[str, object]:
+    count = len(meanings.split())
+    return {"flag_values": np.arange(first, first + count, dtype=np.int8), "flag_meanings": meanings}
+
+
+# name: unit, meaning, further attributes
+MAP = {
+    "regime": ("1", "regime of the motion", _flags(_REGIMES)),
+    "attractor": ("1", "label of the attractor in the catalogue, 0 = none", {}),
+    "reason": ("1", "why the trajectory ended", _flags(_REASONS)),
+    "period": ("1", "period in drive periods, 0 = not periodic", {}),
+    "event_word": ("1", "events of one period of the motion, three bits each", {}),
+    "impacts_per_period": ("1", "impacts per drive period", {}),
+    "mean_impact_speed": ("m/s", "mean speed just before impact", {}),
+    "amplitude": ("m", "half the range of the position", {}),
+    "x_max": ("m", "largest position", {}),
+    "x_min": ("m", "smallest position", {}),
+    "v_max": ("m/s", "largest velocity towards the upper barrier", {}),
+    "settle_time": ("s", "time from the start to capture by the attractor", {}),
+    "grazing_margin": ("m", "smallest distance to a barrier at a turning point that missed it", {}),
+}
+STARTS = {
+    "x0": ("m", "initial position", {}),
+    "v0": ("m/s", "initial velocity", {}),
+    "crank_angle": ("rad", "initial crank angle", {}),
+}
+# name: type, unit, meaning
+CATALOGUE = {
+    "slice": (np.int32, "1", "slice of the parameter axes, C order from 0"),
+    "attractor": (np.int32, "1", "label"),
+    "regime": (np.int8, "1", "regime, coded as in the map"),
+    "period": (np.int16, "1", "period in drive periods"),
+    "event_word": (np.int64, "1", "events of one period"),
+    "x": (np.float64, "m", "position at the section, crank angle 0"),
+    "v": (np.float64, "m/s", "velocity at the section, crank angle 0"),
+    "multiplier": (np.float64, "1", "largest modulus of the multipliers"),
+    "capture_radius": (np.float64, "1", "radius of the neighbourhood found to contract"),
+    "amplitude": (np.float64, "m", "half the range of the position"),
+    "x_max": (np.float64, "m", "largest position"),
+    "x_min": (np.float64, "m", "smallest position"),
+    "v_max": (np.float64, "m/s", "largest velocity"),
+    "impacts_per_period": (np.float64, "1", "impacts per drive period"),
+    "mean_impact_speed": (np.float64, "m/s", "mean speed before impact"),
+    "grazing_margin": (np.float64, "m", "smallest distance to a barrier missed"),
+    "count": (np.int64, "1", "points of the map captured"),
+}
+SAMPLES = {
+    "time": ("s", "time since the start", {}),
+    "x": ("m", "position", {}),
+    "v": ("m/s", "velocity", {}),
+    "mode": ("1", "mode", _flags(_MODES, 1)),
+    "drive": ("m", "position of the foot of the spring", {}),
+    "driver_x": ("m", "position of the driving body", {}),
+    "driver_v": ("m/s", "velocity of the driving body", {}),
+    "contact_force": ("N", "force of the barriers on the body", {}),
+    "energy": ("J", "energy of spring and bodies", {}),
+    "kinetic_energy": ("J", "kinetic energy", {}),
+    "potential_energy": ("J", "energy of the spring", {}),
+    "friction_loss": ("J", "energy lost to dry friction since the start", {}),
+    "damping_loss": ("J", "energy lost to viscous damping since the start", {}),
+    "contact_loss": (
+        "J",
+        "energy put into barriers since the start; of a pressed soft one, part comes back",
+        {},
+    ),
+    "drive_work": ("J", "work of drive and blows since the start", {}),
+}
+EVENTS = {
+    "kind": ("1", "kind of event", _flags(_EVENTS, 1)),
+    "time": ("s", "time of the event", {}),
+    "x": ("m", "position", {}),
+    "v_before": ("m/s", "velocity just before", {}),
+    "v_after": ("m/s", "velocity just after", {}),
+    "driver_x": ("m", "position of the driving body", {}),
+    "driver_v": ("m/s", "velocity of the driving body", {}),
+}
+REGIMES = tuple(_REGIMES.split())
+REASONS = tuple(_REASONS.split())
+
+
+def attributes(row: tuple[str, str, dict]) -> dict[str, object]:
+    """Return the attributes of a variable."""
+    unit, meaning, more = row
+    return {"units": unit, "long_name": meaning, **more}

@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// The machine at an instant, drawn from its case: body, spring, foot or driving body, barriers.
+import { INK, SOFT, hatch, line } from "./plot.js";
+
+const BODY = "#0072B2", DRIVER = "#8a949c", HIT = "#D55E00";
+
+/** Draws a machine. `state`: x, driver, hit (0 to 1, fading after an impact), side of it. `range` of positions. */
+export function drawMachine(context, width, height, machine, summary, range, state) {
+  const law = (machine.restoring || {}).law;
+  if (law === "pendulum") return drawPendulum(context, width, height, summary, state);
+  const size = Math.min(34, height * 0.3), left = size * (summary.two_bodies ? 2 : 3.2), right = width - 1.4 * size, ground = height - 22;
+  const scale = (right - left) / (range[1] - range[0]);
+  const place = (x) => left + (x - range[0]) * scale;
+  context.strokeStyle = INK;
+  context.lineWidth = 1;
+  line(context, 8, ground + 0.5, width - 8, ground + 0.5);
+  for (let x = 12; x < width - 8; x += 9) line(context, x, ground + 6, x + 6, ground);
+  if (summary.two_bodies) return drawPair(context, { place, size, ground, machine, summary, state });
+  const x = place(state.x);
+  for (const [barrier, side] of [[summary.barrier_upper, 1], [summary.barrier_lower, -1]]) {
+    if (barrier === null || !Number.isFinite(barrier)) continue;
+    const wall = place(barrier) + (side * size) / 2;
+    if (state.hit > 0 && state.side === side) {
+      context.fillStyle = `rgba(213, 94, 0, ${0.75 * state.hit})`;
+      context.fillRect(side > 0 ? wall : wall - 9, ground - 2.1 * size, 9, 2.1 * size);
+    }
+    hatch(context, wall, ground - 2.1 * size, 2.1 * size, side);
+  }
+  if (law !== "none") {
+    const foot = place(state.driver) - 2.1 * size;
+    const middle = ground - size / 2;
+    context.fillStyle = DRIVER;
+    context.fillRect(foot - 5, ground - size * 0.95, 6, size * 0.9);
+    spring(context, foot, x - size / 2, middle);
+  }
+  box(context, x, ground, size, state);
+  return undefined;
+}
+
+function box(context, x, ground, size, state) {
+  context.fillStyle = state.hit > 0.5 ? HIT : BODY;
+  context.fillRect(x - size / 2, ground - size, size, size);
+  context.strokeStyle = INK;
+  context.lineWidth = 1.2;
+  context.strokeRect(x - size / 2, ground - size, size, size);
+}
+
+function spring(context, from, to, y) {
+  const turns = 9, length = to - from, ends = Math.min(8, Math.abs(length) / 4);
+  context.beginPath();
+  context.moveTo(from, y);
+  context.lineTo(from + ends, y);
+  for (let i = 0; i < turns; i++) context.lineTo(from + ends + ((i + 0.5) / turns) * (length - 2 * ends), y + (i % 2 ? 7 : -7));
+  context.lineTo(to - ends, y);
+  context.lineTo(to, y);
+  context.strokeStyle = SOFT;
+  context.lineWidth = 1.4;
+  context.stroke();
+}
+
+/** The driven body lies on the driving one; stops stand on the ground or on the driving body. */
+function drawPair(context, { place, size, ground, machine, summary, state }) {
+  const carried = String((machine.body || {}).law).includes("backlash");
+  const top = ground - size * 0.55;
+  const x1 = place(state.driver), x2 = place(state.x), long = size * 3.4;
+  context.fillStyle = DRIVER;
+  context.fillRect(x1 - long / 2, top, long, size * 0.5);
+  context.strokeStyle = INK;
+  context.strokeRect(x1 - long / 2, top, long, size * 0.5);
+  for (const [barrier, side] of [[summary.barrier_upper, 1], [summary.barrier_lower, -1]]) {
+    if (barrier === null || !Number.isFinite(barrier)) continue;
+    const wall = place((carried ? state.driver : 0) + barrier) + (side * size) / 2;
+    hatch(context, wall, top - size * 1.1, size * 1.1, side);
+  }
+  box(context, x2, top, size, state);
+}
+
+function drawPendulum(context, width, height, summary, state) {
+  const pivot = [width / 2, height * 0.12], length = height * 0.7;
+  const end = (angle) => [pivot[0] + length * Math.sin(angle), pivot[1] + length * Math.cos(angle)];
+  context.strokeStyle = INK;
+  for (const barrier of [summary.barrier_upper, summary.barrier_lower]) {
+    if (barrier === null || !Number.isFinite(barrier)) continue;
+    context.lineWidth = 3;
+    const [x, y] = end(barrier);
+    line(context, pivot[0] + (x - pivot[0]) * 0.75, pivot[1] + (y - pivot[1]) * 0.75, x, y);
+  }
+  context.lineWidth = 2;
+  line(context, pivot[0] - 14, pivot[1], pivot[0] + 14, pivot[1]);
+  line(context, ...pivot, ...end(state.x));
+  context.beginPath();
+  context.arc(...end(state.x), 9, 0, 2 * Math.PI);
+  context.fillStyle = state.hit > 0.5 ? HIT : BODY;
+  context.fill();
+  context.stroke();
+}

@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// Files that are no maps: diagrams of sweeps, linked with maps, and points of lists.
+import { fill, h, prepare, words } from "./dom.js";
+import { classColour, css } from "./palette.js";
+import { INK, Plot, extent, line } from "./plot.js";
+
+const UP = "#0072B2", DOWN = "#E69F00", MANY = "#B9C0C6";
+
+export class SweepPanel {
+  /** `chosen(path, value)` is called when a value of the swept parameter is picked. */
+  constructor(file, answer, chosen) {
+    Object.assign(this, { file, answer, chosen, marked: null });
+    const { arrays, shapes } = answer;
+    this.key = Object.keys(arrays).find((name) => shapes[name].length === 1 && shapes.amplitude && shapes[name][0] === shapes.amplitude[1] && answer.variables[name] && name !== "amplitude");
+    const names = ["strobe_x", "strobe_v", "x_max", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period"].filter((name) => name in arrays);
+    this.select = h("select", { onchange: () => this.draw() }, ...names.map((name) => h("option", { value: name }, this.text(name))));
+    this.canvas = h("canvas", { class: "sweep", tabindex: "0", role: "application", "aria-roledescription": "diagram" });
+    this.told = h("p", { class: "note", "aria-live": "polite" });
+    this.element = h("section", { "aria-label": "Sweep" }, h("h2", {}, file.title || file.name),
+      h("div", { class: "bar" }, h("label", {}, "Show", this.select), h("span", { class: "note" }, "blue: run up, orange: run down, grey: many starts; click: this value in the map")), this.canvas, this.told);
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    const pick = (event) => event.buttons && this.pick(event.offsetX);
+    this.canvas.addEventListener("pointerdown", pick);
+    this.canvas.addEventListener("pointermove", pick);
+    this.canvas.addEventListener("keydown", (event) => this.keyed(event));
+  }
+
+  text(name) {
+    return { strobe_x: "stroboscopic x", strobe_v: "stroboscopic v", x_max: "largest and smallest x" }[name] || (this.answer.variables[name] || {}).label || name;
+  }
+
+  get values() { return this.answer.arrays[this.key]; }
+
+  mark(value) {
+    this.marked = value;
+    this.draw();
+  }
+
+  draw() {
+    if (!this.canvas.isConnected) return;
+    const [context, width, height] = prepare(this.canvas);
+    const { arrays, shapes, variables, limits } = this.answer, name = this.select.value;
+    const many = name.startsWith("strobe") ? [] : [`branch_${name}`, name === "x_max" ? "branch_x_min" : ""].filter((one) => one in arrays);
+    const runs = name === "x_max" ? ["x_max", "x_min"] : [name];
+    const unit = variables[name].unit ? ` (${variables[name].unit})` : "";
+    const plot = new Plot(context, width, height, extent(this.values), extent(...runs.map((one) => arrays[one]), ...many.map((one) => arrays[one])),
+      [(variables[this.key] || {}).label || words(this.key), `${this.text(name)}${unit}`]);
+    this.plot = plot;
+    plot.clip(() => {
+      for (const one of many) this.dots(plot, arrays[one], shapes[one][1], MANY, 1.4, 0);
+      for (const [direction, colour] of [[1, DOWN], [0, UP]]) {
+        for (const one of runs) {
+          const [, count, samples = 1] = shapes[one], size = count * samples;
+          this.dots(plot, arrays[one].subarray(direction * size, (direction + 1) * size), samples, colour, samples > 1 ? 0.9 : 2 - 0.7 * (1 - direction), 0);
+        }
+      }
+      context.strokeStyle = INK;
+      context.setLineDash([2, 3]);
+      for (const limit of (limits.lower || [])) line(context, plot.x(limit), plot.box[1], plot.x(limit), plot.box[1] + plot.box[3]);
+      context.setLineDash([]);
+      if (this.marked !== null) {
+        context.lineWidth = 2;
+        line(context, plot.x(this.marked), plot.box[1], plot.x(this.marked), plot.box[1] + plot.box[3]);
+      }
+    });
+    plot.frame();
+    this.canvas.setAttribute("aria-label", `Sweep diagram: ${this.text(name)} over ${words(this.key)}; arrow keys move the marked value, Enter shows it in the map`);
+  }
+
+  dots(plot, values, samples, colour, radius) {
+    const { context } = plot;
+    context.fillStyle = colour;
+    for (let i = 0; i < values.length; i++) {
+      const x = plot.x(this.values[Math.floor(i / samples)]), y = plot.y(values[i]);
+      if (y === y) context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);
+    }
+  }
+
+  pick(pixel) {
+    const [left, , width] = this.plot.box;
+    this.choose(this.plot.xs[0] + ((pixel - left) / width) * (this.plot.xs[1] - this.plot.xs[0]));
+  }
+
+  keyed(event) {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!step && event.key !== "Enter") return;
+    event.preventDefault();
+    const now = this.marked === null ? 0 : nearest(this.values, this.marked);
+    this.choose(this.values[Math.min(Math.max(now + (step || 0), 0), this.values.length - 1)]);
+  }
+
+  choose(value) {
+    const found = this.values[nearest(this.values, value)];
+    if (found === this.marked) return;
+    this.mark(found);
+    fill(this.told, this.chosen(this.key, found) || "");
+  }
+}
+
+function nearest(values, value) {
+  let best = 0;
+  for (let i = 1; i < values.length; i++) if (Math.abs(values[i] - value) < Math.abs(values[best] - value)) best = i;
+  return best;
+}
+
+/** Final states of a list of starts. */
+export class PointsPanel {
+  constructor(file, answer) {
+    Object.assign(this, { file, answer });
+    this.canvas = h("canvas", { class: "sweep", role: "img" });
+    const codes = answer.variables.regime.codes, counts = new Map();
+    for (const regime of answer.arrays.regime) counts.set(regime, (counts.get(regime) || 0) + 1);
+    const legend = [...counts].map(([regime, count]) => `${words(codes[regime] || regime)}: ${count}`).join("; ");
+    this.element = h("section", { "aria-label": "Points" }, h("h2", {}, file.title || file.name), this.canvas, h("p", { class: "note" }, `${answer.arrays.x.length} points at the end of the duration. ${legend}`));
+    this.canvas.setAttribute("aria-label", `States of ${answer.arrays.x.length} points at the end of the duration. ${legend}`);
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  draw() {
+    if (!this.canvas.isConnected) return;
+    const [context, width, height] = prepare(this.canvas);
+    const { x, v, regime } = this.answer.arrays;
+    const plot = new Plot(context, width, height, extent(x), extent(v), ["position x (m)", "velocity v (m/s)"]);
+    plot.clip(() => {
+      for (let i = 0; i < x.length; i++) {
+        context.fillStyle = css(classColour(regime[i]));
+        context.fillRect(plot.x(x[i]) - 1.3, plot.y(v[i]) - 1.3, 2.6, 2.6);
+      }
+    });
+    plot.frame();
+  }
+}

@@ -1,0 +1,228 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The functions of include/separatrix.h that find the attractors of a machine and label starts with them.
+module c_labels
+  use attractors, only: attractor_t, longest_period, most_coordinates
+  use basin, only: basin_variables, catalogue_t, label_slices, outcome_values, search_starts
+  use c_machine, only: prepare_machine, prepared_t, start_problem
+  use c_text, only: answer
+  use case_setup, only: span_of
+  use discover, only: discover_attractors, sort_attractors
+  use errors, only: error_t, fail
+  use grid, only: grid_t
+  use kinds, only: int64, wp
+  use model_type, only: model_t
+  use status, only: exit_resumable, exit_usage
+  use text, only: to_text
+  use trajectories, only: block_size, run_trajectories
+  use trajectory, only: outcome_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
+  implicit none
+  private
+
+  public :: separatrix_catalogue_open, separatrix_catalogue_search, separatrix_catalogue_size, separatrix_catalogue_attractor, &
+    separatrix_catalogue_number, separatrix_catalogue_free, separatrix_labels
+
+  !> Numbers of an attractor.
+  integer, parameter :: of_attractor = 21
+
+  !> What a catalogue's handle stands for.
+  type :: labeller_t
+    type(prepared_t) :: prepared
+    type(attractor_t), allocatable :: attractors(:)
+  end type labeller_t
+
+contains
+
+  integer(c_int) function separatrix_catalogue_open(model, chosen_count, chosen, values, catalogue, message, message_size) &
+      bind(c) result(code)
+    type(c_ptr), value :: model
+    integer(c_int), value :: chosen_count
+    integer(c_int), intent(in) :: chosen(chosen_count)
+    real(c_double), intent(in) :: values(chosen_count)
+    type(c_ptr), intent(out) :: catalogue
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: self
+    type(labeller_t), pointer :: new
+    type(error_t), allocatable :: error
+    call c_f_pointer(model, self)
+    catalogue = c_null_ptr
+    allocate (new)
+    allocate (new%attractors(0))
+    call prepare_machine(self, chosen + 1, values, span_of(self%the_case), .true., new%prepared, error)
+    if (allocated(error)) then
+      deallocate (new)
+    else
+      catalogue = c_loc(new)
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_catalogue_open
+
+  subroutine separatrix_catalogue_free(catalogue) bind(c)
+    type(c_ptr), value :: catalogue
+    type(labeller_t), pointer :: old
+    if (.not. c_associated(catalogue)) return
+    call c_f_pointer(catalogue, old)
+    deallocate (old)
+  end subroutine separatrix_catalogue_free
+
+  integer(c_int) function separatrix_catalogue_search(catalogue, start_count, start, stop_flag, message, message_size) &
+      bind(c) result(code)
+    type(c_ptr), value :: catalogue, start, stop_flag
+    integer(c_int), value :: start_count
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(labeller_t), pointer :: self
+    real(c_double), pointer :: given(:, :)
+    real(wp), allocatable :: starts(:, :)
+    type(error_t), allocatable :: error
+    integer :: i
+    call c_f_pointer(catalogue, self)
+    associate (prepared => self%prepared, settings => self%prepared%the_case%attractors)
+      if (start_count < 0) then
+        starts = search_starts(prepared%grid, settings%sample, settings%seed)
+      else if (start_count == 0) then
+        allocate (starts(3, 0))
+      else
+        call c_f_pointer(start, given, [3, start_count])
+        starts = given
+      end if
+      do i = 1, size(starts, 2)
+        if (asked_to_stop(stop_flag)) then
+          call fail(error, exit_resumable, 'stopped while searching for attractors')
+          exit
+        end if
+        if (len(start_problem(prepared, starts(:, i))) > 0) cycle
+        call discover_attractors(prepared%journey%moving, prepared%journey%span, starts(:, i:i), settings%max_period, &
+                                 self%attractors)
+      end do
+    end associate
+    call sort_attractors(self%attractors)
+    code = answer(error, message, message_size)
+  end function separatrix_catalogue_search
+
+  !> Whether the flag of the caller, who may set it from another thread, is not 0.
+  logical function asked_to_stop(stop_flag)
+    type(c_ptr), intent(in) :: stop_flag
+    integer(c_int), pointer, volatile :: flag
+    asked_to_stop = .false.
+    if (.not. c_associated(stop_flag)) return
+    call c_f_pointer(stop_flag, flag)
+    asked_to_stop = flag /= 0
+  end function asked_to_stop
+
+  integer(c_int) function separatrix_catalogue_size(catalogue) bind(c) result(count)
+    type(c_ptr), value :: catalogue
+    type(labeller_t), pointer :: self
+    call c_f_pointer(catalogue, self)
+    count = size(self%attractors)
+  end function separatrix_catalogue_size
+
+  integer(c_int) function separatrix_catalogue_attractor(catalogue, index, numbers, point_count, points, message, message_size) &
+      bind(c) result(code)
+    type(c_ptr), value :: catalogue
+    integer(c_int), value :: index
+    real(c_double), intent(out) :: numbers(of_attractor), points(most_coordinates, longest_period)
+    integer(c_int), intent(out) :: point_count
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(labeller_t), pointer :: self
+    type(error_t), allocatable :: error
+    call c_f_pointer(catalogue, self)
+    numbers = 0
+    points = ieee_value(1.0_wp, ieee_quiet_nan)
+    point_count = 0
+    if (index < 0 .or. index >= size(self%attractors)) then
+      call fail(error, exit_usage, 'attractor: found '//to_text(int(index))//', allowed 0 to '//to_text(size(self%attractors) - 1))
+    else
+      associate (one => self%attractors(index + 1), f => self%attractors(index + 1)%features)
+        numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
+                   one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
+                   f%grazing_margin, merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
+                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, allocated(self%prepared%journey%moving%pair))]
+        if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
+        points(:one%coordinates, :point_count) = one%points(:one%coordinates, :point_count)
+      end associate
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_catalogue_attractor
+
+  integer(c_int) function separatrix_catalogue_number(count, catalogues, axis_count, shape, message, message_size) bind(c) &
+      result(code)
+    integer(c_int), value :: count, axis_count
+    type(c_ptr), intent(in) :: catalogues(count)
+    integer(c_int), intent(in) :: shape(axis_count)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(error_t), allocatable :: error
+    type(catalogue_t), allocatable :: slices(:)
+    type(labeller_t), pointer :: one
+    type(grid_t) :: grid
+    integer :: i
+    if (product(int(shape, int64)) /= count .or. any(shape < 1)) then
+      call fail(error, exit_usage, 'shape: allowed '//to_text(int(count))//' slices in all')
+    else
+      grid%shape = shape
+      grid%parameter_axes = [(i, i=1, axis_count)]
+      grid%slices = count
+      allocate (slices(count))
+      do i = 1, count
+        call c_f_pointer(catalogues(i), one)
+        slices(i)%attractors = one%attractors
+      end do
+      call label_slices(grid, slices)
+      do i = 1, count
+        call c_f_pointer(catalogues(i), one)
+        one%attractors%id = slices(i)%attractors%id
+      end do
+    end if
+    code = answer(error, message, message_size)
+  end function separatrix_catalogue_number
+
+  integer(c_int) function separatrix_labels(catalogue, start_count, start, values, stop_flag, message, message_size) bind(c) &
+      result(code)
+    type(c_ptr), value :: catalogue, stop_flag
+    integer(c_int), value :: start_count
+    real(c_double), intent(in) :: start(3, start_count)
+    real(c_double), intent(inout) :: values(basin_variables, start_count)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(labeller_t), pointer :: self
+    type(error_t), allocatable :: error
+    integer :: first, last, points
+    call c_f_pointer(catalogue, self)
+    points = block_size(self%prepared%journey)
+    last = 0
+    do while (last < start_count)
+      first = last + 1
+      last = min(last + points, start_count)
+      if (asked_to_stop(stop_flag)) then
+        values(:, first:) = 0
+        call fail(error, exit_resumable, 'stopped after '//to_text(first - 1)//' of '//to_text(int(start_count))//' starts')
+        exit
+      end if
+      call label_block(self, start(:, first:last), values(:, first:last))
+    end do
+    code = answer(error, message, message_size)
+  end function separatrix_labels
+
+  !> Values of a few starts, in the order of the file; all 0 where a start is not allowed.
+  subroutine label_block(self, starts, values)
+    type(labeller_t), intent(in) :: self
+    real(wp), intent(in) :: starts(:, :)
+    real(wp), intent(inout) :: values(:, :)
+    type(outcome_t) :: outcomes(size(starts, 2))
+    integer, allocatable :: allowed(:)
+    integer :: i
+    allowed = pack([(i, i=1, size(starts, 2))], [(len(start_problem(self%prepared, starts(:, i))) == 0, i=1, size(starts, 2))])
+    call run_trajectories(self%prepared%journey, self%attractors, starts(:, allowed), outcomes(:size(allowed)))
+    values = 0
+    do i = 1, size(allowed)
+      values(:, allowed(i)) = outcome_values(outcomes(i))
+    end do
+  end subroutine label_block
+
+end module c_labels

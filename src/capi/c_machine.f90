@@ -1,0 +1,101 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The machine of a model with other values, ready for whole trajectories as the program flies them.
+module c_machine
+  use axis, only: axis_t
+  use basin, only: open_journey
+  use case_check, only: beyond
+  use case_setup, only: grid_of
+  use case_type, only: case_t
+  use contact_law, only: barrier_positions
+  use errors, only: error_t
+  use grid, only: grid_t, slice_motion
+  use jointed_section, only: start_of_jointed
+  use jointed_state, only: jointed_state_t
+  use kinds, only: int64, wp
+  use lanes, only: prepare_lanes
+  use model_type, only: check_values, model_t
+  use parameter_list, only: put_values
+  use span_check, only: check_periods
+  use trajectories, only: describe_all, describe_regime, journey_t
+  use trajectory, only: span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  implicit none
+  private
+
+  public :: prepare_machine, start_problem
+
+  !> The case with its values, the starts of its axes as a grid of one slice, and the machine.
+  type, public :: prepared_t
+    type(case_t) :: the_case
+    type(grid_t) :: grid
+    type(journey_t) :: journey
+  end type prepared_t
+
+contains
+
+  !> A model with `values` in the parameters `chosen`, for trajectories of `span`, of a drive period or more if they are
+  !> `to_label`. Code 64 or 65 if the values, or the machine with them, are refused.
+  subroutine prepare_machine(model, chosen, values, span, to_label, prepared, error)
+    type(model_t), intent(in) :: model
+    integer, intent(in) :: chosen(:)
+    real(wp), intent(in) :: values(:)
+    type(span_t), intent(in) :: span
+    logical, intent(in) :: to_label
+    type(prepared_t), intent(out) :: prepared
+    type(error_t), allocatable, intent(out) :: error
+    type(axis_t), allocatable :: axes(:)
+    integer :: i
+    call check_values(model, chosen, values, error)
+    if (allocated(error)) return
+    prepared%the_case = model%the_case
+    call put_values(prepared%the_case%laws, model%parameters(chosen), values)
+    allocate (axes(0))
+    do i = 1, size(model%the_case%axes)
+      associate (one => model%the_case%axes(i))
+        if (one%name == 'x0' .or. one%name == 'v0' .or. one%name == 'crank_angle') axes = [axes, one]
+      end associate
+    end do
+    prepared%grid = grid_of(prepared%the_case, axes)
+    if (to_label) then
+      call open_journey(prepared%grid, span, 0_int64, describe_all, prepared%journey, error)
+      return
+    end if
+    associate (journey => prepared%journey)
+      call slice_motion(prepared%grid, 0_int64, journey%moving, error)
+      if (.not. allocated(error)) call check_periods(span, journey%moving%machine%period, error)
+      if (allocated(error)) return
+      journey%span = span
+      journey%describe = describe_regime
+      call prepare_lanes(journey%moving, journey%flow)
+    end associate
+  end subroutine prepare_machine
+
+  !> Why a start [x0, v0, crank angle] cannot be flown; '' if it can.
+  pure function start_problem(prepared, start) result(problem)
+    type(prepared_t), intent(in) :: prepared
+    real(wp), intent(in) :: start(3)
+    character(len=:), allocatable :: problem
+    type(axis_t) :: no_axes(0)
+    type(jointed_state_t) :: state
+    real(wp) :: barriers(2)
+    problem = ''
+    if (all(ieee_is_finite(start)) .and. allocated(prepared%journey%moving%jointed)) then
+      state = start_of_jointed(prepared%journey%moving%jointed, start(1), start(2), start(3))
+      if (any(state%q /= state%q)) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
+    else if (all(ieee_is_finite(start))) then
+      ! The names of the barriers are looked up only where they may be needed.
+      associate (moving => prepared%journey%moving)
+        if (.not. allocated(moving%pair)) then
+          barriers = barrier_positions(moving%machine%contact)
+          if (start(1) <= barriers(1) .and. start(1) >= barriers(2)) return
+        end if
+      end associate
+      problem = beyond(prepared%the_case, no_axes, start(1))
+    else
+      problem = 'found a number that is not finite'
+    end if
+  end function start_problem
+
+end module c_machine

@@ -1,0 +1,349 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// Machines without a closed form, by Taylor series over the lanes: cubic springs and pendulums, drag,
+// friction that depends on speed or place, Dahl's friction. Every step expands the motion to a fixed order by
+// recurrences; its length follows from the last coefficients (Jorba & Zou 2005). Events are roots of the
+// polynomials; that nothing comes before them is proven by the Bernstein coefficients of the velocity.
+#ifndef SEPARATRIX_LANE_SERIES_HPP
+#define SEPARATRIX_LANE_SERIES_HPP
+
+#include "lane_restitution.hpp"
+#include "lane_stops.hpp"
+
+namespace {
+
+// At a ratio of exp(-2) between successive terms the term of this order is below rounding.
+enum { order = 18, most_root_rounds = 30 };
+
+// Coefficients of position and velocity in the time since the start of a step.
+struct expansion {
+  vec x[order + 1], v[order];
+};
+
+// Sum of a(i) b(k - i), i = 0 ... k. In two parts, so that additions need not wait for each other.
+LANE_LEAF vec product(const vec *a, const vec *b, int k) {
+  vec sum = a[0] * b[k], other = {};
+  int i = 1;
+  for (; i < k; i += 2) {
+    other += a[i] * b[k - i];
+    sum += a[i + 1] * b[k - i - 1];
+  }
+  if (i == k)
+    other += a[k] * b[0];
+  return sum + other;
+}
+
+// The same of a with itself.
+LANE_LEAF vec square_of(const vec *a, int k) {
+  vec sum = {}, other = {};
+  int i = 0;
+  for (; 2 * i + 2 < k; i += 2) {
+    sum += a[i] * a[k - i];
+    other += a[i + 1] * a[k - i - 1];
+  }
+  if (2 * i < k)
+    sum += a[i] * a[k - i];
+  sum = 2.0 * (sum + other);
+  return k % 2 == 0 ? sum + a[k / 2] * a[k / 2] : sum;
+}
+
+// Sum of i a(i) b(k - i)/k, i = 1 ... k: coefficient k of what has the derivative a' b.
+LANE_LEAF vec chain(const vec *a, const vec *b, int k) {
+  vec sum = {};
+  for (int i = 1; i <= k; i++)
+    sum += double(i) * a[i] * b[k - i];
+  return (1.0 / k) * sum;
+}
+
+// The motion of the foot of the spring.
+inline void expand_foot(const lane_machine &m, vec time, vec *foot) {
+  vec sine, cosine;
+  sine_cosine(time * m.drive_frequency, sine, cosine);
+  for (int k = 0; k < order - 1; k++)
+    foot[k] = {};
+  vec c = cosine, s = sine;
+  for (int n = 0; n < m.harmonics; n++) {
+    const double w = (n + 1) * m.drive_frequency;
+    vec part = m.cosine[n] * c + m.sine[n] * s, slope = m.sine[n] * c - m.cosine[n] * s;
+    for (int k = 0; k < order - 1; k++) {
+      foot[k] += part;
+      const double turn = w / (k + 1);
+      vec next = turn * slope;
+      slope = -turn * part;
+      part = next;
+    }
+    vec next = c * cosine - s * sine;
+    s = s * cosine + c * sine;
+    c = next;
+  }
+}
+
+// One Stribeck excess, E exp(-(|v|/v_s)^delta), delta 1 or 2, as a series.
+struct excess_series {
+  vec u[order], square[order], value[order];
+};
+
+inline vec next_excess(const lane_law &l, int i, mask within, vec d, const expansion &p, int k,
+                       excess_series &e) {
+  e.u[k] = (1 / l.velocity[i]) * d * p.v[k];
+  const bool squared = l.exponent[i] > 1.5;
+  e.square[k] = squared ? square_of(e.u, k) : e.u[k];
+  if (k == 0)
+    e.value[0] = pick(within, l.excess[i] * exponential(-e.square[0]), vec{});
+  else
+    e.value[k] = -chain(e.square, e.value, k);
+  return e.value[k];
+}
+
+// Expands the motion of every lane from where it is, slipping as `direction` says.
+inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
+  const lane_law &l = m.law;
+  const vec d = g.direction, viscous = l.viscous + l.asymmetric_viscous * d;
+  const vec level = pick(d > 0.0, l.dahl_level[0], l.dahl_level[1]);
+  vec foot[order], stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order],
+      factor[order];
+  excess_series excess[2];
+  expand_foot(m, g.time, foot);
+  p.x[0] = g.x;
+  p.v[0] = g.v;
+  for (int k = 0; k < order - 1; k++) {
+    stretch[k] = foot[k] - p.x[k];
+    if (k == 0)
+      stretch[0] += l.length;
+    vec a = l.stiffness * stretch[k] - viscous * p.v[k];
+    if (l.pendulum != 0) {
+      if (k == 0)
+        sine_cosine(stretch[0], sine[0], cosine[0]);
+      else {
+        sine[k] = chain(stretch, cosine, k);
+        cosine[k] = -chain(stretch, sine, k);
+      }
+      a += l.pendulum * sine[k];
+    }
+    if (l.cubic != 0) {
+      square[k] = square_of(stretch, k);
+      a += l.cubic * product(square, stretch, k);
+    }
+    if (l.quadratic != 0)
+      a -= l.quadratic * d * square_of(p.v, k);
+    dry[k] = {};
+    if (l.dahl_stiffness > 0) {
+      // z - level: its derivative is -(sigma/level) v times itself.
+      behind[k] =
+          k == 0 ? g.z - level : (-l.dahl_stiffness / (double(k) * level)) * product(p.v, behind, k - 1);
+      dry[k] = l.inverse_mass * (k == 0 ? g.z : behind[k]);
+    } else {
+      if (k == 0)
+        dry[0] = l.kinetic * d + l.asymmetric;
+      for (int i = 0; i < 2; i++)
+        if (l.excess[i] > 0)
+          dry[k] += d * next_excess(l, i, within, d, p, k, excess[i]);
+    }
+    factor[k] = m.friction_slope * p.x[k];
+    if (k == 0) {
+      factor[0] += 1.0;
+      a += l.offset;
+    }
+    a -= m.friction_slope != 0 ? product(factor, dry, k) : dry[k];
+    p.v[k + 1] = (1.0 / (k + 1)) * a;
+    p.x[k + 1] = (1.0 / (k + 1)) * p.v[k];
+  }
+  p.x[order] = (1.0 / order) * p.v[order - 1];
+}
+
+// Length of a step over which the terms shrink by exp(-2) from one to the next.
+inline vec step_length(const lane_machine &m, const expansion &p) {
+  const double smallest = 1e-290;
+  vec last = logarithm(magnitude(p.x[order]) + smallest),
+      before = logarithm(magnitude(p.x[order - 1]) + smallest);
+  const double scale = m.law.log_scale;
+  vec a = (1.0 / order) * (scale - last), b = (1.0 / (order - 1)) * (scale - before);
+  return exponential(pick(a < b, a, b) - 2.0);
+}
+
+// A polynomial over a step, in the fraction of the step, with its derivatives.
+template <int degree> inline void value_at(const vec (&c)[degree + 1], vec s, vec &f, vec &f1, vec &f2) {
+  f = c[degree];
+  f1 = {};
+  f2 = {};
+  for (int k = degree - 1; k >= 0; k--) {
+    f2 = f2 * s + f1;
+    f1 = f1 * s + f;
+    f = f * s + c[k];
+  }
+  f2 = 2.0 * f2;
+}
+
+// Where the polynomials of `seek` that are positive at 0 and not at `high` fall to zero, by Halley's steps
+// within brackets. Returns the lanes that were not found.
+template <int degree> inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, vec &root) {
+  vec low = {}, s = high;
+  for (int round = 0; round < most_root_rounds && any(seek); round++) {
+    vec f, f1, f2;
+    value_at<degree>(c, s, f, f1, f2);
+    put(low, f > 0.0, s);
+    put(high, f <= 0.0, s);
+    vec next = s - 2.0 * f * f1 / (2.0 * f1 * f1 - f * f2);
+    mask guided = (f1 < 0.0) & (next >= low) & (next <= high);
+    mask done = seek & ((guided & (magnitude(next - s) <= 1e-7 * high)) | (high - low <= 4e-16 * high));
+    put(root, done, pick(guided, next, s));
+    seek = seek & ~done;
+    s = pick(guided, next, 0.5 * (low + high));
+  }
+  return seek;
+}
+
+// Is a polynomial positive between 0 and `end`, where it may vanish? Its chord less the bound t (end - t)/2
+// times its second derivative is, if the value at one end exceeds half of that derivative; else its Bernstein
+// coefficients are asked.
+inline mask positive_until(const vec (&c)[order], mask asked, vec end) {
+  enum { degree = order - 1 };
+  vec b[order], power = end, curvature = {}, last = c[0];
+  b[0] = c[0];
+  for (int k = 1; k <= degree; k++) {
+    b[k] = c[k] * power;
+    power *= end;
+    last += b[k];
+    if (k > 1)
+      curvature += (0.5 * k * (k - 1)) * magnitude(b[k]);
+  }
+  mask plain = ((c[0] > curvature) & (last > -1e-15 * curvature)) | ((last > curvature) & (c[0] >= 0.0));
+  if (!any(asked & ~plain))
+    return plain;
+  // Divided by binomial coefficients, then summed along the rows of Pascal's triangle.
+  double binomial = 1;
+  for (int k = 1; k <= degree; k++) {
+    binomial = binomial * (degree - k + 1) / k;
+    b[k] = b[k] * (1 / binomial);
+  }
+  for (int level = 1; level <= degree; level++)
+    for (int k = degree; k >= level; k--)
+      b[k] += b[k - 1];
+  mask positive = (b[0] >= 0.0) & (b[1] > 0.0);
+  for (int k = 2; k < degree; k++)
+    positive = positive & (b[k] > 0.0);
+  return plain | positive;
+}
+
+// A step of the lanes: its polynomials in the fraction of the step, how far it goes, and what it ends with.
+struct stride_of_lanes {
+  vec x[order + 1], fall[order], length, end;
+  mask turns, hits, slows, lost;
+};
+
+// Looks for the first event of the lanes `flying` within a step of `length`.
+inline stride_of_lanes look_for_events(const lane_machine &m, const expansion &p, mask flying, mask within,
+                                       vec barrier, vec length, const lane_group &g) {
+  stride_of_lanes t;
+  vec d = g.direction, power = 1.0, gap[order + 1];
+  t.length = length;
+  for (int k = 0; k <= order; k++) {
+    t.x[k] = p.x[k] * power;
+    gap[k] = -d * t.x[k];
+    if (k < order)
+      t.fall[k] = d * p.v[k] * power;
+    power *= length;
+  }
+  gap[0] += d * barrier;
+  // Outside a Stribeck layer the series is that without it: the step ends at its edge.
+  vec level = pick(within, 0, m.law.edge);
+  t.fall[0] -= level;
+  vec w = t.fall[order - 1], free = gap[order];
+  for (int k = order - 2; k >= 0; k--)
+    w += t.fall[k];
+  for (int k = order - 1; k >= 0; k--)
+    free += gap[k];
+  t.end = 1.0;
+  mask slows = flying & (w <= 0.0);
+  t.lost = mask{};
+  if (any(slows)) {
+    t.lost = fall<order - 1>(t.fall, slows, vec(1.0), t.end);
+    vec f, f1, f2;
+    value_at<order>(gap, t.end, f, f1, f2);
+    put(free, slows, f);
+  }
+  t.hits = flying & ~t.lost & (free <= 0.0);
+  if (any(t.hits)) {
+    vec root = t.end;
+    t.lost = t.lost | fall<order>(gap, t.hits, t.end, root);
+    t.end = root;
+  }
+  slows = slows & ~t.hits;
+  t.turns = slows & within;
+  t.slows = slows & ~within;
+  return t;
+}
+
+// What follows the steps `due`. Returns the lanes that the scalar code must look at.
+inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, mask due, vec barrier,
+                               lane_group &g) {
+  vec x, scaled_v, scaled_a;
+  value_at<order>(t.x, t.end, x, scaled_v, scaled_a);
+  vec per_time = 1.0 / t.length, v = scaled_v * per_time, a = scaled_a * (per_time * per_time);
+  vec w = g.direction * v, gap = g.direction * (barrier - x);
+  put(v, t.slows, g.direction * m.law.edge);
+  vec factor = 1.0 + m.friction_slope * x, push = -g.direction * a - m.law.rest_friction * factor;
+  vec restitution = m.restitution;
+  if (any(due & t.hits))
+    restitution = restitution_at(m, w);
+  mask rare = due & ((t.turns & (push <= m.break_away * factor)) | (t.hits & (restitution * w <= m.slow)) |
+                     (magnitude(x) >= m.domain) | (factor <= 0.0));
+  due = due & ~rare;
+  mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
+  if (m.law.dahl_stiffness > 0) {
+    vec level = pick(g.direction > 0.0, m.law.dahl_level[0], m.law.dahl_level[1]);
+    vec done = exponential((-m.law.dahl_stiffness / level) * (x - g.x));
+    put(g.z, due, level + (g.z - level) * done);
+  }
+  put(g.flights, events, g.flights + 1.0);
+  put(g.impacts, hits, g.impacts + 1.0);
+  put(g.speed_sum, hits, g.speed_sum + w);
+  put(g.last_speed, hits, w);
+  put(g.margin, turns & (gap < g.margin), gap);
+  put(g.time, due, g.time + t.end * t.length);
+  put(g.x, due, pick(hits, barrier, x));
+  put(g.v, due, pick(turns, 0, pick(hits, -restitution * v, v)));
+  put(g.direction, events, -g.direction);
+  return rare;
+}
+
+// Steps on with all lanes of one vector until one has stopped or is left to the scalar code.
+void fly_in_series(const lane_machine &m, int first, lane_batch &batch) {
+  const double shortest = 1e-12 * m.period;
+  lane_group g;
+  load<true>(batch, first, g);
+  put(g.status, g.status == lane_fresh, lane_flying);
+  mask flying = g.status == lane_flying, sent = flying;
+  // A step that could not be proven is taken in halves.
+  vec limit = m.stride;
+  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+    flying = sent;
+    mask upward = g.direction > 0.0;
+    mask within = m.law.edge <= 0 ? ~mask{} : g.direction * g.v <= m.law.edge;
+    vec barrier = pick(upward, m.upper, m.lower);
+    expansion p;
+    expand(m, g, within, p);
+    vec length = step_length(m, p), ahead = g.until - g.time;
+    put(length, limit < length, limit);
+    mask last = length >= ahead;
+    put(length, last, ahead);
+    stride_of_lanes t = look_for_events(m, p, flying, within, barrier, length, g);
+    mask proven = flying & ~t.lost & positive_until(t.fall, flying, t.end);
+    // At a barrier that it moves towards, a body hits at once.
+    mask left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
+    proven = proven & ~left;
+    left =
+        left | (proven & take_series_events(m, t, proven, barrier, g)) | (flying & (g.flights >= g.budget));
+    limit = pick(proven, m.stride, 0.5 * t.end * length);
+    put(g.status, left, lane_left);
+    mask there = proven & ~left & last & ~(t.turns | t.hits | t.slows);
+    if (any(there))
+      stop_or_pass(m.period, m.domain, there, g.x, g.v, batch, g);
+  }
+  store<true>(g, first, batch);
+}
+
+} // namespace
+
+#endif

@@ -1,0 +1,227 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Where the mark of a motion, see `mark_of`, changes along a parameter: as an experiment sees it that moves in steps, and where the
+!> settled motion itself comes to an end. A step disturbs a motion; near the end of its branch the smallest disturbance is
+!> enough to throw it off, so that the two differ by more than the step.
+module sweep_limits
+  use attractors, only: most_coordinates
+  use errors, only: error_t
+  use grid, only: grid_t, machine_with
+  use kinds, only: wp
+  use motion, only: motion_t
+  use settling, only: settle, settled_t
+  use status, only: reason_time_over
+  use strobe, only: resume_strobe, section_point, strobe_at, strobe_t
+  use sweep, only: hold_parameter, hold_t
+  use trajectory, only: span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  public :: observe_limit, branch_end, follow_limit
+
+  !> What became of a settled motion that was followed.
+  integer, parameter, public :: limit_not_known = 0, limit_bracketed = 1, limit_beyond_range = 2
+  character(len=*), parameter, public :: limit_outcomes(0:2) = [character(len=12) :: 'not_known', 'bracketed', 'beyond_range']
+
+  !> Drive periods for which a motion that neither settles nor changes its mark is watched.
+  integer, parameter :: patience = 16384
+  !> Steps are halved down to this share of the tolerance: what a step disturbs must be small beside what is asked.
+  real(wp), parameter :: least_step = 0.125_wp
+  !> Most steps along a branch.
+  integer, parameter :: most_steps = 1000
+
+contains
+
+  !> Halves the interval in which the mark of a hold changes from `mark` while the parameter moves from `value` (state given)
+  !> to `beyond`, until it is at most `tolerance` wide or a hold has to be given up. Every hold starts from the last state
+  !> before the change and lasts as long as those of the sweep, settled or not. `next` comes in as the mark at `beyond` and goes
+  !> out as that behind the limit.
+  subroutine observe_limit(grid, span, path, value, beyond, state, mark, tolerance, next, bracket, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value, beyond, tolerance
+    type(strobe_t), intent(in) :: state
+    integer, intent(in) :: mark
+    integer, intent(inout) :: next
+    real(wp), intent(out) :: bracket(2)
+    type(error_t), allocatable, intent(out) :: error
+    type(hold_t) :: held
+    type(strobe_t) :: last
+    real(wp) :: near, far, middle
+    near = value
+    far = beyond
+    last = state
+    do while (abs(far - near) > tolerance)
+      middle = 0.5_wp*(near + far)
+      if (.not. (abs(middle - near) > 0 .and. abs(middle - far) > 0)) exit
+      call hold_parameter(grid, span, path, middle, last, 0.0_wp, 0, 0, held, error)
+      if (allocated(error)) return
+      if (held%reason /= reason_time_over) exit
+      if (held%mark == mark) then
+        near = middle
+        last = held%state
+      else
+        far = middle
+        next = held%mark
+      end if
+    end do
+    bracket = [min(near, far), max(near, far)]
+  end subroutine observe_limit
+
+  !> Follows the motion with `mark` whose mark has changed behind the last of the values in `course` that `settled` tells of, where the
+  !> state was `state`, from the last of them at which it had settled. A motion may have left its branch long before its mark
+  !> shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
+  subroutine branch_end(grid, path, course, settled, state, mark, longest, tolerance, bracket, outcome, error)
+    type(grid_t), intent(in) :: grid
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: course(:), tolerance
+    type(settled_t), intent(in) :: settled(:)
+    type(strobe_t), intent(in) :: state
+    integer, intent(in) :: mark, longest
+    real(wp), intent(out) :: bracket(2)
+    integer, intent(out) :: outcome
+    type(error_t), allocatable, intent(out) :: error
+    type(settled_t) :: there
+    real(wp) :: none(0)
+    integer :: from
+    bracket = ieee_value(1.0_wp, ieee_quiet_nan)
+    outcome = limit_not_known
+    from = size(settled)
+    there = settled(from)
+    if (there%period == 0) call settle_at(grid, path, course(from), none, state, longest, patience, there, error)
+    if (allocated(error)) return
+    if (there%period == 0 .and. there%mark == mark) return
+    do while (there%period == 0 .or. there%mark /= mark)
+      from = from - 1
+      if (from == 0) return
+      there = settled(from)
+    end do
+    call follow_limit(grid, path, course(from), course(size(course)), abs(course(from + 1) - course(from)), there, longest, &
+                      tolerance, bracket, outcome, error)
+  end subroutine branch_end
+
+  !> Follows a motion that has settled at `value` of the parameter `path` towards `last`, its settled motions being cycles of at
+  !> most `longest` drive periods. Steps begin as `step` and are halved where the motion does not settle with the same mark. The
+  !> end of the branch is between the last value at which it did and one, at most `tolerance` away where possible, at which
+  !> the mark is another. `outcome` is `limit_bracketed` then; else `bracket` is not numbers.
+  subroutine follow_limit(grid, path, value, last, step, settled, longest, tolerance, bracket, outcome, error)
+    type(grid_t), intent(in) :: grid
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value, last, step, tolerance
+    type(settled_t), intent(in) :: settled
+    integer, intent(in) :: longest
+    real(wp), intent(out) :: bracket(2)
+    integer, intent(out) :: outcome
+    type(error_t), allocatable, intent(out) :: error
+    type(settled_t) :: here, next, before
+    real(wp) :: near, far, behind, h, smallest
+    integer :: i
+    bracket = ieee_value(1.0_wp, ieee_quiet_nan)
+    outcome = limit_not_known
+    near = value
+    behind = value
+    here = settled
+    before = settled
+    h = sign(step, last - value)
+    do i = 1, most_steps
+      if (.not. abs(last - near) > 0) then
+        outcome = limit_beyond_range
+        return
+      end if
+      smallest = max(least_step*tolerance, 4*spacing(near))
+      far = near + h
+      if (abs(h) >= abs(last - near)) far = last
+      call settle_at(grid, path, far, predicted(before, here, behind, near, far), here%state, longest, 0, next, error)
+      if (allocated(error)) return
+      if (.not. keeps(next, here) .and. abs(far - near) <= smallest) then
+        call look_beyond(grid, path, near, last, step, here, longest, tolerance, far, next, error)
+        if (allocated(error)) return
+        if (next%mark == here%mark .and. next%period == 0) return
+        if (next%mark /= here%mark) then
+          bracket = [min(near, far), max(near, far)]
+          outcome = limit_bracketed
+          return
+        end if
+      end if
+      if (keeps(next, here)) then
+        behind = near
+        before = here
+        near = far
+        here = next
+        h = sign(min(2*abs(h), step), h)
+      else
+        h = (far - near)/2
+      end if
+    end do
+  end subroutine follow_limit
+
+  !> Whether a motion has settled with the mark of another.
+  pure logical function keeps(next, here)
+    type(settled_t), intent(in) :: next, here
+    keeps = next%period > 0 .and. next%mark == here%mark
+  end function keeps
+
+  !> What becomes of the motion that has settled at `near` where it can no longer be followed: goes `tolerance` further, or where
+  !> it settles too slowly for that, beside a fold, as far as it takes, up to `step`.
+  subroutine look_beyond(grid, path, near, last, step, here, longest, tolerance, far, next, error)
+    type(grid_t), intent(in) :: grid
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: near, last, step, tolerance
+    type(settled_t), intent(in) :: here
+    integer, intent(in) :: longest
+    real(wp), intent(out) :: far
+    type(settled_t), intent(out) :: next
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: none(0), width
+    ! A little less than the tolerance: sums are rounded.
+    width = max(min((1 - least_step)*tolerance, step), 4*spacing(near))
+    do
+      far = near + sign(min(width, abs(last - near)), last - near)
+      call settle_at(grid, path, far, none, here%state, longest, patience, next, error)
+      if (allocated(error)) return
+      if (next%period > 0 .or. next%mark /= here%mark .or. .not. next%near_cycle) return
+      if (width >= min(step, abs(last - near))) return
+      width = min(2*width, step)
+    end do
+  end subroutine look_beyond
+
+  !> The section point at which a branch should be at `far`, on the line through those at `behind` and `near`; without numbers
+  !> where there is no such line.
+  pure function predicted(before, here, behind, near, far) result(point)
+    type(settled_t), intent(in) :: before, here
+    real(wp), intent(in) :: behind, near, far
+    real(wp), allocatable :: point(:)
+    allocate (point(0))
+    if (.not. abs(near - behind) > 0 .or. before%period /= here%period .or. here%state%pair%mode /= 0) return
+    associate (a => before%state%state, b => here%state%state)
+      point = [b%x, b%v] + ([b%x, b%v] - [a%x, a%v])*((far - near)/(near - behind))
+    end associate
+  end function predicted
+
+  !> Where the motion at `value` ends that starts from a section point, or where that has no numbers from the state before.
+  subroutine settle_at(grid, path, value, point, state, longest, patience, settled, error)
+    type(grid_t), intent(in) :: grid
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value, point(:)
+    type(strobe_t), intent(in) :: state
+    integer, intent(in) :: longest, patience
+    type(settled_t), intent(out) :: settled
+    type(error_t), allocatable, intent(out) :: error
+    type(motion_t) :: moving
+    type(strobe_t) :: start
+    call machine_with(grid, path, value, moving, error)
+    if (allocated(error)) return
+    if (size(point) > 0) then
+      associate (contact => moving%machine%contact)
+        start = strobe_at(moving, [min(max(point(1), contact%lower), contact%upper), point(2)])
+      end associate
+    else
+      start = resume_strobe(moving, state, 0.0_wp)
+    end if
+    call settle(moving, start, longest, patience, settled)
+  end subroutine settle_at
+
+end module sweep_limits

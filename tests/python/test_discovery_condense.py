@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Condensed records say what their samples say: same least squares, same noise, and memory in proportion."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from separatrix.discovery.fitting import noise
+from separatrix.discovery.measured import tables
+from separatrix.discovery.measured.condense import (
+    NODES,
+    _basis,
+    _spread,
+    condense,
+    expected_left,
+    stride,
+)
+from separatrix.discovery.measured.records import make_record, read_record
+from separatrix.errors import SeparatrixError
+
+RATE, PERIOD, SIGMA = 10_000.0, 0.7, 1e-5
+KINK = 5.00037
+
+
+def moving(seconds: float = 7.0, sigma: float = SIGMA, seed: int = 0):
+    """A swing with a second harmonic, sampled far faster than it moves."""
+    t = np.arange(int(seconds * RATE)) / RATE
+    x = 0.2 * np.sin(2 * np.pi * t / PERIOD) + 0.02 * np.cos(4 * np.pi * t / PERIOD + 1)
+    x = x + sigma * np.random.default_rng(seed).standard_normal(t.size)
+    return make_record("moving", {"t": t, "x": x}, {"units": "s, m", "sampling_rate_hz": RATE})
+
+
+def condensed(record, sigma: float = SIGMA, kept=None, slow=None):
+    none = np.zeros(record.t.size, bool)
+    events = (none if kept is None else kept, none if slow is None else slow, 20.0)
+    return condense(record, PERIOD * RATE, sigma, events)
+
+
+@pytest.mark.parametrize("size", [16, 64, 256])
+def test_values_of_a_stretch_have_independent_errors_and_follow_their_degree(size):
+    q, nodes, values = _basis(size)
+    weights = values @ q[:, :NODES].T
+    covariance = weights @ weights.T
+    assert np.allclose(covariance, np.diag(_spread(size, 0.0) ** 2), atol=1e-12)
+    for degree in range(NODES + 1):
+        # one degree more than the polynomial has
+        assert np.allclose(weights @ np.arange(size) ** float(degree), nodes**degree, rtol=1e-9)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.8])
+def test_noise_with_memory_spreads_the_values_and_leaves_what_is_expected(memory):
+    size, random = 64, np.random.default_rng(3)
+    lags = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
+    drawn = random.standard_normal((20_000, size)) @ np.linalg.cholesky(memory**lags).T
+    q, _, values = _basis(size)
+    terms = drawn @ q[:, :NODES]
+    assert np.allclose(np.std(terms @ values.T, axis=0), _spread(size, memory), rtol=0.03)
+    rest = drawn - terms @ q[:, :NODES].T
+    power, product = expected_left(size, memory)
+    assert np.isclose(np.mean(np.sum(rest**2, axis=1)), power, rtol=0.02)
+    assert np.isclose(np.mean(np.sum(rest[:, 1:] * rest[:, :-1], axis=1)), product, atol=0.02 * power)
+
+
+def test_a_fit_to_the_rows_is_the_fit_to_the_samples():
+    """Value and error of every parameter of a motion that is linear in them."""
+    record = moving()
+    rows = condensed(record)
+    assert rows.t.size < record.t.size / 20
+
+    def fitted(t, x, size):
+        columns = [f(n * 2 * np.pi * t / PERIOD) for n in (1, 2) for f in (np.sin, np.cos)]
+        design = np.column_stack([*columns, t, np.ones(t.size)]) / size[:, None]
+        covariance = np.linalg.inv(design.T @ design)
+        return covariance @ design.T @ (x / size), np.sqrt(np.diag(covariance))
+
+    every, error = fitted(record.t, record.x, np.full(record.t.size, SIGMA))
+    few, same = fitted(rows.t, rows.x, SIGMA * rows.spread(0.0))
+    assert np.allclose(same, error, rtol=1e-3)
+    assert np.all(np.abs(few - every) < 0.05 * error)
+
+
+def test_what_stretches_leave_over_is_the_noise():
+    record = moving()
+    rows = condensed(record)
+    assert np.isclose(np.sqrt(rows.left.sum() / rows.freedom.sum()), SIGMA, rtol=0.01)
+
+
+def test_samples_stay_around_events_and_where_a_kink_shows():
+    record = moving()
+    kept, slow = np.zeros((2, record.t.size), bool)
+    kept[20_000:20_040] = True
+    slow[30_000:30_100] = True
+    # a kink that nobody flagged
+    record.x = record.x + np.where(record.t > KINK, 0.5 * (record.t - KINK), 0.0)
+    rows = condensed(record, kept=kept, slow=slow)
+    single = np.zeros(record.t.size, bool)
+    single[rows.place[rows.size == 1].astype(int)] = True
+    assert single[kept].all()
+    assert rows.size[(rows.place >= 30_000) & (rows.place < 30_100)].max() <= 16
+    assert rows.size[np.abs(rows.t - KINK) < 2e-4].max() == 1
+    assert np.median(rows.size[np.abs(rows.t - KINK) > 0.1]) >= 256
+
+
+def test_slow_motions_of_few_samples_are_left_alone():
+    assert stride(400) == 1
+    assert stride(1340) > 1
+
+
+def test_gaps_stay_gaps():
+    record = moving()
+    cut = make_record(
+        "gap",
+        {"t": np.delete(record.t, slice(9000, 9100)), "x": np.delete(record.x, slice(9000, 9100))},
+        {"units": "s, m"},
+    )
+    rows = condensed(cut)
+    assert len(rows.pieces) == 2
+    (first, last), (after, _) = rows.pieces
+    assert last == after
+    assert rows.t[last - 1] < 0.9 < 0.91 <= rows.t[after] + 1e-9
+    assert first == 0
+
+
+def test_records_that_cannot_be_condensed_are_refused_with_words(monkeypatch):
+    record = moving(1.0)
+    monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", 1000)
+    with pytest.raises(SeparatrixError, match="keep every 10th row"):
+        condensed(record, kept=np.ones(record.t.size, bool))
+
+
+def test_the_expected_noise_is_that_of_dense_projections():
+    """Against the projectors themselves, which nothing else forms any more."""
+    random = np.random.default_rng(0)
+    length, counts = 40, np.array([40, 33])
+    basis = np.zeros((2, length, 4))
+    for k, n in enumerate(counts):
+        basis[k, :n] = np.linalg.qr(random.standard_normal((n, 4)))[0]
+    powers, products = noise._expected(basis, counts)
+    left = np.stack(
+        [np.diag((np.arange(length) < n) * 1.0) - b @ b.T for n, b in zip(counts, basis, strict=True)]
+    )
+    shifted = left[:, 1:].transpose(0, 2, 1) @ left[:, :-1]
+    lags = np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
+    for i, memory in enumerate(noise._MEMORIES):
+        covariance = np.where(lags == 0, 1.0, np.sign(memory) ** lags * np.abs(memory) ** lags)
+        assert np.allclose(powers[i], np.sum(left * covariance, axis=(1, 2)))
+        assert np.allclose(products[i], np.sum(shifted * covariance, axis=(1, 2)))
+
+
+def test_reading_takes_memory_in_proportion_to_the_file(tmp_path):
+    path = tmp_path / "long.csv"
+    record = moving()
+    with path.open("w") as file:
+        file.write("# units: s, m\nt,x\n")
+        np.savetxt(file, np.column_stack([record.t, record.x]), fmt="%.9g", delimiter=",")
+    tracemalloc.start()
+    read = read_record(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.array_equal(read.t, np.loadtxt(path, delimiter=",", skiprows=2)[:, 0])
+    assert most < 20 * path.stat().st_size
+
+
+def test_too_long_a_record_is_refused_with_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "MOST_SAMPLES", 100)
+    path = tmp_path / "long.csv"
+    t = np.arange(1000) / 100
+    path.write_text("t,x\n" + "".join(f"{a:.4f},{np.sin(a):.6f}\n" for a in t))
+    with pytest.raises(SeparatrixError, match=r"about 1.02e\+03 samples.*every \d+th row"):
+        read_record(path)

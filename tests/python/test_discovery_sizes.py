@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Verdicts go by the size of a gap: the rate of sampling changes none, and what is closed is named."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from program import CASE
+from separatrix.discovery import Options, discover
+from separatrix.discovery.decision.judge import Judged, adequate, sizeable
+from separatrix.discovery.decision.remains import Remains, share_text
+from separatrix.discovery.fitting.machine import drive_nuisances
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import make_record
+from separatrix.discovery.measured.segments import padded
+from separatrix.library import Model
+
+SIGMA = 2e-4
+RATIOS = (0.8, 1.25, 0.95)
+
+
+def record_of(model: Model, rate: float, number: int, seconds: float = 8.0, phi_noise: float | None = None):
+    """The motion of a machine as a sensor of some rate sees it."""
+    t = np.arange(int(seconds * rate)) / rate
+    ratio = RATIOS[number]
+    start = np.array([(0.6, 0.5, 0.4)])
+    motion = model.segments(["drive.ratio"], np.array([ratio]), start, [0, t.size], t, derivatives=False)
+    random = np.random.default_rng([number, int(rate)])
+    columns = {"t": t, "x": motion.x + SIGMA * random.standard_normal(t.size)}
+    header = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "sensor_noise_sigma_m": SIGMA}
+    if phi_noise is not None:
+        frequency = model.drive_frequency({"drive.ratio": ratio})
+        columns["phi"] = 0.4 + frequency * t + phi_noise * random.standard_normal(t.size)
+        header["phi_noise_sigma_rad"] = phi_noise
+    return make_record(f"r{number}", columns, header)
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("effect", [{"quadratic_drag": {"coefficient": 0.1}}, {}])
+def test_one_motion_has_one_verdict_at_every_rate_of_sampling(effect):
+    base = Model.from_text(CASE)
+    true = base
+    for name, values in effect.items():
+        true = true.with_effect(name, values)
+    options = Options(
+        quick=True, most_effects=1, candidates=("quadratic_drag", "cubic_spring", "offset_force")
+    )
+    for rate in (125, 500, 2000, 8000):
+        records = [record_of(true, rate, number) for number in range(3)]
+        verdict = discover(base, records[:2], records[2:], options)
+        assert verdict["outcome"] == ("named" if effect else "none"), rate
+        assert verdict["effects"] == list(effect), rate
+        assert verdict["gap"]["held_out"]["after"] == pytest.approx(1, abs=0.15)
+        if effect:
+            assert min(one["closed"] for one in verdict["remains"]) > 0.9
+            found = verdict["parameters"]["effect.quadratic_drag.coefficient"]
+            assert abs(found["value"] - 0.1) < 5 * found["standard_error"]
+
+
+def candidate(training: float, left: float, samples: float, p: float = 0.0) -> Judged:
+    """An effect that gained so much and leaves so much, in chi^2, as no chance would."""
+    fit = SimpleNamespace(samples=samples, excess=left, sample_chi2=1 + left / samples)
+    prediction = SimpleNamespace(excess=left)
+    one = Judged(SimpleNamespace(fit=fit), prediction, training, training, np.zeros(0), 1)
+    one.ceiling = SimpleNamespace(p=p, closable=left)
+    return one
+
+
+def test_a_gap_that_is_closed_but_for_a_hundredth_is_adequate_whatever_the_rest_is():
+    """As 23854 to 1.14 at 20 000 samples; what leaves a tenth does not."""
+    assert adequate(candidate(training=1e8, left=2800, samples=20_000), Options())
+    assert not adequate(candidate(training=1e5, left=28_000, samples=20_000), Options())
+
+
+def test_what_is_far_below_the_noise_of_a_sample_is_no_gap():
+    options = Options()
+    fit = SimpleNamespace(samples=1e6)
+    assert not sizeable(2000, fit, options)
+    assert sizeable(3000, fit, options)
+    # with as few samples as were always enough
+    assert sizeable(7, SimpleNamespace(samples=2400), options)
+
+
+def test_what_remains_is_told_in_words():
+    said = Remains("training", 0.99994, 0.37, "velocity").text()
+    assert said == (
+        "in training, 99.994 % of the gap is closed; what remains is 0.37 times the noise of a sample, "
+        "mostly a force that depends on velocity"
+    )
+    assert share_text(1.0) == "100 %"
+    assert share_text(0.5) == "50 %"
+    assert "below the noise" in Remains("held_out", 0.999, 0.01, "").text()
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("noise", [1e-4, 0.0])
+def test_a_noisy_crank_angle_is_fitted_within_its_error(noise):
+    model = Model.from_text(CASE)
+    prepared = [prepare(record_of(model, 400, 0, phi_noise=noise), model)]
+    one = prepared[0]
+    count = one.record.t.size
+    assert one.phase_known
+    free = drive_nuisances(model, prepared)
+    assert ("nuisance:phase" in [each.path for each in free]) == bool(noise)
+    if not noise:
+        return
+    assert one.phase_error == pytest.approx(1e-4 / np.sqrt(count), rel=0.1)
+    assert one.clock_error == pytest.approx(
+        1e-4 * np.sqrt(12 / count) / one.record.duration / one.frequency, rel=0.1
+    )
+    first = np.arange(0, count - 100, 100)
+    problem = Problem(model, prepared, padded(0 * first, first, first + 100), free)
+    values = problem.values
+    starts = np.column_stack([one.record.x[first], np.zeros(first.size)])
+    off = values.copy()
+    place = [each.path for each in free].index("nuisance:phase")
+    off[place] = 3 * one.phase_error
+    # three errors cost 9 of chi^2, shared among the segments
+    column = problem.channels * 100 + [k for k, each in enumerate(free) if each.error].index(place)
+    found = problem.evaluate(off, starts)
+    assert np.sum(found.used * found.residual**2, axis=0)[column] == pytest.approx(9)
+    assert found.used[:, column].sum() == pytest.approx(1)
+    assert np.all(found.by_parameter[:, column, place] == 1 / one.phase_error)

@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a figure is asked to look like: ranges, slices, units, colours, marks, shading, films."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import separatrix as sx
+from figure_probes import V0, X0, colour_at, legend_texts
+from matplotlib.colors import to_rgb
+from PIL import Image
+from program import CASE
+from sample_files import write_basin, write_sweep
+from separatrix import cli, style
+from separatrix.errors import SeparatrixError
+from separatrix.figures import basin, section, sweep
+from separatrix.figures.animation import animate
+from separatrix.figures.look import Look
+from separatrix.open import open_result
+
+RATIOS = np.array([1.1, 1.2, 1.3])
+# Machado, Oliveira and Fernandes (2009) at full severity, on linear RGB
+BLINDNESS = {
+    "none": np.eye(3),
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "tritanopia": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+
+
+def lab(colour: str, seen: str = "none") -> np.ndarray:
+    """CIE L*a*b* of a colour as somebody sees it."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    linear = np.clip(np.array(BLINDNESS[seen]) @ linear, 0, 1)
+    to_xyz = [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.0721750],
+        [0.0193339, 0.119192, 0.9503041],
+    ]
+    xyz = np.array(to_xyz) @ linear / [0.95047, 1.0, 1.08883]
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def test_colours_differ_in_grey_and_for_the_colour_blind() -> None:
+    first = style.ATTRACTORS[:3]
+    assert min(abs(lab(a)[0] - lab(b)[0]) for a, b in itertools.combinations(first, 2)) > 20
+    regimes = [style.REGIMES[name] for name in ("non_impact", "impact", "mixed")]
+    assert min(abs(lab(a)[0] - lab(b)[0]) for a, b in itertools.combinations(regimes, 2)) > 20
+    for seen in BLINDNESS:
+        pairs = itertools.combinations(style.ATTRACTORS, 2)
+        assert min(np.linalg.norm(lab(a, seen) - lab(b, seen)) for a, b in pairs) > 20, seen
+
+
+def stack(path: Path) -> tuple[Path, np.ndarray]:
+    """A map over two starts and a ratio, of three attractors by chance."""
+    attractor = np.random.default_rng(4).integers(1, 4, (7, 4, 3))
+    axes = {"x0": X0, "v0": V0, "drive_ratio": RATIOS}
+    return write_basin(path, axes, attractor, regime_of=(0, 1, 2, 3)), attractor
+
+
+def drawn(path: Path, look: Look, field: str = "attractor") -> object:
+    with style.context(), open_result(path) as result:
+        return basin.basin_map(path, result, field, "title", look)
+
+
+def test_the_first_figure_of_a_map_shows_its_attractors(tmp_path: Path) -> None:
+    with open_result(stack(tmp_path / "b.h5")[0]) as result:
+        assert list(basin.figures(None, result, None, "title")) == ["attractor", "regime"]
+
+
+def test_ranges_slices_axes_and_units_show_the_same_points(tmp_path: Path) -> None:
+    path, attractor = stack(tmp_path / "b.h5")
+    look = Look(
+        region={"x0": (-0.5, 0.6)}, slice={"drive.ratio": 1.22}, axes=("v0", "x0"), units=["mm", "cm/s"],
+        colours=["#ff0000", "#00ff00", "#0000ff"],
+    )  # fmt: skip
+    figure = drawn(path, look)
+    assert len(figure.axes) == 1
+    assert "(mm)" in figure.axes[0].get_ylabel()
+    assert "(cm/s)" in figure.axes[0].get_xlabel()
+    inside = np.flatnonzero((X0 >= -0.5) & (X0 <= 0.6))
+    for i in inside:
+        for j, v in enumerate(V0):
+            expected = np.eye(3)[attractor[i, j, 1] - 1]
+            assert colour_at(figure, 100 * v, 1000 * X0[i]) == pytest.approx(expected, abs=0.01)
+    low, high = figure.axes[0].get_ylim()
+    assert (low, high) == pytest.approx((1000 * X0[inside[0]] - 150, 1000 * X0[inside[-1]] + 150))
+    # shares are those of what is shown
+    shown = attractor[inside, :, 1]
+    share = f"({100 * np.mean(shown == 1):.1f}"
+    assert legend_texts(figure)[0].split(": ")[1].find(share) > 0
+
+
+def test_shading_keeps_the_hue_and_gets_darker_with_time(tmp_path: Path) -> None:
+    attractor = np.ones((7, 4), int)
+    attractor[:, 2:] = 2
+    times = np.arange(28.0).reshape(7, 4)
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, attractor, fields={"settle_time": times})
+    figure = drawn(path, Look(shade=True, attractors=False))
+    assert "light: settles early" in figure.separatrix_caption
+    for columns in ((0, 1), (2, 3)):
+        order = sorted((times[i, j], i, j) for i in range(7) for j in columns)
+        lightness = [sum(colour_at(figure, X0[i], V0[j])) for _, i, j in order]
+        assert lightness == sorted(lightness, reverse=True)
+        assert lightness[0] > lightness[-1] + 0.5
+
+
+def test_captions_hold_every_number_of_the_machine(tmp_path: Path, library: Path) -> None:
+    result = sx.basin(sx.Case.from_text(CASE), x0=5, v0=5, progress=False)
+    caption = result.separatrix.plot().separatrix_caption
+    case = result.separatrix.case.resolved
+    for family in ("body", "restoring", "friction", "contact", "drive"):
+        for value in case[family].values():
+            for number in value if isinstance(value, list) else [value]:
+                if isinstance(number, float) and number != 0:
+                    assert f"{number:.6g}" in caption, (family, number)
+    assert "N/m" in caption
+    assert "duration 50 s" in caption
+    short = result.separatrix.plot(caption="short").separatrix_caption
+    assert "N/m" not in short
+    assert result.separatrix.plot(caption="none").separatrix_caption == ""
+
+
+def test_marks_lie_on_the_attractors(library: Path) -> None:
+    """A point on the section comes back after its period, at any crank angle of the starts."""
+    for angle in (0.0, 1.0, 6.0):
+        case = sx.Case.from_text(CASE).with_(start__crank_angle=angle)
+        result = sx.basin(case, x0=9, v0=9, progress=False)
+        found = list(section.points(result, {}))
+        assert len(found) == 2
+        for identity, xs, vs in found:
+            row = result.separatrix.attractors.loc[identity]
+            assert len(xs) == row["period"]
+            period = 2 * np.pi / case.model.drive_frequency({})
+            motion = sx.trajectory(case, xs[-1], vs[-1], duration=period * row["period"], samples=50)
+            end = float(motion.x[-1]), float(motion.v[-1])
+            assert end == pytest.approx((xs[-1], vs[-1]), abs=1e-5)
+            if angle == 0.0:
+                assert (xs[0], vs[0]) == (row["x"], row["v"])
+
+
+def test_marks_are_those_of_the_slice(library: Path) -> None:
+    result = sx.basin(sx.Case.from_text(CASE), drive__ratio=[1.1, 1.2, 1.3], x0=9, v0=9, progress=False)
+    one = sx.basin(sx.Case.from_text(CASE).with_(drive__ratio=1.2), x0=9, v0=9, progress=False)
+    mine = np.concatenate([points[1:] for points in section.points(result, {"drive_ratio": 1})], axis=1)
+    theirs = np.concatenate([points[1:] for points in section.points(one, {})], axis=1)
+    np.testing.assert_allclose(mine[:, mine[0].argsort()], theirs[:, theirs[0].argsort()], atol=1e-6)
+    figure = result.separatrix.plot("attractor", slice={"drive.ratio": 1.2}, units=["mm"])
+    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
+    assert sorted(x for line in marks for x in line.get_xdata()) == pytest.approx(sorted(1000 * mine[0]))
+
+
+def test_shares_over_a_parameter_add_up(tmp_path: Path) -> None:
+    path, attractor = stack(tmp_path / "b.h5")
+    with open_result(path) as result:
+        figure = basin.figures(None, result, "shares", "title")["shares"]
+    figure.canvas.draw()
+    ax = figure.axes[0]
+    for k, ratio in enumerate(RATIOS):
+        share = 100 * np.mean(attractor[..., k] == 1)
+        inside = np.clip(ratio, RATIOS[0] + 0.01, RATIOS[-1] - 0.01)
+        for height, identity in ((share - 3, 1), (share + 3, 2)):
+            expected = to_rgb(style.ATTRACTORS[identity - 1])
+            assert colour_at(figure, inside, height) == pytest.approx(expected, abs=0.02)
+    assert ax.get_ylim() == (0, 100)
+
+
+def test_a_film_has_a_frame_for_each_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, _ = stack(tmp_path / "b.h5")
+    with open_result(path) as result:
+        film = animate(result, "drive.ratio", tmp_path / "film.gif", "title", dpi=60)
+        with Image.open(film) as image:
+            assert image.n_frames == 3
+        monkeypatch.setenv("PATH", "")
+        with pytest.raises(SeparatrixError, match="needs ffmpeg"):
+            animate(result, "drive.ratio", tmp_path / "film.mp4", "title")
+        with pytest.raises(SeparatrixError, match="allowed are .gif and .mp4"):
+            animate(result, "drive.ratio", tmp_path / "film.avi", "title")
+        with pytest.raises(SeparatrixError, match="found the axes x0, v0, drive_ratio"):
+            animate(result, "contact.upper", tmp_path / "film.gif", "title")
+
+
+def test_runs_that_agree_are_drawn_as_one(tmp_path: Path) -> None:
+    path = write_sweep(tmp_path / "s.h5", np.linspace(0.7, 1.8, 45))
+    with style.context(), open_result(path) as result:
+        figure = sweep.bifurcation_diagram(result, "title")
+        drawn_points = sum(len(points.get_offsets()) for points in figure.axes[0].collections)
+        strobe = result["strobe_x"].values
+        agree = sweep._runs_agree(strobe)
+    assert agree.any()
+    assert not agree.all()
+    assert drawn_points == strobe[0].size + strobe[0][~agree].size
+    assert legend_texts(figure)[:3] == ["run-up", "run-down", "both alike"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--region", "x0=5:6"], "region x0: found 5 to 6, allowed -1 to 0.8"),
+        (["--region", "x0=1:0"], "is not A:B"),
+        (["--region", "y0=0:1"], "no axis 'y0'; there are x0, v0, drive_ratio"),
+        (["--slice", "drive.ratio=a"], "is not NAME=VALUE"),
+        (["--axes", "x0"], "is not two names"),
+        (["--axes", "x0,x0"], "axes: found x0, x0"),
+        (["--units", "inch"], "is not a list out of mm"),
+        (["--colours", "nocolour"], "which is no colour"),
+        (["--colour-map", "none", "--field", "settle_time"], "which matplotlib does not have"),
+        (["--size", "85"], "is not WxH"),
+        (["--size", "5x5"], "allowed 10 to 1000 mm"),
+        (["--style", "absent.mplstyle"], "no style of matplotlib"),
+        (["--animate", "x1"], "found the axes"),
+    ],
+)
+def test_wishes_that_make_no_sense_are_one_line(
+    tmp_path: Path, options: list, message: str, capsys: pytest.CaptureFixture
+) -> None:
+    path, _ = stack(tmp_path / "b.h5")
+    assert cli.main([str(path), "-o", str(tmp_path / "out"), *options]) == 64
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
+
+
+def test_a_style_file_and_svg_are_taken(tmp_path: Path) -> None:
+    path, _ = stack(tmp_path / "b.h5")
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("axes.edgecolor: 12ab34\n")
+    options = ["--style", str(sheet), "--formats", "svg", "--field", "regime"]
+    assert cli.main([str(path), "-o", str(tmp_path), *options]) == 0
+    assert "#12ab34" in (tmp_path / "b_regime.svg").read_text()

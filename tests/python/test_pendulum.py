@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A pendulum that goes round: files, logs and figures speak of an angle on a circle."""
+
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from separatrix.figures import trajectory
+from separatrix.open import open_result
+
+SMALL = ["--set", "axis[1].count=6", "--set", "axis[2].count=5"]
+
+
+@pytest.fixture
+def run(separatrix: Path, source_dir: Path, tmp_path: Path):
+    """Runs a command on the example and returns its file and what it printed."""
+
+    def run_it(command: str, *options: str) -> tuple[Path, str]:
+        out = tmp_path / f"{command}.h5"
+        case = source_dir / "examples" / "basin_pendulum.toml"
+        ended = subprocess.run(
+            [separatrix, command, case, "-o", out, *options], check=True, capture_output=True, text=True
+        )
+        return out, ended.stdout
+
+    return run_it
+
+
+def test_both_senses_of_rotation_are_found(run):
+    out, printed = run("basin", *SMALL)
+    with h5py.File(out) as file:
+        catalogue = file["catalogue"]
+        assert sorted(catalogue["rotation_number"][:]) == [-1.0, 1.0]
+        assert list(catalogue["period"][:]) == [1, 1]
+        assert set(np.unique(file["attractor"])) == {1, 2}
+        units = {name: file[name].attrs["units"] for name in ("x0", "v0", "x_max", "v_max", "amplitude")}
+    assert set(units.values()) == {b"rad", b"rad/s"} or set(units.values()) == {"rad", "rad/s"}
+    assert "amplitude 3.1416 rad" in printed
+    assert "rotation number -1.000" in printed
+
+
+def test_a_trajectory_goes_on_and_its_portrait_goes_round(run):
+    options = ["--set", 'start.x0="90 deg"', "--set", "run.duration=300.0"]
+    out, printed = run("trajectory", *options)
+    assert "3.14159 rad" in printed
+    with open_result(out) as result:
+        assert abs(result.attrs["rotation_number"]) == 1
+        x = result["x"].values
+        assert np.abs(np.diff(x)).max() < np.pi
+        assert np.ptp(x) > 20 * np.pi
+        figure = trajectory.phase_portrait(result, "pendulum")
+        drawn = figure.axes[0].lines[0].get_xdata()
+        assert np.nanmax(np.abs(drawn)) <= np.pi
+        assert np.isnan(drawn).sum() >= 9
+        assert "rad" in figure.axes[0].get_xlabel()
+
+
+def test_lengths_are_refused_where_an_angle_is_meant(separatrix, source_dir, tmp_path):
+    case = source_dir / "examples" / "basin_pendulum.toml"
+    command = [separatrix, "basin", case, "-o", tmp_path / "a.h5", "--set", 'start.x0="1 m"']
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 65
+    assert "deg" in ended.stderr
+
+
+def test_a_sweep_counts_the_turns(run, source_dir, separatrix, tmp_path):
+    text = (source_dir / "examples" / "basin_pendulum.toml").read_text().split("[[axis]]")[0]
+    text += '[sweep]\nparameter = "friction.damping"\nfrom = 0.5\nto = 0.52\ncount = 2\nsamples = 8\nstarts = [0, 0]\n'
+    text += "x0 = [0, 0]\nv0 = [0, 0]\n"
+    case = tmp_path / "sweep.toml"
+    case.write_text(text)
+    out = tmp_path / "sweep.h5"
+    subprocess.run([separatrix, "sweep", case, "-o", out], check=True, capture_output=True)
+    with h5py.File(out) as file:
+        assert (np.abs(file["rotation_number"][:]) == 1).all()
+        assert (file["period"][:] == 1).all()
+        assert (np.abs(file["strobe_x"][:]) <= np.pi).all()

@@ -1,0 +1,378 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The viewer in headless Chromium: skipped without it or Playwright (scripts/bootstrap.sh --browser)."""
+
+import base64
+import os
+import re
+import shutil
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import succeed
+from separatrix.view.export import export_page
+from separatrix.view.protocol import Desk
+from separatrix.view.server import Server
+from test_view_server import start_command
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+pytestmark = [
+    pytest.mark.usefixtures("library"),
+    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed"),
+]
+FLAGS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
+    "--disable-background-networking", "--disable-component-update",
+]  # fmt: skip
+SIZE = {"width": 1280, "height": 900}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    """One Chromium for all tests."""
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where views are kept."""
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.fixture(scope="module")
+def server(results: dict[str, Path], folder: Path, build_dir: Path) -> Iterator[Server]:
+    """A viewer of a map, a stack, a sweep and a map over parameters."""
+    os.environ.setdefault("SEPARATRIX_LIBRARY", str(build_dir / "lib" / "libseparatrix.so"))
+    desk = Desk([results[kind] for kind in ("map", "stack", "sweep", "plane")], folder)
+    with Server(desk) as server:
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+        yield server
+        server.shutdown()
+    desk.close()
+
+
+@pytest.fixture
+def page(browser: object, server: Server) -> Iterator[object]:
+    """A page of the viewer; nothing may be written to its console."""
+    page = browser.new_page(viewport=SIZE, accept_downloads=True)
+    said: list[str] = []
+    # The tests read pixels back, which the viewer never does.
+    page.on("console", lambda one: said.append(one.text) if "willReadFrequently" not in one.text else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto(server.address)
+    page.wait_for_selector("canvas.map")
+    ready(page)
+    yield page
+    assert said == []
+    page.close()
+
+
+def ready(page: object) -> None:
+    """Wait until the picture is there."""
+    wait(page, "v.map && v.map.painter && v.map.tiles.overview().length > 0 && !v.map.pending")
+
+
+def wait(page: object, condition: str) -> None:
+    """Poll a condition on the viewer `v`: waiting inside the page is against its content security policy."""
+    for _ in range(400):
+        if look(page, f"Boolean(v && ({condition}))"):
+            return
+        page.wait_for_timeout(25)
+    raise AssertionError(condition)
+
+
+def look(page: object, expression: str) -> object:
+    """Return an expression of the viewer `v`."""
+    return page.evaluate(
+        f"() => {{ const v = document.getElementById('separatrix').viewer; return {expression}; }}"
+    )
+
+
+def at_point(page: object, i: float, j: float) -> tuple[float, float]:
+    """Return the pixel of an index coordinate within the map."""
+    return tuple(look(page, f"[v.map.px({i}), v.map.py({j})]"))
+
+
+def colour_at(page: object, x: float, y: float) -> list[int]:
+    """Return the colour of a pixel of the map."""
+    return look(page, f"Array.from(v.canvas.getContext('2d').getImageData({x}, {y}, 1, 1).data).slice(0, 3)")
+
+
+def test_pixels_have_the_colours_of_the_file(page: object, results: dict[str, Path], server: Server) -> None:
+    """The token is not left in the address; points of the map, and what is said about them."""
+    assert server.token not in page.url
+    with h5py.File(results["map"]) as file:
+        labels, times = file["attractor"][()], file["settle_time"][()]
+    shown = {0: [214, 217, 220], 1: [0, 114, 178], 2: [230, 159, 0]}
+    chance = np.random.default_rng(2)
+    marks = look(page, "v.map.marks.map((m) => [m.x, m.y])")
+    assert len(marks) >= 2
+    for i, j in chance.integers(0, labels.shape, (40, 2)):
+        x, y = at_point(page, i, j)
+        if colour_at(page, x + 3, y + 3) != shown[labels[i, j]]:
+            near = [abs(a / 1.1 * 18 - i) < 1 and abs((b + 6) / 12 * 30 - j) < 1 for a, b in marks]
+            assert any(near), (i, j)
+    i, j = 4, 20
+    page.locator("canvas.map").hover(position=dict(zip("xy", at_point(page, i, j), strict=True)))
+    page.wait_for_selector(".values :text('settle time')")
+    text = page.locator(".values").inner_text()
+    assert f"attractor {labels[i, j]}" in text
+    assert f"settle time {float(f'{times[i, j]:.5g}'):g}" in text
+
+
+def test_a_click_shows_the_motion_of_points(
+    page: object, server: Server, separatrix: Path, tmp_path: Path, results: dict[str, Path]
+) -> None:
+    """Numbers to the bit, downloads, time, machine; then the same by keyboard alone."""
+    x, y = at_point(page, 6, 18)
+    page.locator("canvas.map").click(position={"x": x, "y": y})
+    wait(page, "v.panel.motion")
+    start = look(page, "v.panel.motion.start")
+    (tmp_path / "one.csv").write_text(f"x0,v0\n{start[0]!r},{start[1]!r}\n")
+    succeed(
+        separatrix,
+        "points",
+        results["map"].parent / "case.toml",
+        "--list",
+        "one.csv",
+        "-o",
+        "end.h5",
+        folder=tmp_path,
+    )
+    with h5py.File(tmp_path / "end.h5") as file:
+        assert look(page, "[v.panel.motion.summary.x, v.panel.motion.summary.v]") == [
+            file["x"][0],
+            file["v"][0],
+        ]
+    with page.expect_download() as caught:
+        page.get_by_role("button", name="Events as CSV").click()
+    assert Path(caught.value.path()).read_text().startswith("kind,time,x,v_before,v_after\n")
+    with page.expect_download() as caught:
+        page.get_by_role("button", name="Case file").click()
+    assert "[start]\n" in Path(caught.value.path()).read_text()
+    page.get_by_role("button", name="Play").click()
+    wait(page, "v.panel.time > 0")
+    page.get_by_role("button", name="Pause").click()
+    before = look(page, "v.panel.motion.start")
+    page.locator("canvas.map").focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowDown", "Enter"):
+        page.keyboard.press(key)
+    wait(page, f"v.panel.motion.start[0] !== {before[0]!r}")
+    page.keyboard.press("+")
+    wait(page, "v.map.view.a1 - v.map.view.a0 < 12")
+    page.keyboard.press("0")
+    assert look(page, "v.map.view.a0") == -0.5
+
+
+def test_zooms_beyond_the_file_and_keeps(page: object, folder: Path) -> None:
+    """Live labels at the resolution of the screen, stopped by a pan, then kept as a file that opens."""
+    page.set_viewport_size({"width": 640, "height": 600})
+    box = page.locator("canvas.map").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.5)
+    for _ in range(4):
+        page.mouse.wheel(0, -300)
+    wait(page, "v.live.picture && v.live.picture.stride === 1")
+    assert "computed now, not in the file" in page.locator("[role=status]").inner_text()
+    assert set(look(page, "Array.from(new Set(v.live.picture.arrays.attractor))")) <= {0, 1, 2}
+    number = look(page, "v.live.number")
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + box["height"] * 0.55, steps=4)
+    page.mouse.up()
+    wait(page, f"v.live.number > {number} && v.live.picture.number > {number} && v.live.picture.stride === 1")
+    page.get_by_role("button", name="Keep this view").click()
+    wait(page, "v.told.textContent.startsWith('wrote')")
+    kept = look(page, "v.told.textContent").removeprefix("wrote ")
+    with h5py.File(folder / kept) as file:
+        shown = look(page, "Array.from(v.live.picture.arrays.attractor)")
+        np.testing.assert_array_equal(file["attractor"][()].T.ravel(), shown)
+
+
+def test_variables_slices_legend_and_sweep(page: object) -> None:
+    """Every variable; a class hidden and shown; the slider of a stack; a click in the sweep moves it."""
+    show = page.get_by_label("Show").first
+    count = show.locator("option").count()
+    for i in range(count):
+        show.select_option(str(i))
+        ready(page)
+    show.select_option("1")
+    ready(page)
+    button = page.locator(".legend button.class").first
+    button.click()
+    assert page.locator(".legend button.class").first.get_attribute("aria-pressed") == "false"
+    page.locator(".legend button.class").first.click()
+    page.get_by_label("Map").first.select_option("1")
+    ready(page)
+    slider = page.locator(".slider input")
+    slider.focus()
+    before = look(page, "v.at.join()")
+    page.keyboard.press("ArrowRight")
+    wait(page, f"v.at.join() !== '{before}'")
+    sweep = page.locator("canvas.sweep")
+    sweep.scroll_into_view_if_needed()
+    place = look(page, "[v.sweeps[0].plot.x(1.1), v.sweeps[0].plot.box[1] + 40]")
+    sweep.click(position={"x": place[0], "y": place[1]})
+    wait(page, "v.at[0] === 0")
+    assert look(page, "v.sweeps[0].marked") == pytest.approx(1.1)
+    page.get_by_label("Map").first.select_option("0")
+    ready(page)
+    place = look(page, "[v.sweeps[0].plot.x(1.0), v.sweeps[0].plot.box[1] + 40]")
+    sweep.click(position={"x": place[0], "y": place[1]})
+    wait(page, "v.with['drive.ratio'] !== undefined && v.live.picture && v.live.picture.stride > 0")
+    page.get_by_label("Map").first.select_option("2")
+    ready(page)
+    assert look(page, "v.variable.name") == "regime"
+
+
+def test_two_tabs_and_a_server_that_stops(browser: object, results: dict[str, Path], library: Path) -> None:
+    """Both tabs work; when the server is gone they say so."""
+    process, address = start_command(results)
+    context = browser.new_context(viewport=SIZE)
+    pages = [context.new_page() for _ in range(2)]
+    for page in pages:
+        page.goto(address)
+        page.wait_for_selector("canvas.map")
+        ready(page)
+    for page in pages:
+        page.locator("canvas.map").click(position={"x": 300, "y": 200})
+        wait(page, "v.panel.motion")
+    pages[0].reload()
+    pages[0].wait_for_selector("canvas.map")
+    ready(pages[0])
+    stranger = context.new_page()
+    stranger.goto(address.partition("#")[0])
+    stranger.wait_for_selector(".problem:not([hidden])")
+    assert "token" in stranger.locator(".problem").inner_text()
+    process.kill()
+    process.wait()
+    for page in pages:
+        page.locator("canvas.map").click(position={"x": 350, "y": 250})
+        page.wait_for_selector(".problem:not([hidden])")
+        assert "does not answer" in page.locator(".problem").inner_text()
+    context.close()
+
+
+def test_the_exported_page_works_offline(browser: object, results: dict[str, Path], tmp_path: Path) -> None:
+    """One file, no network, no outside address: map, table, sweep, stored motions, empty console."""
+    path = tmp_path / "page.html"
+    size = export_page([results["map"], results["stack"], results["sweep"]], path, 36)
+    assert size < 3e6
+    text = path.read_text()
+    assert re.findall(r"https?://[^\s\"'<]+", text) == []
+    context = browser.new_context(viewport=SIZE, offline=True)
+    page = context.new_page()
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(path.as_uri())
+    page.wait_for_selector("canvas.map")
+    ready(page)
+    page.locator("canvas.map").click(position={"x": 400, "y": 250})
+    wait(page, "v.panel.motion")
+    assert look(page, "v.panel.motion.arrays.x.length") > 1000
+    assert page.locator("table tbody tr").count() >= 2
+    page.get_by_label("Map").first.select_option("1")
+    ready(page)
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    context.close()
+
+
+def test_can_be_read_and_used_by_everybody(page: object) -> None:
+    """Names of controls, contrast of texts, no width that scrolls sideways, distinct colours in grey."""
+    unnamed = page.evaluate(
+        """() => Array.from(document.querySelectorAll('button, select, input, canvas'))
+           .filter((e) => e.offsetParent && !(e.getAttribute('aria-label') || e.textContent.trim()))
+           .filter((e) => !e.closest('label')).map((e) => e.outerHTML)"""
+    )
+    assert unnamed == []
+    poor = page.evaluate(
+        """() => {
+          const linear = (v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+          const weights = [0.2126, 0.7152, 0.0722];
+          const light = (c) => weights.reduce((sum, weight, i) => sum + weight * linear(c[i] / 255), 0);
+          const parse = (text) => text.match(/[\\d.]+/g).map(Number);
+          const back = (e) => {
+            for (; e; e = e.parentElement) {
+              const c = parse(getComputedStyle(e).backgroundColor);
+              if (c.length === 3 || c[3] > 0) return c;
+            }
+            return [255, 255, 255];
+          };
+          const written = (e) => Array.from(e.childNodes).some((n) => n.nodeType === 3 && n.data.trim());
+          const ratio = (e) => {
+            const [a, b] = [light(parse(getComputedStyle(e).color)), light(back(e))];
+            return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+          };
+          return Array.from(document.querySelectorAll('.separatrix *'))
+            .filter((e) => e.offsetParent && written(e) && ratio(e) < 4.5)
+            .map((e) => e.outerHTML.slice(0, 80));
+        }"""
+    )
+    assert poor == []
+    assert "period" in page.locator("canvas.map").get_attribute("aria-label")
+    for width in (1280, 700, 320):
+        page.set_viewport_size({"width": width, "height": 800})
+        page.wait_for_timeout(100)
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+    grey = [0.2126 * r + 0.7152 * g + 0.0722 * b for r, g, b in ((0, 114, 178), (230, 159, 0))]
+    assert abs(grey[0] - grey[1]) > 50
+
+
+def test_the_widget_of_notebooks(browser: object, results: dict[str, Path]) -> None:
+    """The same module over a kernel's messages: map, motion, stopped work, refusals."""
+    widget = pytest.importorskip("separatrix.view.widget", reason="anywidget is not installed")
+    viewer = widget.Viewer(results["map"])
+    sent: list[tuple[dict, list[bytes]]] = []
+    viewer.send = lambda message, buffers=None: sent.append((message, buffers or []))
+
+    def kernel(message: dict) -> list:
+        sent.clear()
+        viewer._answer(message)
+        reply, buffers = sent[-1]
+        return [reply, base64.b64encode(buffers[0]).decode() if buffers else ""]
+
+    page = browser.new_page(viewport=SIZE)
+    said: list[str] = []
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.expose_function("kernel", kernel)
+    page.set_content(f"<style>{viewer._css}</style><div id='cell'></div>")
+    page.evaluate(
+        """async (text) => {
+          const listeners = [];
+          const model = { on: (name, call) => listeners.push(call), send: async (message) => {
+            const [reply, data] = await window.kernel(message);
+            const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+            for (const call of listeners) call(reply, data ? [new DataView(bytes.buffer)] : []);
+          } };
+          const module = await import(URL.createObjectURL(new Blob([text], { type: 'text/javascript' })));
+          await module.default.render({ model, el: document.getElementById('cell') });
+          document.querySelector('.separatrix').id = 'separatrix';
+        }""",
+        viewer._esm,
+    )
+    ready(page)
+    page.locator("canvas.map").click(position={"x": 300, "y": 200})
+    wait(page, "v.panel.motion")
+    assert kernel({"id": 1, "name": "tile", "parameters": {}})[0]["status"] == 400
+    assert kernel({"id": 2})[0]["status"] == 400
+    assert said == []
+    page.close()
+
+
+def test_answers_are_as_documented(source_dir: Path) -> None:
+    """Every request is in the documentation."""
+    from separatrix.view.protocol import REQUESTS
+
+    text = (source_dir / "docs" / "viewer.md").read_text()
+    for name in REQUESTS:
+        assert f"`{name}`" in text
