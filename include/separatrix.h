@@ -111,10 +111,9 @@ int separatrix_segments(const separatrix_model *model, int chosen_count, const i
 enum {
   separatrix_sample_numbers = 13,
   separatrix_event_numbers = 7,
-  separatrix_summary_numbers = 25,
-  separatrix_attractor_numbers = 21,
+  separatrix_summary_numbers = 26,
+  separatrix_attractor_numbers = 54,
   separatrix_label_numbers = 13,
-  separatrix_section_points = 64,
   separatrix_section_coordinates = 16
 };
 
@@ -137,16 +136,18 @@ enum {
  *   sample [sample_capacity][13]
  *     time [s], x [m], v [m/s], mode (1 slip_plus, 2 slip_minus, 3 stick, 4 upper_barrier, 5 lower_barrier,
  *     6 held); position of the foot of the spring [m] and not a number, of two bodies position [m] and
- * velocity [m/s] of the driving one; force of soft barriers on the body [N]; energy [J], kinetic energy [J],
- * energy lost since the start to friction, damping and contacts [J], put in by the drive [J] event
- * [event_capacity][7] kind (docs/file-format.md), time [s], x [m], v before and after [m/s], of two bodies
- * position and velocity of the driving one, otherwise not numbers summary [25] as `points`: x [m], v [m/s],
- * number of impacts, speed before the last [m/s], regime, reason (the codes of docs/file-format.md). As
- * `trajectory`, over the window at the end: amplitude [m], largest and smallest x [m], largest v [m/s],
- * impacts per drive period, mean impact speed [m/s]. The machine: drive period [s], upper and lower barrier
- * [m] (infinite: none), 1 if they are soft, 1 if it has two bodies. Reason of the `trajectory`; its energy
- * [J] at the start, lost to friction, damping and contacts, put in; if it came to its end, energy at the end
- * and what is missing in this book, otherwise not numbers */
+ *     velocity [m/s] of the driving one; force of soft barriers on the body [N]; energy and kinetic energy
+ * [J]; lost since the start to friction, to damping and to contacts, put in by the drive [J] event
+ * [event_capacity][7] kind (docs/file-format.md), time [s], x [m], v before and after [m/s]; of two bodies
+ * position and velocity of the driving one, otherwise not numbers summary [26] As `points`: x [m], v [m/s],
+ * number of impacts, speed before the last [m/s], regime, reason (codes of docs/file-format.md). As
+ * `trajectory`, over the cycle that the motion comes to, or the window at the end: amplitude [m], largest and
+ * smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s]. The machine: drive
+ * period [s], upper and lower barrier [m] (infinite: none), 1 if they are soft, 1 if it has two bodies.
+ * Reason of the `trajectory`; its energy [J] at the start, lost to friction, damping and contacts, put in; if
+ * it came to its end, energy at the end and what is missing in this book, otherwise not numbers. Period of
+ * the cycle in drive periods, 0: none; not a number, and the values are over the window, with a duration
+ * other than that of the case */
 int separatrix_trajectory(const separatrix_model *model, int chosen_count, const int *chosen,
                           const double *values, const double *start, double duration, int samples_per_period,
                           int sample_capacity, int *sample_count, double *sample, int event_capacity,
@@ -177,16 +178,19 @@ int separatrix_catalogue_search(separatrix_catalogue *catalogue, int start_count
 int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
 
 /* Attractor `index`, from 0.
- *   numbers [21]
+ *   numbers [54]
  *     label, regime, period in drive periods (0: not periodic), event word; x [m] and v [m/s] on the section
- * at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude [m],
- * largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s], grazing
- * margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be anywhere between
- * stops, number of coordinates on the section, 1 if the machine has two bodies points [64][16], point_count
- *     points on the section, of one body x [m] and v [m/s]; of a motion that is not periodic the lower and
- * the upper corner of their box */
+ *     at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude
+ *     [m], largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s],
+ *     grazing margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be
+ * anywhere between stops, number of coordinates on the section, 1 if the machine has two bodies, kind (the
+ * codes of docs/file-format.md), real parts of its multipliers [16], imaginary parts [16], one for each
+ * coordinate point_capacity, point_count, points [point_capacity][16] room for points on the section, how many
+ * there are (those beyond the room are left out), and these: of one body x [m] and v [m/s]; of a motion that
+ * is not periodic the lower and the upper corner of their box */
 int separatrix_catalogue_attractor(const separatrix_catalogue *catalogue, int index, double *numbers,
-                                   int *point_count, double *points, char *message, size_t message_size);
+                                   int point_capacity, int *point_count, double *points, char *message,
+                                   size_t message_size);
 
 /* Numbers the attractors of the slices of a map so that a branch keeps its label, as `basin` does: catalogues
  * [count] over shape [axis_count] values of the parameters, the last axis fastest. */

@@ -12,7 +12,7 @@ import xarray as xr
 from separatrix.cases import Case
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.open import decode_flags, decode_words, flag_names, table
-from separatrix.variables import REGIMES
+from separatrix.variables import KINDS, REGIMES
 
 if TYPE_CHECKING:
     import pandas
@@ -51,7 +51,10 @@ class Accessor:
         catalogue = table(self._result, "catalogue")
         if "attractor" not in catalogue:
             raise SeparatrixError("this map has no catalogue: none of its axes is a start", USAGE)
-        frame = catalogue.to_dataframe()
+        # multipliers and section points have further dimensions
+        frame = xr.Dataset({k: v for k, v in catalogue.items() if v.dims == ("entry",)}).to_dataframe()
+        if "kind" in catalogue:
+            frame["kind"] = [KINDS[code - 1] for code in catalogue["kind"].values]
         frame["regime"] = [REGIMES[code] for code in catalogue["regime"].values]
         frame["event_word"] = decode_words(catalogue["event_word"]).values
         slices = np.unique(catalogue["slice"].values).size

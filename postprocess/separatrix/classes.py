@@ -125,7 +125,7 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
 
 
 def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
-    """Return ', -1 turns per period' for a cycle of an angle that goes round; '' where it does not, or not always so."""
+    """Return ', -1 turns per drive period' for a cycle of an angle that goes round; '' for any other."""
     if "rotation_number" not in catalogue:
         return ""
     turns = np.unique(catalogue["rotation_number"].values[mine])

@@ -14,8 +14,8 @@ import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix.cases import Case
 from separatrix.errors import BAD_DATA, CaseError, Interrupted
 from separatrix.progress import Progress, Report
-from separatrix.simulate import LABEL_VARIABLES, Catalogue, StopFlag, StoppedError, search_slices
-from separatrix.variables import CATALOGUE, MAP, STARTS, attributes
+from separatrix.simulate import LABEL_VARIABLES, Attractor, Catalogue, StopFlag, StoppedError, search_slices
+from separatrix.variables import CATALOGUE, CYCLES, KINDS, MAP, STARTS, attributes
 from separatrix.version import __version__
 
 # Starts of one call: enough for the lanes, few enough to be stopped soon.
@@ -27,6 +27,10 @@ def can_label(case: Case) -> bool:
     resolved = case.resolved
     starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
     return starts and "refine" not in resolved and "driven_mass" not in resolved["body"]
+
+
+class SecondLookError(Exception):
+    """Points ended without an attractor: the program searches again from them."""
 
 
 class Labelling:
@@ -41,6 +45,7 @@ class Labelling:
         self.parameters = [name for name in self.axes if name not in STARTS]
         self.shape = tuple(len(self.axes[name]) for name in self.parameters)
         self.starts = self._starts()
+        self.looks_twice = case.resolved["attractors"].get("second_look", 0) > 0
         self.catalogues: list[Catalogue] = []
         count = math.prod(self.shape)
         self.values = {
@@ -118,6 +123,8 @@ class Labelling:
         found = self.catalogues[number].labels(self.starts[first:last], stop)
         for name, values in found.items():
             self.values[name][number, first:last] = values
+        if self.looks_twice and not found["attractor"].all():
+            raise SecondLookError
         return last - first
 
     def _dataset(self) -> xr.Dataset:
@@ -148,7 +155,7 @@ class Labelling:
         return {"units": unit or "1", "long_name": name.replace(".", " ").replace("_", " ")}
 
     def _catalogue(self) -> dict[str, tuple]:
-        rows = []
+        rows, found = [], []
         for number, catalogue in enumerate(self.catalogues):
             labels, counts = np.unique(self.values["attractor"][number], return_counts=True)
             captured = dict(zip(labels.tolist(), counts.tolist(), strict=True))
@@ -156,7 +163,8 @@ class Labelling:
                 count = captured.get(int(one.numbers["attractor"]), 0)
                 margin = min(one.numbers["grazing_margin"], np.finfo(float).max)
                 rows.append({**one.numbers, "grazing_margin": margin, "slice": number, "count": count})
-        return {
+                found.append(one)
+        table = {
             f"catalogue_{name}": (
                 "entry",
                 np.array([row[name] for row in rows], kind),
@@ -164,6 +172,34 @@ class Labelling:
             )
             for name, (kind, unit, meaning) in CATALOGUE.items()
         }
+        flags = {"flag_values": np.arange(1, len(KINDS) + 1, dtype=np.int8), "flag_meanings": " ".join(KINDS)}
+        table["catalogue_kind"][2].update(flags)
+        return table | _cycles(found)
+
+
+def _cycles(found: list[Attractor]) -> dict[str, tuple]:
+    """All multipliers and all section points of the cycles, as a file has them."""
+    if not found:
+        return {}
+    cycle = KINDS.index("cycle") + 1
+    cycles = [(place, one) for place, one in enumerate(found) if one.numbers["kind"] == cycle]
+    multipliers = np.full((len(found), max(one.multipliers.size for one in found)), np.nan, complex)
+    multipliers.imag = np.nan
+    for place, one in cycles:
+        multipliers[place, : one.multipliers.size] = one.multipliers
+    data = {"multiplier_real": multipliers.real, "multiplier_imaginary": multipliers.imag}
+    if cycles:
+        data["point_entry"] = np.concatenate([np.full(len(one.points), place) for place, one in cycles])
+        data["point_entry"] = data["point_entry"].astype(np.int32)
+        data["point"] = np.concatenate([one.points for _, one in cycles])
+    return {
+        f"catalogue_{name}": (
+            CYCLES[name][0],
+            values,
+            {"units": CYCLES[name][1], "long_name": CYCLES[name][2]},
+        )
+        for name, values in data.items()
+    }
 
 
 def axis_values(axis: Mapping[str, object]) -> np.ndarray:

@@ -173,7 +173,8 @@ class Model:
         directions in their space to differentiate along; None: each parameter by itself. `start` is (n, 3):
         x [m], v [m/s] and crank angle [rad] at the time 0 of each segment. The samples of segment i are at
         `times[first[i]:first[i + 1]]`, in seconds since its start, ascending from 0.
-        `tolerance` is that of the adaptive flight.
+        `tolerance` is that of the adaptive flight. With `derivatives` false none are computed: `jacobian` and
+        `velocity_jacobian` are None then, and `directions` is not looked at.
 
         `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
         takes the place of the measured force of the case; the crank angles of `start` are not looked at.

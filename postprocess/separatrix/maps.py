@@ -13,7 +13,7 @@ import xarray as xr
 
 from separatrix.cases import Case, as_case, linspace
 from separatrix.errors import USAGE, CaseError, Interrupted, SeparatrixError
-from separatrix.labelling import Labelling, axis_values, can_label
+from separatrix.labelling import Labelling, SecondLookError, axis_values, can_label
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.runner import StoppedError, cores, run
@@ -158,7 +158,11 @@ def basin(
     if threads is not None and not here:
         raise SeparatrixError("threads: allowed without output, workers, ranks and time_limit", USAGE)
     if here and can_label(case):
-        return Labelling(case, _workers(threads, None, number, "threads"), progress)()
+        count = _workers(threads, None, number, "threads")
+        try:
+            return Labelling(case, count, progress)()
+        except SecondLookError:
+            workers = count
     work = _Work(
         "basin", case, _path(output), _workers(workers, ranks, number), ranks, progress, resume, overwrite,
         time_limit, lambda place: [],

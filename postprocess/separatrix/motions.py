@@ -11,7 +11,7 @@ import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
 from separatrix.cases import Case, as_case
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.variables import EVENTS, REASONS, REGIMES, SAMPLES, attributes
+from separatrix.variables import EVENTS, KINDS, REASONS, REGIMES, SAMPLES, attributes
 from separatrix.version import __version__
 
 _BOOK = (
@@ -61,10 +61,27 @@ def trajectory(
         asked |= {"run.duration": float(duration), "run.window": window}
     if samples is not None:
         asked["trajectory.samples_per_period"] = int(samples)
-    return _dataset(case.with_(asked), motion)
+    changed = case.with_(asked)
+    return _dataset(changed, motion, _cycle(changed, motion.summary))
 
 
-def _dataset(case: Case, motion: simulate.Motion) -> xr.Dataset:
+def _cycle(case: Case, summary: dict[str, float]) -> dict[str, float] | None:
+    """The cycle that a motion has come to by its end, as the program looks for it; None if there is none."""
+    run, start = case.resolved["run"], case.resolved["start"]
+    if run.get("average") != "whole_periods" or REASONS[int(summary["trajectory_reason"])] != "time_over":
+        return None
+    if run["duration"] < summary["drive_period"]:
+        return None
+    place = np.array([[start["x0"], start["v0"], start["crank_angle"]]])
+    catalogue = simulate.Catalogue(case.model).search(place)
+    label = catalogue.labels(place)
+    found = [one.numbers for one in catalogue.attractors if one.numbers["attractor"] == label["attractor"][0]]
+    if not found or not label["settle_time"][0] <= run["duration"]:
+        return None
+    return found[0] if KINDS[found[0]["kind"] - 1] == "cycle" else None
+
+
+def _dataset(case: Case, motion: simulate.Motion, cycle: dict[str, float] | None) -> xr.Dataset:
     summary = motion.summary
     two_bodies = bool(summary["two_bodies"])
     columns = dict(motion.samples)
@@ -86,19 +103,30 @@ def _dataset(case: Case, motion: simulate.Motion) -> xr.Dataset:
         for name in EVENTS
         if name in events
     }
-    return xr.Dataset(data, {"time": ("time", time, attributes(SAMPLES["time"]))}, _about(case, summary))
+    return xr.Dataset(
+        data, {"time": ("time", time, attributes(SAMPLES["time"]))}, _about(case, summary, cycle)
+    )
 
 
-def _about(case: Case, summary: dict[str, float]) -> dict[str, object]:
+def _window(run: dict, period: float) -> float:
+    """The window, of whole drive periods unless it is asked for as it is."""
+    if run.get("average") != "whole_periods" or run["duration"] < period:
+        return float(run["window"])
+    return min(max(1.0, np.floor(run["window"] / period + 0.5)), np.floor(run["duration"] / period)) * period
+
+
+def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None) -> dict[str, object]:
     resolved = case.resolved
+    steady = cycle or summary
     about: dict[str, object] = {
         "format": "separatrix", "format_version": 1, "kind": "trajectory", "complete": 1, "title": case.title,
         "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
         "drive_period": summary["drive_period"], "drive_ratio": float(resolved["drive"].get("ratio", 0.0)),
-        "window": float(resolved["run"]["window"]), "reason": REASONS[int(summary["trajectory_reason"])],
-        "regime": REGIMES[int(summary["regime"])],
+        "window": _window(resolved["run"], summary["drive_period"]),
+        "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],
+        "regime": REGIMES[int(steady["regime"])],
     }  # fmt: skip
-    about |= {name: summary[name] for name in _STEADY}
+    about |= {name: steady[name] for name in _STEADY}
     about |= {name: summary[name] for name in _BOOK if np.isfinite(summary[name])}
     for name in ("barrier_upper", "barrier_lower"):
         if abs(summary[name]) < _HUGE:

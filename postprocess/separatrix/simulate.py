@@ -34,12 +34,12 @@ SUMMARY = (
     "impacts_per_period", "mean_impact_speed", "drive_period", "barrier_upper", "barrier_lower", "soft",
     "two_bodies",
     "trajectory_reason", "energy_start", "energy_lost_to_friction", "energy_lost_to_damping",
-    "energy_lost_to_contacts", "energy_put_in", "energy_end", "energy_closing_error",
+    "energy_lost_to_contacts", "energy_put_in", "energy_end", "energy_closing_error", "period",
 )  # fmt: skip
 ATTRACTOR = (
     "attractor", "regime", "period", "event_word", "x", "v", "driver_x", "driver_v", "multiplier",
     "capture_radius", "amplitude", "x_max", "x_min", "v_max", "impacts_per_period", "mean_impact_speed",
-    "grazing_margin", "rests", "any_place", "coordinates", "two_bodies",
+    "grazing_margin", "rests", "any_place", "coordinates", "two_bodies", "kind",
 )  # fmt: skip
 #: Variables of a label in the order of the library, with the types that a file has.
 LABEL_VARIABLES = {
@@ -48,7 +48,8 @@ LABEL_VARIABLES = {
     "x_max": np.float32, "x_min": np.float32, "v_max": np.float32, "settle_time": np.float32,
     "grazing_margin": np.float32,
 }  # fmt: skip
-_SECTION = (64, 16)
+# coordinates on the section, at most
+_COORDINATES = 16
 _WHOLE = {
     "impacts",
     "regime",
@@ -58,6 +59,7 @@ _WHOLE = {
     "period",
     "event_word",
     "coordinates",
+    "kind",
 }
 _STOPPED = 75
 
@@ -98,10 +100,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Attractor:
-    """An attractor: its numbers as in a file's catalogue, and its points on the section (rows)."""
+    """An attractor: its numbers as in a file's catalogue, points on the section (rows), all multipliers."""
 
     numbers: dict[str, float]
     points: np.ndarray
+    multipliers: np.ndarray
 
 
 def trajectory(
@@ -178,14 +181,20 @@ class Catalogue:
         return [self._attractor(index) for index in range(_library().separatrix_catalogue_size(self._handle))]
 
     def _attractor(self, index: int) -> Attractor:
-        numbers, points = np.empty(len(ATTRACTOR)), np.empty(_SECTION)
-        count = ctypes.c_int()
-        arrays = (_pointer(numbers), ctypes.byref(count), _pointer(points))
-        _call("separatrix_catalogue_attractor", self._handle, index, *arrays)
-        named = _numbers(ATTRACTOR, numbers)
+        numbers, room = np.empty(len(ATTRACTOR) + 2 * _COORDINATES), 64
+        while True:
+            points, count = np.empty((room, _COORDINATES)), ctypes.c_int()
+            arrays = (_pointer(numbers), room, ctypes.byref(count), _pointer(points))
+            _call("separatrix_catalogue_attractor", self._handle, index, *arrays)
+            if count.value <= room:
+                break
+            room = count.value
+        named = _numbers(ATTRACTOR, numbers[: len(ATTRACTOR)])
         if named["grazing_margin"] > 1e308:
             named["grazing_margin"] = np.inf
-        return Attractor(named, points[: count.value, : named["coordinates"]])
+        size = named["coordinates"]
+        real, imaginary = numbers[len(ATTRACTOR) :].reshape(2, _COORDINATES)[:, :size]
+        return Attractor(named, points[: count.value, :size], real + 1j * imaginary)
 
     def labels(self, starts: np.ndarray, stop: StopFlag | None = None) -> dict[str, np.ndarray]:
         """Where `starts` (n, 3) end up: the variables of a map in the types of its file.

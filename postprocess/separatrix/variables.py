@@ -61,7 +61,18 @@ CATALOGUE = {
     "mean_impact_speed": (np.float64, "m/s", "mean speed before impact"),
     "grazing_margin": (np.float64, "m", "smallest distance to a barrier missed"),
     "count": (np.int64, "1", "points of the map captured"),
+    "kind": (np.int8, "1", "whether it is a cycle, rest, chaotic, or nothing of them is known"),
 }
+KINDS = ("cycle", "rest", "chaotic", "not_known")
+# name: dimensions, unit, meaning
+CYCLES = {
+    "multiplier_real": (("entry", "coordinate"), "1", "real parts of the multipliers"),
+    "multiplier_imaginary": (("entry", "coordinate"), "1", "imaginary parts of the multipliers"),
+    "point_entry": (
+        ("cycle_point",), "1", "entry that has the section point, from 0; its points are in order of time",
+    ),
+    "point": (("cycle_point", "coordinate"), "SI", "section points of the cycles: of one body x and v"),
+}  # fmt: skip
 SAMPLES = {
     "time": ("s", "time since the start", {}),
     "x": ("m", "position", {}),

@@ -3,7 +3,7 @@
 
 !> The functions of include/separatrix.h that find the attractors of a machine and label starts with them.
 module c_labels
-  use attractors, only: attractor_t, longest_period, most_coordinates
+  use attractors, only: attractor_t, most_coordinates
   use basin, only: basin_variables, catalogue_t, label_slices, outcome_values, search_starts
   use c_machine, only: prepare_machine, prepared_t, start_problem
   use c_text, only: answer
@@ -26,7 +26,7 @@ module c_labels
     separatrix_catalogue_number, separatrix_catalogue_free, separatrix_labels
 
   !> Numbers of an attractor.
-  integer, parameter :: of_attractor = 21
+  integer, parameter :: of_attractor = 22 + 2*most_coordinates
 
   !> What a catalogue's handle stands for.
   type :: labeller_t
@@ -121,16 +121,17 @@ contains
     count = size(self%attractors)
   end function separatrix_catalogue_size
 
-  integer(c_int) function separatrix_catalogue_attractor(catalogue, index, numbers, point_count, points, message, message_size) &
-      bind(c) result(code)
+  integer(c_int) function separatrix_catalogue_attractor(catalogue, index, numbers, point_capacity, point_count, points, &
+      message, message_size) bind(c) result(code)
     type(c_ptr), value :: catalogue
-    integer(c_int), value :: index
-    real(c_double), intent(out) :: numbers(of_attractor), points(most_coordinates, longest_period)
+    integer(c_int), value :: index, point_capacity
+    real(c_double), intent(out) :: numbers(of_attractor), points(most_coordinates, point_capacity)
     integer(c_int), intent(out) :: point_count
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
     type(labeller_t), pointer :: self
     type(error_t), allocatable :: error
+    integer :: shown
     call c_f_pointer(catalogue, self)
     numbers = 0
     points = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -142,9 +143,11 @@ contains
         numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
                    one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
                    f%grazing_margin, merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
-                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, allocated(self%prepared%journey%moving%pair))]
+                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, allocated(self%prepared%journey%moving%pair)), &
+                   real(one%kind, wp), real(one%multipliers), aimag(one%multipliers)]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
-        points(:one%coordinates, :point_count) = one%points(:one%coordinates, :point_count)
+        shown = min(point_count, point_capacity)
+        points(:one%coordinates, :shown) = one%points(:one%coordinates, :shown)
       end associate
     end if
     code = answer(error, message, message_size)

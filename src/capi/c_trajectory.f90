@@ -7,6 +7,7 @@ module c_trajectory
   use c_machine, only: prepare_machine, prepared_t, start_problem
   use c_text, only: answer
   use case_setup, only: span_of
+  use case_type, only: case_t
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
   use kinds, only: wp
@@ -14,10 +15,11 @@ module c_trajectory
   use motion, only: motion_t
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: closing_error, log_t, open_log
+  use settled_cycle, only: describe_cycle
   use status, only: exit_usage, reason_time_over
   use text, only: to_text
   use trajectories, only: run_trajectories
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_positive_inf, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
   implicit none
@@ -26,7 +28,7 @@ module c_trajectory
   public :: separatrix_trajectory
 
   !> Numbers of a sample, of an event, and of the motion as a whole.
-  integer, parameter :: of_sample = 13, of_event = 7, of_summary = 25
+  integer, parameter :: of_sample = 13, of_event = 7, of_summary = 26
   !> Most samples of a trajectory: some hundred bytes each.
   real(wp), parameter :: most_samples = 2e7_wp
 
@@ -57,7 +59,7 @@ contains
     summary = ieee_value(1.0_wp, ieee_quiet_nan)
     call prepare(self, chosen + 1, values, start, duration, samples_per_period, prepared, log, error)
     if (.not. allocated(error)) then
-      call fly(prepared, start, log, outcome, summary)
+      call fly(self%the_case, prepared, start, duration > 0, log, outcome, summary)
       sample_count = log%samples
       event_count = log%events
       kept = min(sample_count, sample_capacity)
@@ -109,16 +111,28 @@ contains
   end subroutine prepare
 
   !> Flies with a log as the command `trajectory` does, and to the end as the command `points` does, in lanes where the
-  !> machine allows.
-  subroutine fly(prepared, start, log, outcome, summary)
+  !> machine allows. The cycle that it comes to is not looked for in a motion of `another_duration`.
+  subroutine fly(the_case, prepared, start, another_duration, log, outcome, summary)
+    type(case_t), intent(in) :: the_case
     type(prepared_t), intent(in) :: prepared
     real(wp), intent(in) :: start(3)
+    logical, intent(in) :: another_duration
     type(log_t), intent(inout) :: log
     type(outcome_t), intent(out) :: outcome
     real(wp), intent(inout) :: summary(:)
     type(attractor_t) :: no_catalogue(0)
+    type(attractor_t) :: cycle
     type(outcome_t) :: ends(1)
-    call run_trajectory(prepared%journey%moving, no_catalogue, prepared%journey%span, start(1), start(2), start(3), outcome, log)
+    type(span_t) :: span
+    span = prepared%journey%span
+    associate (moving => prepared%journey%moving)
+      call fit_window(moving%machine%period, span)
+      call run_trajectory(moving, no_catalogue, span, start(1), start(2), start(3), outcome, log)
+      if (.not. another_duration) then
+        call describe_cycle(moving, span_of(the_case), span, the_case%attractors%max_period, start, outcome, cycle)
+        summary(26) = cycle%period
+      end if
+    end associate
     call run_trajectories(prepared%journey, no_catalogue, reshape(start, [3, 1]), ends)
     associate (last => ends(1))
       summary(:6) = [last%x, last%v, real(last%impacts, wp), last%last_impact_speed, real(last%features%regime, wp), &

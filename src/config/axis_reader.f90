@@ -6,8 +6,8 @@ module axis_reader
   use angle_units, only: unit_of
   use axis, only: axis_t, linear_values
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
-  use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, &
-    list_size, report
+  use case_source, only: case_source_t, description, enter_table, find, forgive_missing, has_problems, know, &
+    know_all_below, list_size, report
   use case_type, only: case_t
   use case_values, only: any_number, bounds_t, more_than, take_choice, take_integer, take_integers, &
     take_range, take_real, take_reals, take_text
@@ -104,7 +104,8 @@ contains
     if (found) then
       new%name = canonical_name(name)
       new%unit = trim(bounds%unit)
-    else if (size(source%problems) == problems) then
+    else if (size(source%problems) == problems .and. .not. has_problems(source, name(:index(name//'.', '.') - 1)//'.law')) then
+      ! Of a family whose law is wrong nobody knows the parameters.
       allowed = parameter_names(laws)
       if (starts_too) allowed = 'x0, v0, crank_angle, '//allowed
       call report(source, key, 'found "'//name//'", allowed '//allowed)
@@ -161,9 +162,10 @@ contains
     call take_real(source, path//'.step', more_than(0.0_wp, bounds%unit), step)
     call take_integer(source, path//'.count', 1, count, highest=most_values)
     if (size(source%problems) > problems) return
-    if ((step > 0) .eqv. (count > 0)) then
-      call report(source, path//'.count', 'found '//trim(merge('both count and step', 'no count or step   ', count > 0))// &
-                  ', allowed one of them')
+    if (step > 0 .and. count > 0) then
+      call report(source, path//'.count', 'found both count and step, allowed one of them')
+    else if (.not. step > 0 .and. count == 0) then
+      call report(source, path//'.count', 'found no count or step, allowed one of them', missing=.true.)
     else if (step > 0) then
       call count_steps(source, path, from, to, step, count)
     else if ((count == 1 .and. from /= to) .or. (count > 1 .and. from >= to)) then
@@ -199,7 +201,7 @@ contains
     type(case_source_t), intent(inout) :: source
     type(case_t), intent(inout) :: the_case
     type(bounds_t) :: bounds
-    logical :: found
+    logical :: found, lacks
     associate (sweep => the_case%sweep)
       sweep%swept%name = 'drive.ratio'
       sweep%swept%unit = '1'
@@ -225,6 +227,9 @@ contains
       end associate
       call take_integer(source, 'sweep.samples', 1, sweep%samples)
       call take_real(source, 'sweep.limit_tolerance', more_than(0.0_wp, bounds%unit), sweep%limit_tolerance)
+      if (sweep%wanted) return
+      call forgive_missing(source, 'sweep', lacks)
+      sweep%present = .not. lacks
     end associate
   end subroutine read_sweep
 

@@ -4,23 +4,19 @@
 !> What must hold between the values of a case, here and for every combination of its axes.
 module case_check
   use axis, only: axis_t
-  use build_jointed, only: is_jointed, jointed_of
+  use build_jointed, only: is_jointed
   use build_motion, only: machine_of
   use case_parameters, only: is_start, parameter_value, set_parameter
   use case_source, only: case_source_t, report
-  use case_type, only: case_t, contact_law, drive_law, friction_law, restoring_law
-  use effect_check, only: refuse_effects
+  use case_type, only: case_t
   use errors, only: error_t, fail
-  use jointed, only: jointed_t
   use jointed_section, only: start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
-  use law_table, only: law_choice_t, list_of, value_of
-  use lever_reach, only: check_assembly
+  use law_check, only: check_laws, is_good
+  use law_table, only: effect_family, families, law_choice_t
   use motion, only: motion_t
   use motion_state, only: options_t
-  use oscillator, only: refuse_pair
-  use pair, only: build_pair, is_pair, pair_t
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -39,134 +35,34 @@ module case_check
 
 contains
 
-  !> Notes every violated condition of a case whose single values are good.
+  !> Notes every violated condition between values that are good themselves: whatever can be judged, so that all problems of a
+  !> case are told at once.
   subroutine check_case(source, the_case)
     type(case_source_t), intent(inout) :: source
     type(case_t), intent(in) :: the_case
-    integer :: before
+    logical :: of_laws, of_axes, of_sweep
     associate (run => the_case%run)
-      if (run%window > run%duration) then
+      if (is_good(source, ['run']) .and. run%window > run%duration) then
         call report(source, 'run.window', 'found '//to_text(run%window)//' s, allowed at most the duration '// &
                     to_text(run%duration)//' s')
       end if
     end associate
     associate (refine => the_case%refine)
-      if (modulo(refine%block, refine%step) /= 0) then
+      if (is_good(source, ['refine']) .and. modulo(refine%block, refine%step) /= 0) then
         call report(source, 'refine.block', 'found '//to_text(refine%block)//', allowed a multiple of the step '// &
                     to_text(refine%step))
       end if
     end associate
-    before = size(source%problems)
+    of_axes = is_good(source, ['axis'])
+    of_sweep = the_case%sweep%present .and. the_case%sweep%wanted .and. is_good(source, ['sweep'])
+    if (of_axes) call check_axis_order(source, the_case%axes)
+    if (of_axes .and. is_good(source, ['grid'])) call check_tiles(source, the_case)
+    if (of_axes .and. is_good(source, ['body   ', 'contact', 'effect ', 'start  '])) call check_starts(source, the_case, of_sweep)
     call check_laws(source, the_case%laws, '')
-    if (size(source%problems) > before) return
-    call check_combinations(source, the_case, the_case%axes)
-    if (the_case%sweep%present) call check_combinations(source, the_case, [the_case%sweep%swept])
-    call check_axis_order(source, the_case%axes)
-    call check_tiles(source, the_case)
-    call check_starts(source, the_case)
+    of_laws = is_good(source, [character(len=len(families)) :: families, effect_family])
+    if (of_laws .and. of_axes) call check_combinations(source, the_case, the_case%axes)
+    if (of_laws .and. of_sweep) call check_combinations(source, the_case, [the_case%sweep%swept])
   end subroutine check_case
-
-  !> The conditions within one choice of laws; `at` names the combination of axis values.
-  subroutine check_laws(source, laws, at)
-    type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(in) :: laws(:)
-    character(len=*), intent(in) :: at
-    real(wp) :: static, kinetic, tension
-    kinetic = parameter_value(laws, 'friction.kinetic_coefficient', 0.0_wp)
-    static = parameter_value(laws, 'friction.static_coefficient', kinetic)
-    if (static < kinetic) then
-      call report(source, 'friction.static_coefficient', 'found '//to_text(static)// &
-                  ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
-    end if
-    if (laws(contact_law)%name /= 'none') call check_barriers(source, laws(contact_law), at)
-    tension = parameter_value(laws, 'contact.tension', 1.0_wp)
-    if (tension > 0 .and. tension < 1) call report(source, 'contact.tension', 'found '//to_text(tension)//', allowed 0 or 1'//at)
-    call check_bodies(source, laws, at)
-    if (needs_spring(laws(drive_law)%name) .and. laws(restoring_law)%name /= 'linear') then
-      call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
-                  '", allowed with "linear": the ratio refers to its natural frequency')
-    end if
-    select case (laws(drive_law)%name)
-    case ('fourier')
-      call check_series(source, laws(drive_law))
-    case ('crank_lever_rod')
-      call check_lever(source, laws(drive_law), at)
-    case ('measured_force')
-      if (size(list_of(laws(drive_law), 'force')) < 2) then
-        call report(source, 'drive.force', 'found '//to_text(size(list_of(laws(drive_law), 'force')))// &
-                    ' samples, allowed two or more')
-      end if
-    end select
-  end subroutine check_laws
-
-  pure logical function needs_spring(drive)
-    character(len=*), intent(in) :: drive
-    needs_spring = drive == 'harmonic' .or. drive == 'fourier' .or. drive == 'crank_lever_rod'
-  end function needs_spring
-
-  !> One body and two have laws of their own, and effects laws that they belong to.
-  subroutine check_bodies(source, laws, at)
-    type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(in) :: laws(:)
-    character(len=*), intent(in) :: at
-    type(pair_t) :: pair
-    type(jointed_t) :: jointed
-    type(error_t), allocatable :: error
-    if (is_jointed(laws)) then
-      call jointed_of(laws, jointed, error)
-    else if (is_pair(laws)) then
-      call build_pair(laws, pair, error)
-    else
-      call refuse_pair(laws, error)
-      if (.not. allocated(error)) call refuse_effects(laws, error)
-    end if
-    if (.not. allocated(error)) return
-    call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:)//at)
-  end subroutine check_bodies
-
-  subroutine check_barriers(source, contact, at)
-    type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(in) :: contact
-    character(len=*), intent(in) :: at
-    real(wp) :: upper, lower
-    upper = value_of(contact, 'upper')
-    lower = value_of(contact, 'lower')
-    if (upper >= huge(upper) .and. lower <= -huge(lower)) then
-      call report(source, 'contact.law', 'found "'//trim(contact%name)//'" without a barrier, allowed with upper, lower or both')
-    else if (lower > upper) then
-      call report(source, 'contact.lower', 'found '//to_text(lower)//' m, allowed at most upper = '// &
-                  to_text(upper)//' m'//at)
-    end if
-  end subroutine check_barriers
-
-  subroutine check_series(source, drive)
-    type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(in) :: drive
-    integer :: cosines, sines
-    cosines = size(list_of(drive, 'cosine'))
-    sines = size(list_of(drive, 'sine'))
-    if (sines /= cosines) then
-      call report(source, 'drive.sine', 'found '//to_text(sines)//' numbers, allowed as many as cosine has: '// &
-                  to_text(cosines))
-    end if
-  end subroutine check_series
-
-  subroutine check_lever(source, drive, at)
-    type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(in) :: drive
-    character(len=*), intent(in) :: at
-    character(len=:), allocatable :: problem
-    real(wp) :: side
-    side = value_of(drive, 'side')
-    if (abs(side) /= 1) call report(source, 'drive.side', 'found '//to_text(side)//', allowed +1 or -1'//at)
-    if (value_of(drive, 'crank') >= value_of(drive, 'pivot_distance')) then
-      call report(source, 'drive.crank', 'found '//to_text(value_of(drive, 'crank'))// &
-                  ' m, allowed less than pivot_distance = '//to_text(value_of(drive, 'pivot_distance'))//' m'//at)
-    else
-      problem = check_assembly(drive)
-      if (len(problem) > 0) call report(source, 'drive.rod', problem//at)
-    end if
-  end subroutine check_lever
 
   !> check_laws for the combinations of the values of the law axes, up to the first that fails.
   subroutine check_combinations(source, the_case, axes)
@@ -262,15 +158,16 @@ contains
     end if
   end subroutine check_tiles
 
-  !> No start lies beyond a barrier of the case, its axes or its sweep.
-  subroutine check_starts(source, the_case)
+  !> No start lies beyond a barrier of the case, its axes or, `of_sweep`, its sweep.
+  subroutine check_starts(source, the_case, of_sweep)
     type(case_source_t), intent(inout) :: source
     type(case_t), intent(in) :: the_case
+    logical, intent(in) :: of_sweep
     character(len=:), allocatable :: problem
     integer :: i, j
     logical :: is_axis
     if (is_jointed(the_case%laws)) then
-      call check_bodies_at_start(source, the_case)
+      if (is_good(source, ['spring  ', 'friction', 'drive   ', 'watch   '])) call check_bodies_at_start(source, the_case)
       return
     end if
     is_axis = .false.
@@ -288,7 +185,7 @@ contains
       problem = beyond(the_case, the_case%axes, the_case%start%x0)
       if (len(problem) > 0) call report(source, 'start.x0', problem)
     end if
-    if (the_case%sweep%present) call check_sweep_starts(source, the_case, is_axis .or. len(problem) > 0)
+    if (of_sweep) call check_sweep_starts(source, the_case, is_axis .or. len(problem) > 0)
   end subroutine check_starts
 
   !> No bodies overlap at the start, at all corners of the axes (gaps are linear in positions and stops).

@@ -9,7 +9,7 @@ module case_reader
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
   use case_echo, only: echo_case
-  use case_source, only: case_source_t, enter_table, has_problems, open_source, problems_of, report_unknown
+  use case_source, only: case_source_t, enter_table, open_source, problems_of, report_unknown
   use case_type, only: case_t
   use case_values, only: any_number, at_least, between, more_than, take_choice, take_integer, take_real, take_text
   use errors, only: error_t
@@ -30,26 +30,30 @@ module case_reader
 contains
 
   !> Reads the file `path`, puts the overrides ('key.path=value' in TOML syntax, blank-padded) on top
-  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it.
-  subroutine load_case(path, overrides, the_case, error)
+  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it. With `wants_sweep` false a table [sweep] that
+  !> lacks what a sweep needs is left out.
+  subroutine load_case(path, overrides, the_case, error, wants_sweep)
     character(len=*), intent(in) :: path, overrides(:)
     type(case_t), intent(out) :: the_case
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: wants_sweep
     character(len=:), allocatable :: text
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call load_case_text(text, path, overrides, the_case, error)
+    call load_case_text(text, path, overrides, the_case, error, wants_sweep)
   end subroutine load_case
 
   !> The same for a text that is already in memory; `name` stands for the file in messages.
-  subroutine load_case_text(text, name, overrides, the_case, error)
+  subroutine load_case_text(text, name, overrides, the_case, error, wants_sweep)
     character(len=*), intent(in) :: text, name, overrides(:)
     type(case_t), intent(out) :: the_case
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: wants_sweep
     type(case_source_t) :: source
     the_case%path = name
     the_case%raw_text = text
     the_case%title = ''
+    if (present(wants_sweep)) the_case%sweep%wanted = wants_sweep
     call open_source(source, text, name, overrides, error)
     if (allocated(error)) return
     call take_text(source, 'title', the_case%title)
@@ -64,7 +68,7 @@ contains
     call read_trajectory(source, the_case)
     call read_record(source, the_case)
     call report_unknown(source)
-    if (.not. has_problems(source)) call check_case(source, the_case)
+    call check_case(source, the_case)
     call problems_of(source, error)
     if (allocated(error)) return
     the_case%resolved_text = echo_case(the_case)

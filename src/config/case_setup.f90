@@ -74,9 +74,9 @@ contains
                      [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], options_of(the_case))
   end function grid_of
 
-  !> Where the output goes: as asked, or the name of the case without its folder, with .h5.
-  pure function output_path(asked, case_path) result(path)
-    character(len=*), intent(in) :: asked, case_path
+  !> Where the output of a command goes: as asked, or the name of the case without its folder, with .COMMAND.h5.
+  pure function output_path(asked, case_path, command) result(path)
+    character(len=*), intent(in) :: asked, case_path, command
     character(len=:), allocatable :: path
     if (len(asked) > 0) then
       path = asked
@@ -86,7 +86,7 @@ contains
     if (len(path) > 5) then
       if (path(len(path) - 4:) == '.toml') path = path(:len(path) - 5)
     end if
-    path = path//'.h5'
+    path = path//'.'//command//'.h5'
   end function output_path
 
   !> Tile shape where the case leaves it open: about a thousand trajectories of one slice, more on a grid that would have

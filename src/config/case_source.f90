@@ -13,7 +13,7 @@ module case_source
   implicit none
   private
 
-  public :: open_source, find, list_size, know, know_all_below, enter_table, report, &
+  public :: open_source, find, list_size, know, know_all_below, enter_table, report, forgive_missing, &
     report_unknown, problems_of, description, has_problems
 
   type, public :: source_entry_t
@@ -24,7 +24,9 @@ module case_source
 
   type :: problem_t
     integer :: line
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: path, text
+    !> Something is not there that is needed.
+    logical :: missing = .false.
   end type problem_t
 
   integer, parameter :: path_length = 96
@@ -208,11 +210,13 @@ contains
   end subroutine enter_table
 
   !> Notes a problem with the key `path` (or the table that lacks it); `shown` replaces the key in
-  !> the message.
-  subroutine report(source, path, problem, shown)
+  !> the message. `missing`: something that is needed is not there.
+  subroutine report(source, path, problem, shown, missing)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path, problem
     character(len=*), intent(in), optional :: shown
+    logical, intent(in), optional :: missing
+    type(problem_t) :: new
     character(len=:), allocatable :: above, place
     integer :: at, line
     above = path
@@ -233,8 +237,24 @@ contains
     end if
     above = path
     if (present(shown)) above = shown
-    call insert(source, problem_t(line, place//': key '''//above//''': '//problem))
+    new = problem_t(line, path, place//': key '''//above//''': '//problem)
+    if (present(missing)) new%missing = missing
+    call insert(source, new)
   end subroutine report
+
+  !> Takes back what is missing below a table; `lacks` tells whether anything was.
+  subroutine forgive_missing(source, table, lacks)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: table
+    logical, intent(out) :: lacks
+    logical :: kept(size(source%problems))
+    integer :: i
+    do i = 1, size(kept)
+      kept(i) = .not. (source%problems(i)%missing .and. is_or_is_below(source%problems(i)%path, table))
+    end do
+    lacks = .not. all(kept)
+    source%problems = pack(source%problems, kept)
+  end subroutine forgive_missing
 
   !> Keeps the problems in the order of the lines, overrides last.
   subroutine insert(source, problem)
@@ -245,10 +265,17 @@ contains
     source%problems = [source%problems(:at), problem, source%problems(at + 1:)]
   end subroutine insert
 
-  !> Whether any problem has been noted.
-  pure logical function has_problems(source)
+  !> Whether a problem has been noted, with `below` one of this key, or below it.
+  pure logical function has_problems(source, below)
     type(case_source_t), intent(in) :: source
+    character(len=*), intent(in), optional :: below
+    integer :: i
     has_problems = size(source%problems) > 0
+    if (.not. present(below)) return
+    has_problems = .false.
+    do i = 1, size(source%problems)
+      has_problems = has_problems .or. is_or_is_below(source%problems(i)%path, below)
+    end do
   end function has_problems
 
   !> The problems as one error, a line each; none leaves `error` unallocated.

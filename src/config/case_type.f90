@@ -56,8 +56,10 @@ module case_type
   end type attractors_t
 
   type, public :: sweep_t
-    !> Whether the case has a [sweep] table; the rest is meaningless without it.
+    !> Whether the case has a [sweep] table, and if it is not wanted one that lacks nothing; the rest is meaningless without it.
     logical :: present = .false.
+    !> Whether a sweep is what is wanted of the case.
+    logical :: wanted = .true.
     !> The swept parameter, its unit and its values.
     type(axis_t) :: swept
     !> 'both', 'up' or 'down'.

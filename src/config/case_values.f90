@@ -118,7 +118,7 @@ contains
     call know(source, path)
     at = find(source, path)
     if (at > 0 .or. .not. present(required)) return
-    if (required) call report(source, path, 'missing')
+    if (required) call report(source, path, 'missing', missing=.true.)
   end subroutine look_up
 
   !> One number with its unit.
@@ -279,6 +279,8 @@ contains
   subroutine take_choice(source, path, words, value)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path, words(:)
+    ! The settings have several lengths.
+    ! allow(C072)
     character(len=*), intent(inout) :: value
     integer :: at
     call look_up(source, path, at=at)

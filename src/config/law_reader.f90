@@ -117,13 +117,15 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: path
     integer :: i
-    logical :: found
+    logical :: from_file
     rows = parameters_of(choice%family, choice%name)
     if (choice%name == 'measured_force') then
-      call read_force_file(source, choice, found)
-      if (found) return
+      call read_force_file(source, choice, from_file)
+    else
+      from_file = .false.
     end if
     do i = 1, size(rows)
+      if (from_file .and. (rows(i)%name == 'interval' .or. rows(i)%name == 'force')) cycle
       path = table_of(rows(i)%family, rows(i)%law)//'.'//trim(rows(i)%name)
       if (rows(i)%list) then
         call take_reals(source, path, row_bounds(rows(i)), choice%parameters(i)%values, &

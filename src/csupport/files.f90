@@ -13,7 +13,7 @@ module files
   implicit none
   private
 
-  public :: file_exists, is_special, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
+  public :: file_exists, is_special, is_text, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
     take_lock, give_lock, open_append, append_line
 
 contains
@@ -29,6 +29,24 @@ contains
     character(len=*), intent(in) :: path
     is_special = c_is_special(path//c_null_char) == 1
   end function is_special
+
+  !> Whether a file begins like a text: its first bytes are no control characters but tabs and ends of lines. False for an
+  !> empty file and one that cannot be read.
+  logical function is_text(path)
+    character(len=*), intent(in) :: path
+    character(len=1) :: byte
+    integer :: unit, status, i
+    is_text = .false.
+    open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=status)
+    if (status /= 0) return
+    do i = 1, 512
+      read (unit, iostat=status) byte
+      if (status /= 0) exit
+      is_text = iachar(byte) >= 32 .and. iachar(byte) /= 127 .or. any(iachar(byte) == [9, 10, 13])
+      if (.not. is_text) exit
+    end do
+    close (unit)
+  end function is_text
 
   !> Code 73 unless a file can be created in the folder of `path`.
   subroutine check_folder(path, error)

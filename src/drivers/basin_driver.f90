@@ -67,7 +67,7 @@ contains
       call session%journal%line('valid', command%path//' is a valid case for basin')
       call session%end_with(exit_done)
     end if
-    path = output_path(command%output, command%path)
+    path = output_path(command%output, command%path, command%name)
     if (command%shard > 0) path = shard_path(path, command%shard, command%shard_count)
     if (.not. command%dry_run) call session%begin(path, tiled=.true.)
     if (command%dry_run .and. work%grid%slices > most_dry_slices) then

@@ -6,6 +6,7 @@ module case_warnings
   use case_setup, only: grid_of
   use case_type, only: case_t
   use contact_law, only: contact_at_speed, contact_hunt_crossley, contact_t
+  use drive_law, only: same_force
   use errors, only: error_t
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
@@ -34,6 +35,7 @@ contains
     grid = grid_of(the_case, the_case%axes(:0))
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
+    if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
     if (allocated(moving%pair)) then
       associate (machine => moving%pair%machine)
         if (abs(machine%blow) > 0 .and. machine%blow_time > the_case%run%duration) then
@@ -49,6 +51,24 @@ contains
     end if
     if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
+
+  !> Says if a record of a force jumps where it begins again.
+  subroutine warn_about_force(command, the_case, moving, journal)
+    character(len=*), intent(in) :: command
+    type(case_t), intent(in) :: the_case
+    type(motion_t), intent(in) :: moving
+    type(journal_t), intent(inout) :: journal
+    integer :: last
+    associate (force => moving%machine%drive%force, period => moving%machine%period)
+      last = size(force)
+      if (.not. abs(force(last) - force(1)) > same_force*maxval(abs(force))) return
+      if (command /= 'basin' .and. command /= 'sweep' .and. the_case%run%duration <= period) return
+      call journal%line('warning', 'warning: drive.force begins with '//to_text(force(1), 6)//' N and ends with '// &
+        to_text(force(last), 6)//' N: repeated every '//to_text(period, 6)//' s, from its first sample to its last, it jumps. '// &
+        'If its '//to_text(last)//' samples are one period, of '//to_text(last*moving%machine%drive%interval, 6)// &
+        ' s, say so: drive.periodic = 1')
+    end associate
+  end subroutine warn_about_force
 
   !> Says if a body that leans on a soft barrier would use up the steps of a trajectory.
   subroutine warn_about_steps(the_case, moving, journal)

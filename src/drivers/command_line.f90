@@ -373,7 +373,7 @@ contains
         'separatrix COMMAND --help tells more. CASE is a TOML file, see docs/case-file.md.'//nl
     end select
     lines = lines//nl//'Options:'//nl// &
-      '  -o, --output FILE  where to write (default: the name of the case with .h5)'//nl// &
+      '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case)'//nl// &
       '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'//nl// &
       '  --validate         checks the case and stops'//nl// &
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &

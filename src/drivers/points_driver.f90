@@ -72,7 +72,7 @@ contains
                                                      work%list, error)
     if (.not. allocated(error)) call check_periods(work%journey%span, shortest_period(work), error)
     call session%stop_if(error)
-    path = output_path(command%output, command%path)
+    path = output_path(command%output, command%path, command%name)
     if (command%shard > 0) path = shard_path(path, command%shard, command%shard_count)
     if (command%validate) then
       call session%journal%line('valid', command%path//' and '//command%list//' are valid for points')

@@ -77,7 +77,8 @@ contains
     ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
     if (command%name /= 'trajectory') call install_signals(error)
     if (.not. allocated(error)) call ignore_file_limit(error)
-    if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error)
+    if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
+                                                   wants_sweep=command%name == 'sweep')
     call session%stop_if(error)
   end subroutine open_session
 

@@ -21,7 +21,7 @@ module sweep_chain
   implicit none
   private
 
-  public :: run_chains
+  public :: new_chains, run_chains
 
   !> Numbers kept of a hold before its samples: regime, reason, period, word, impacts per period, mean
   !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
@@ -68,11 +68,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: mine(:), all_values(:), packed(:)
     integer :: direction
+    chains = new_chains(size(values), samples)
     chains%ran = ran
-    allocate (chains%holds(hold_numbers, size(values), 2), chains%samples(2, samples, size(values), 2), &
-              source=ieee_value(1.0_wp, ieee_quiet_nan))
-    chains%holds(:hold_codes, :, :) = 0
-    allocate (chains%limits(0), mine(0))
+    allocate (mine(0))
     do direction = 1, 2
       if (.not. ran(direction) .or. modulo(direction - 1, team%size()) /= team%rank()) cycle
       call journal%begin('values', size(values, kind=int64), 0_int64)
@@ -86,8 +84,18 @@ contains
     call unpack_chains(all_values, samples, size(values), chains)
   end subroutine run_chains
 
-  !> One chain as plain numbers: holds, samples, number of limits, and of each marks before and behind, the bracket in steps, that of the
-  !> settled motion, its outcome.
+  !> Chains over so many values, with so many samples of each, that were not run.
+  pure function new_chains(values, samples) result(chains)
+    integer, intent(in) :: values, samples
+    type(chains_t) :: chains
+    allocate (chains%holds(hold_numbers, values, 2), chains%samples(2, samples, values, 2), &
+              source=ieee_value(1.0_wp, ieee_quiet_nan))
+    chains%holds(:hold_codes, :, :) = 0
+    allocate (chains%limits(0))
+  end function new_chains
+
+  !> One chain as plain numbers: holds, samples, number of limits, and of each marks before and behind, the bracket in
+  !> steps, that of the settled motion, its outcome.
   subroutine run_chain(journal, time_limit, grid, span, path, values, up, samples, longest, tolerance, packed, error)
     type(journal_t), intent(inout) :: journal
     real(wp), intent(in) :: time_limit
@@ -135,7 +143,7 @@ contains
         state = held%state
       end if
       call journal%progress(int(i, int64))
-      call check_stop(journal, time_limit, 'running '//trim(path)//' up and down', error)
+      call check_stop(journal, time_limit, 'running '//trim(path)//trim(merge(' up  ', ' down', up)), error)
       if (allocated(error)) return
     end do
     packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(found, wp), &

@@ -16,14 +16,18 @@ module sweep_driver
   use errors, only: error_t
   use file_layout, only: add_map_variables, axis_dimension
   use grid, only: grid_t
+  use journal, only: duration_text
   use kinds, only: int64, wp
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, last_reason, reason_settled, reason_time_over
-  use sweep_chain, only: chains_t, run_chains
+  use strobe, only: strobe_t
+  use sweep, only: hold_parameter, hold_t
+  use sweep_chain, only: chains_t, new_chains, run_chains
   use sweep_report, only: describe_chains, report_given_up, report_limits
+  use system, only: monotonic_seconds
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use trajectory, only: span_t
@@ -61,31 +65,19 @@ contains
     type(schema_t) :: schema
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
-    real(wp) :: seconds
     call open_session(command, session)
     call require_sweep(session%the_case, error)
     call session%stop_if(error)
-    path = output_path(command%output, command%path)
+    path = output_path(command%output, command%path, command%name)
     call prepare_branches(session, work)
     associate (sweep => session%the_case%sweep)
       if (command%validate) then
         call session%journal%line('valid', command%path//' is a valid case for sweep')
         call session%end_with(exit_done)
       end if
-      if (command%dry_run) then
-        ! Without catalogues: every point discovers its own attractor, which takes longer.
-        allocate (work%catalogues(0))
-        seconds = 0
-        if (product(sweep%starts) > 0) call pilot_seconds(work, [size(sweep%swept%values), product(sweep%starts)], &
-                                                          seconds, error)
-        call session%stop_if(error)
-        call session%journal%line('plan', to_text(size(sweep%swept%values))//' values of '//trim(sweep%swept%name)// &
-          ', up and down; many starts: '//plan_text([size(sweep%swept%values), max(1, product(sweep%starts))], &
-          [1, max(1, product(sweep%starts))], bytes_per_point, seconds))
-        call session%end_with(exit_done)
-      end if
+      if (command%dry_run) call tell_plan(session, work)
       call session%begin(path, tiled=product(sweep%starts) > 0)
-      call session%journal%line('chains', 'running '//trim(sweep%swept%name)//' up and down over '// &
+      call session%journal%line('chains', 'running '//trim(sweep%swept%name)//' '//directions_text(session%the_case)//' over '// &
                                 to_text(size(sweep%swept%values))//' values')
       call run_chains(session%team, session%journal, command%time_limit, &
                       grid_of(session%the_case, session%the_case%axes(:0)), work%span, &
@@ -109,6 +101,67 @@ contains
     end if
     call session%end_with(exit_done)
   end subroutine run_sweep
+
+  !> Says what would be done: holds of the runs, points of the many starts, bytes, time. Ends the program.
+  subroutine tell_plan(session, work)
+    type(session_t), intent(inout) :: session
+    type(branch_work_t), intent(inout) :: work
+    type(error_t), allocatable :: error
+    type(chains_t) :: chains
+    type(schema_t) :: schema
+    character(len=:), allocatable :: plan
+    real(wp) :: seconds
+    integer :: holds
+    associate (sweep => session%the_case%sweep, values => session%the_case%sweep%swept%values)
+      seconds = hold_seconds(session, error)
+      call session%stop_if(error)
+      chains = new_chains(size(values), sweep%samples)
+      call describe_chains(session, chains, schema)
+      holds = size(values)*merge(2, 1, sweep%directions == 'both')
+      plan = to_text(size(values))//' values of '//trim(sweep%swept%name)//', '//directions_text(session%the_case)//': '// &
+        to_text(holds)//' holds, '//to_text(schema%bytes())//' bytes; about '// &
+        duration_text(size(values)*seconds)//' on one core for each direction'
+      if (product(sweep%starts) > 0) then
+        ! Without catalogues: every point discovers its own attractor, which takes longer.
+        allocate (work%catalogues(0))
+        call pilot_seconds(work, [size(values), product(sweep%starts)], seconds, error)
+        call session%stop_if(error)
+        plan = plan//'; many starts: '//plan_text([size(values), product(sweep%starts)], [1, product(sweep%starts)], &
+                                                  bytes_per_point, seconds)
+      else
+        plan = plan//'; no many starts'
+      end if
+    end associate
+    call session%journal%line('plan', plan)
+    call session%end_with(exit_done)
+  end subroutine tell_plan
+
+  !> Time that a hold in the middle of the range takes from the start of the case [s].
+  real(wp) function hold_seconds(session, error) result(seconds)
+    type(session_t), intent(in) :: session
+    type(error_t), allocatable, intent(out) :: error
+    type(grid_t) :: grid
+    type(hold_t) :: held
+    type(strobe_t) :: state
+    grid = grid_of(session%the_case, session%the_case%axes(:0))
+    state%state%x = grid%start(1)
+    state%state%v = grid%start(2)
+    seconds = monotonic_seconds()
+    associate (sweep => session%the_case%sweep)
+      call hold_parameter(grid, span_of(session%the_case), trim(sweep%swept%name), &
+                          sweep%swept%values(1 + size(sweep%swept%values)/2), state, grid%start(3), sweep%samples, &
+                          longest_cycle(session%the_case), held, error)
+    end associate
+    seconds = monotonic_seconds() - seconds
+  end function hold_seconds
+
+  !> Which ways the parameter runs.
+  pure function directions_text(the_case) result(text)
+    type(case_t), intent(in) :: the_case
+    character(len=:), allocatable :: text
+    text = trim(the_case%sweep%directions)
+    if (text == 'both') text = 'up and down'
+  end function directions_text
 
   !> Drive periods of the longest cycle that the runs look for: that of the attractors, or half of the samples that are kept.
   pure integer function longest_cycle(the_case)

@@ -4,13 +4,12 @@
 !> `separatrix trajectory`: one motion, its time history and every event.
 module trajectory_driver
   use angle_units, only: unit_of
-  use attractors, only: attractor_t, features_t, kind_cycle, regime_names
+  use attractors, only: attractor_t, features_t, regime_names
   use case_check, only: require_start
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
   use contact_law, only: barrier_positions
-  use discover, only: discover_attractors, sort_attractors
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
@@ -25,8 +24,9 @@ module trajectory_driver
   use record_writer, only: write_record
   use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
+  use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
-  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_settled, reason_time_over
+  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
@@ -67,7 +67,7 @@ contains
     if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
     if (.not. allocated(error) .and. len(command%record) > 0) call check_record(session%the_case, error)
     call session%stop_if(error)
-    path = output_path(command%output, command%path)
+    path = output_path(command%output, command%path, command%name)
     if (command%validate .or. command%dry_run) then
       call session%journal%line('valid', command%path//' is a valid case for trajectory: about '// &
         to_text(nint(span%duration/moving%machine%period*session%the_case%trajectory%samples_per_period))// &
@@ -124,27 +124,6 @@ contains
               to_text(most_samples/the_case%run%duration, 6)//' Hz over '//to_text(the_case%run%duration, 6)//' s ('// &
               to_text(nint(most_samples))//' samples in all)')
   end subroutine check_record
-
-  !> The cycle that the motion has come to by its end, period 0 if none; then the steady values are those of the cycle. Not where
-  !> they are asked for over the window as it is. `patience`: span of the case, with its extension.
-  subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
-    type(motion_t), intent(in) :: moving
-    type(span_t), intent(in) :: patience, span
-    integer, intent(in) :: max_period
-    real(wp), intent(in) :: start(3)
-    type(outcome_t), intent(inout) :: outcome
-    type(attractor_t), intent(out) :: cycle
-    type(attractor_t), allocatable :: own(:)
-    type(outcome_t) :: again
-    if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
-    call discover_attractors(moving, patience, reshape(start, [3, 1]), max_period, own)
-    if (size(own) == 0) return
-    call sort_attractors(own)
-    call run_trajectory(moving, own, span, start(1), start(2), start(3), again)
-    if (again%reason /= reason_settled) return
-    cycle = own(again%attractor)
-    if (cycle%kind == kind_cycle) outcome%window = cycle%features
-  end subroutine describe_cycle
 
   !> Attributes: the drive, the barriers, and the steady values over the cycle or the window.
   subroutine describe_motion(moving, span, outcome, cycle, log, schema)

@@ -13,8 +13,8 @@ module map_reader
   use h5_trap, only: trap
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
-  use status, only: exit_io, exit_no_input
-  use files, only: file_exists
+  use status, only: exit_bad_case, exit_io, exit_no_input
+  use files, only: file_exists, is_text
   use output_check, only: is_folder
   use text, only: to_text
   use value_types, only: bytes_of, from_bytes, type_names, type_string
@@ -62,6 +62,8 @@ contains
       call fail(error, exit_no_input, 'there is no file '''//path//'''')
     else if (is_folder(path)) then
       call fail(error, exit_no_input, ''''//path//''' is a folder')
+    else if (is_text(path)) then
+      call fail(error, exit_bad_case, ''''//path//''' is a text, allowed is a file that Separatrix wrote')
     end if
     if (allocated(error)) return
     call h5_open(path, reader%file, error)

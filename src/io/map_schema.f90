@@ -6,7 +6,7 @@
 module map_schema
   use angle_units, only: unit_of
   use kinds, only: int64, real64
-  use value_types, only: type_float32, type_float64, type_int16, type_int32, type_int64, type_int8, &
+  use value_types, only: bytes_of, type_float32, type_float64, type_int16, type_int32, type_int64, type_int8, &
     type_string
   implicit none
   private
@@ -72,6 +72,7 @@ module map_schema
     generic :: add_attribute => add_text_attribute, add_integer_attribute, add_long_attribute, add_real_attribute
     procedure :: append
     procedure :: length_of
+    procedure :: bytes
     procedure :: lengths_of
     procedure :: find_text_attribute
   end type schema_t
@@ -202,6 +203,18 @@ contains
       call push_text(self%texts, other%texts(i))
     end do
   end subroutine append
+
+  !> Bytes of the numbers that the variables hold; of tiled ones those of no tile.
+  pure integer(int64) function bytes(self)
+    class(schema_t), intent(in) :: self
+    integer :: i
+    bytes = 0
+    do i = 1, size(self%variables)
+      associate (variable => self%variables(i))
+        if (allocated(variable%data)) bytes = bytes + size(variable%data, kind=int64)*bytes_of(variable%type)
+      end associate
+    end do
+  end function bytes
 
   !> The length of a dimension; -1 if there is none of this name.
   pure integer(int64) function length_of(self, name)

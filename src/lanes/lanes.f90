@@ -344,14 +344,16 @@ contains
     end associate
   end subroutine set_layer
 
-  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, rigid barriers.
+  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, rigid barriers. Lanes know no
+  !> coordinate on a circle.
   pure subroutine prepare_series(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
     real(wp) :: length
     associate (law => moving%machine, m => flow%machine, l => flow%machine%law, friction => moving%machine%friction, &
                effects => moving%machine%effects)
-      flow%available = .not. (law%drive%interval > 0 .or. law%contact%soft) .and. size(law%drive%cosine) <= most_harmonics
+      flow%available = .not. (law%drive%interval > 0 .or. law%contact%soft) .and. size(law%drive%cosine) <= most_harmonics &
+        .and. .not. law%turn > 0
       if (friction%excess > 0) flow%available = flow%available .and. has_series(friction%stribeck_exponent)
       if (friction%second_excess > 0) flow%available = flow%available .and. has_series(friction%second_exponent)
       if (effects%dahl_stiffness > 0) flow%available = flow%available .and. &

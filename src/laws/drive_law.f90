@@ -13,6 +13,9 @@ module drive_law
   implicit none
   private
 
+  !> Samples of a measured force closer than this share of the largest are the same.
+  real(wp), parameter, public :: same_force = 1e-9_wp
+
   public :: drive_of, add_ripple, foot_motion, measured_force, next_sample, lever_foot, lever_assembles
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
@@ -26,7 +29,7 @@ module drive_law
     real(wp), allocatable :: cosine(:), sine(:)
     !> False if the series of a mechanism did not converge.
     logical :: converged = .true.
-    !> Measured force: time between samples [s], 0 = none, and the samples [N].
+    !> Measured force: time between samples [s], 0 = none, and the samples [N] from the section to the next, both ends counted.
     real(wp) :: interval = 0
     real(wp), allocatable :: force(:)
   end type drive_t
@@ -58,6 +61,8 @@ contains
     case ('measured_force')
       law%interval = value_of(choice, 'interval')
       law%force = list_of(choice, 'force')
+      ! One period has its first sample once more at its end.
+      if (value_of(choice, 'periodic') > 0.5_wp) law%force = [law%force, law%force(:1)]
       allocate (law%cosine(0), law%sine(0))
       return
     case default

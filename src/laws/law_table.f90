@@ -68,10 +68,10 @@ module law_table
               'calibrated stand-in for the drive of Lemes et al.'), &
     law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
               'geometry derived from '//lemes), &
-    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats after the last', &
+    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats as `periodic` says', &
               'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)')]
 
-  type(parameter_row_t), parameter :: other_parameters(36) = [ &
+  type(parameter_row_t), parameter :: other_parameters(37) = [ &
     parameter_row_t('body', 'point_mass', 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'm'), &
     parameter_row_t('body', 'point_mass', 'gravity', 'm/s^2', 0.0_wp, none_above, .false., .true., 9.81_wp, .false., &
@@ -143,7 +143,9 @@ module law_table
     parameter_row_t('drive', 'measured_force', 'interval', 's', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'time between samples; from the file if the force is one'), &
     parameter_row_t('drive', 'measured_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'samples from the start on, or the name of a CSV file with columns t and force')]
+                    'samples from the start on, or the name of a CSV file with columns t and force'), &
+    parameter_row_t('drive', 'measured_force', 'periodic', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
+                    '1: samples of one period, a last step leads back to the first; 0: up to the last')]
 
   type(law_row_t), parameter, public :: laws( &
     size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws)) = &

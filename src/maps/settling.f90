@@ -123,8 +123,8 @@ contains
     end do
   end subroutine run_periods
 
-  !> How far the last section points, of twice the longest period, are from coming back after 1, 2, ... drive periods, in sizes of the
-  !> motion. `half_range` [m] is that of the position.
+  !> How far the last section points, of twice the longest period, are from coming back after 1, 2, ... drive periods, in
+  !> sizes of the motion. `half_range` [m] is that of the position.
   pure function misses_of(moving, points, half_range) result(misses)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: points(:, :), half_range
@@ -143,8 +143,8 @@ contains
     end do
   end function misses_of
 
-  !> The smallest period with which a motion comes back to within rounding; 0 if there is none, or if it may turn out to be a multiple of
-  !> one that is about to: a transient that turns round the cycle comes back earlier after some turns.
+  !> The smallest period with which a motion comes back to within rounding; 0 if there is none, or if it may turn out to be
+  !> a multiple of one that is about to: a transient that turns round the cycle comes back earlier after some turns.
   pure integer function period_of(misses, before) result(period)
     real(wp), intent(in) :: misses(:), before(:)
     integer :: p, q

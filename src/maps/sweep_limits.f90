@@ -71,9 +71,9 @@ contains
     bracket = [min(near, far), max(near, far)]
   end subroutine observe_limit
 
-  !> Follows the motion with `mark` whose mark has changed behind the last of the values in `course` that `settled` tells of, where the
-  !> state was `state`, from the last of them at which it had settled. A motion may have left its branch long before its mark
-  !> shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
+  !> Follows the motion with `mark` whose mark has changed behind the last of the values in `course` that `settled` tells
+  !> of, where the state was `state`, from the last of them at which it had settled. A motion may have left its branch long
+  !> before its mark shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
   subroutine branch_end(grid, path, course, settled, state, mark, longest, tolerance, bracket, outcome, error)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path

@@ -197,7 +197,7 @@ def test_a_case_that_cannot_be_read(separatrix, tmp_path, command, missing):
 
 
 @pytest.mark.parametrize("command", ["info", "verify"])
-@pytest.mark.parametrize(("path", "code"), [("nowhere.h5", 66), ("folder", 66), ("case.toml", 74)])
+@pytest.mark.parametrize(("path", "code"), [("nowhere.h5", 66), ("folder", 66), ("case.toml", 65)])
 def test_a_file_that_cannot_be_read(separatrix, tmp_path, command, path, code):
     write_case(tmp_path)
     (tmp_path / "folder").mkdir()
@@ -256,16 +256,17 @@ def test_a_folder_is_not_replaced_even_with_force(separatrix, tmp_path, name):
 def test_an_existing_output_is_only_replaced_with_force(separatrix, tmp_path, name):
     write_case(tmp_path)
     (tmp_path / "starts.csv").write_text(STARTS)
-    (tmp_path / "case.h5").write_text("something dear")
+    output = f"case.{COMMANDS[name][0]}.h5"
+    (tmp_path / output).write_text("something dear")
     before = listing(tmp_path)
     outcome = run(separatrix, *COMMANDS[name], folder=tmp_path)
     assert (outcome.code, outcome.out) == (73, "")
-    assert "'case.h5' exists" in outcome.err
+    assert f"'{output}' exists" in outcome.err
     assert "--force" in outcome.err
     assert listing(tmp_path) == before
     succeed(separatrix, *COMMANDS[name], "--force", folder=tmp_path)
     after = listing(tmp_path)
-    assert after["case.h5"].startswith(b"\x89HDF")
+    assert after[output].startswith(b"\x89HDF")
     assert after.keys() == before.keys()
 
 
@@ -335,7 +336,7 @@ def test_bad_usage(separatrix, tmp_path, arguments, words):
         (["trajectory", "case.toml", "-o", "case.toml/x"], 73, "case.toml/x"),
         (["basins", "case.toml"], 64, "basins"),
         (["info", "nowhere.h5"], 66, "nowhere.h5"),
-        (["verify", "bad.toml"], 74, "bad.toml"),
+        (["verify", "bad.toml"], 65, "is a text"),
     ],
 )
 def test_errors_are_printed_once_whatever_the_number_of_ranks(
@@ -352,3 +353,39 @@ def test_errors_are_printed_once_whatever_the_number_of_ranks(
     assert len(outcome.messages) == 1
     assert message in outcome.messages[0]
     assert listing(tmp_path) == before
+
+
+def test_all_problems_are_told_at_once_where_one_is_a_wrong_law(separatrix, tmp_path):
+    """What can be judged without the law is judged; what cannot is no problem."""
+    case = CASE.replace('law = "coulomb"', 'law = "columb"').replace(
+        "sine = [0.0, 0.02849, -0.02686]", "sine = [0.0]"
+    )
+    case += "[run]\nduration = 1\nwindow = 2\n[refine]\nstep = 4\nblock = 6\n"
+    axis = '[[axis]]\nname = "friction.kinetic_coefficient"\nvalues = [0.1, 0.2]\n[sweep]'
+    write_case(tmp_path, case.replace("[sweep]", axis))
+    outcome = run(separatrix, "basin", "case.toml", folder=tmp_path)
+    assert outcome.code == 65
+    keys = re.findall(r"key '([^']*)'", outcome.err)
+    assert keys == ["friction.law", "drive.sine", "run.window", "refine.block"]
+
+
+def test_a_map_needs_nothing_that_only_a_sweep_does(separatrix, tmp_path):
+    """Not the ranges of its starts, nor that the start suits what it sweeps."""
+    axes = (
+        CASE[CASE.index("[[axis]]") : CASE.index("[sweep]")]
+        .replace('"x0"', '"crank_angle"')
+        .replace("1.1 m", "6 rad")
+    )
+    case = (
+        CASE[: CASE.index("[[axis]]")] + axes + "[sweep]\nparameter = 'contact.upper'\nfrom = 0.3\nto = 1\n"
+    )
+    write_case(tmp_path, case)
+    succeed(separatrix, "basin", "case.toml", "--validate", folder=tmp_path)
+    succeed(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
+    outcome = run(separatrix, "sweep", "case.toml", "--validate", folder=tmp_path)
+    assert outcome.code == 65
+    assert "'sweep.x0': missing" in outcome.err
+    assert "'sweep.count': found no count or step" in outcome.err
+    # a typing error is one for every command
+    write_case(tmp_path, case + "stpe = 0.1\n")
+    assert run(separatrix, "basin", "case.toml", "--validate", folder=tmp_path).code == 65

@@ -94,15 +94,38 @@ def test_a_dry_run_counts_the_points(separatrix, tmp_path, kind, plan):
     assert plan in succeed(separatrix, *KINDS[kind], "--dry-run", folder=tmp_path).out
 
 
+def test_a_dry_run_of_a_sweep_counts_all_that_is_written(separatrix, tmp_path):
+    write_case(tmp_path)
+    for way, said, holds in (("both", "up and down", 14), ("down", "down", 7)):
+        words = [*KINDS["sweep"], "--set", f"sweep.directions='{way}'", "--set", "sweep.starts=[0, 0]"]
+        plan = succeed(separatrix, *words, "--dry-run", folder=tmp_path).out
+        told = re.fullmatch(r"7 values of drive.ratio, (.*): (\d+) holds, (\d+) bytes; about (.*)\n", plan)
+        assert told
+        assert told.groups()[:2] == (said, str(holds))
+        assert told[4].endswith("; no many starts")
+        assert (
+            f"running drive.ratio {said} over"
+            in succeed(separatrix, *words, "-o", f"{way}.h5", folder=tmp_path).out
+        )
+        with h5py.File(tmp_path / f"{way}.h5") as file:
+            names = ["drive_ratio", *(key for key, item in file.items() if getattr(item, "ndim", 0) > 1)]
+            written = sum(file[key].nbytes for key in names)
+        assert int(told[3]) == written
+    whole = succeed(separatrix, *KINDS["sweep"], "--dry-run", folder=tmp_path).out
+    assert "14 holds" in whole
+    assert "many starts: 7 x 6 = 42 points" in whole
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_command_under_mpirun(mpi_separatrix, tmp_path, results, kind):
     write_case(tmp_path)
     (tmp_path / "starts.csv").write_bytes((results["map"].parent / "starts.csv").read_bytes())
     more = ["--csv", "table.csv"] if kind in ("points", "trajectory") else []
     outcome = succeed(mpi_separatrix, *KINDS[kind], *more, folder=tmp_path, ranks=2)
-    assert differences(results[kind], tmp_path / "case.h5") == []
-    assert outcome.out.count("wrote case.h5") == 1
-    assert sorted(listing(tmp_path)) == sorted(["case.h5", "case.toml", "starts.csv", *more[1:]])
+    name = f"case.{KINDS[kind][0]}.h5"
+    assert differences(results[kind], tmp_path / name) == []
+    assert outcome.out.count(f"wrote {name}") == 1
+    assert sorted(listing(tmp_path)) == sorted([name, "case.toml", "starts.csv", *more[1:]])
 
 
 @pytest.mark.parametrize(
@@ -119,7 +142,9 @@ def test_the_default_output_is_the_case_in_this_folder(separatrix, tmp_path):
     (tmp_path / "cases").mkdir()
     write_case(tmp_path / "cases", name="some.case.toml")
     succeed(separatrix, "trajectory", "cases/some.case.toml", folder=tmp_path)
-    assert sorted(listing(tmp_path)) == ["cases/some.case.toml", "some.case.h5"]
+    succeed(separatrix, "basin", "cases/some.case.toml", folder=tmp_path)
+    written = ["some.case.basin.h5", "some.case.trajectory.h5"]
+    assert sorted(listing(tmp_path)) == ["cases/some.case.toml", *written]
 
 
 @pytest.mark.parametrize("option", [["-o", "out.h5"], ["--output", "out.h5"], ["--output=out.h5"]])
@@ -139,7 +164,7 @@ def test_set_changes_the_case(separatrix, tmp_path):
     ]
     options = [word for setting in settings for word in ("--set", setting)]
     succeed(separatrix, "trajectory", "case.toml", *options, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file["x"][0] == 0.5
         assert file.attrs["drive_ratio"] == 1.05
         resolved = file["provenance/resolved_case"][()].decode()
@@ -319,7 +344,7 @@ def test_the_events_of_a_trajectory_as_a_table(separatrix, tmp_path):
     with (tmp_path / "events.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["kind", "time", "x", "v_before", "v_after"]
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         for name in ("time", "x", "v_before", "v_after"):
             assert [float(row[name]) for row in rows] == file[f"event_{name}"][()].tolist()
 

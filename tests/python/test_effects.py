@@ -30,7 +30,7 @@ def record(separatrix, folder, text, *settings):
 def test_sensors_change_the_record_alone(separatrix, tmp_path):
     """Record = (1 + gain) x(t - delay) + bias, to rounding, and the same motion."""
     plain = record(separatrix, tmp_path, CASE + RECORD)
-    motion = h5py.File(tmp_path / "case.h5")["x"][:]
+    motion = h5py.File(tmp_path / "case.trajectory.h5")["x"][:]
     sensed = record(
         separatrix,
         tmp_path,
@@ -39,7 +39,7 @@ def test_sensors_change_the_record_alone(separatrix, tmp_path):
         'effect.sensor_bias.bias="3 mm"',
         'effect.sensor_delay.delay="5 ms"',
     )
-    np.testing.assert_array_equal(motion, h5py.File(tmp_path / "case.h5")["x"][:])
+    np.testing.assert_array_equal(motion, h5py.File(tmp_path / "case.trajectory.h5")["x"][:])
     np.testing.assert_allclose(sensed["x"][10:], 1.02 * plain["x"][:-10] + 0.003, rtol=0, atol=1e-12)
     assert sensed["x"][0] == pytest.approx(1.02 * 0.4 + 0.003)
 
@@ -64,6 +64,33 @@ def test_measured_force_drives_what_it_was_measured_on(separatrix, tmp_path):
     np.testing.assert_allclose(again["x"][:-1], first["x"][:-1], rtol=0, atol=1e-8)
 
 
+def test_a_force_that_jumps_where_it_repeats_is_warned_of(separatrix, tmp_path):
+    """Samples of one period, taken as a record that ends with its last, repeat a step too early."""
+    samples = [round(float(x), 12) for x in np.cos(2 * np.pi * np.arange(20) / 20)]
+    text = (
+        "[body]\nmass = 1\n[restoring]\nlaw = 'linear'\nstiffness = 4\n"
+        "[friction]\nlaw = 'viscous'\ndamping = 0.5\n"
+        f"[drive]\nlaw = 'measured_force'\ninterval = 0.1\nforce = {samples}\n[run]\nduration = {{}}\n"
+    )
+    for name, duration, settings, warned in (
+        ("whole", 1.9, [], False),
+        ("longer", 40, [], True),
+        ("periodic", 40, ["--set", "drive.periodic=1"], False),
+    ):
+        (tmp_path / "case.toml").write_text(text.format(duration))
+        said = succeed(
+            separatrix, "trajectory", "case.toml", *settings, "-o", f"{name}.h5", folder=tmp_path
+        ).out
+        assert ("drive.periodic = 1" in said) == warned
+    with h5py.File(tmp_path / "longer.h5") as file:
+        assert file.attrs["drive_period"] == pytest.approx(1.9)
+    with h5py.File(tmp_path / "periodic.h5") as file:
+        assert file.attrs["drive_period"] == pytest.approx(2.0)
+        # a chain of straight lines instead of a cosine has (sin(pi/20)/(pi/20))^2 of its amplitude
+        swing = (np.sin(np.pi / 20) / (np.pi / 20)) ** 2 / np.hypot(4 - np.pi**2, 0.5 * np.pi)
+        assert file.attrs["amplitude"] == pytest.approx(swing, rel=2e-3)
+
+
 def test_maps_over_an_effect(separatrix, tmp_path):
     """Basin over the size of an effect, points, sweep and verification against quadruple precision."""
     case = CASE.replace(
@@ -79,10 +106,10 @@ def test_maps_over_an_effect(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(case)
     (tmp_path / "starts.csv").write_text(STARTS)
     succeed(separatrix, "basin", "case.toml", folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.basin.h5") as file:
         np.testing.assert_array_equal(file["effect_cubic_spring_stiffness"], [0, 10])
         assert np.all(file["reason"][:] < 3)
-    answer = run(separatrix, "verify", "case.h5", "--sample", "2", folder=tmp_path)
+    answer = run(separatrix, "verify", "case.basin.h5", "--sample", "2", folder=tmp_path)
     assert answer.code == 0
     assert "0 label flips" in answer.out
     succeed(separatrix, "points", "case.toml", "--list", "starts.csv", "-o", "points.h5", folder=tmp_path)

@@ -169,7 +169,7 @@ def test_a_map_agrees_with_points_where_no_axis_is_a_start(separatrix, tmp_path,
     options += [f"friction.kinetic_coefficient={float(point['friction_kinetic_coefficient'])!r}"]
     options = [word for option in [*options, "run.duration=120"] for word in ("--set", option)]
     succeed(separatrix, "trajectory", "case.toml", *options, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert float(point["amplitude"]) == pytest.approx(file.attrs["amplitude"], rel=2e-6)
         assert float(point["v_max"]) == pytest.approx(file.attrs["v_max"], rel=2e-6)
 
@@ -297,14 +297,14 @@ def test_verify_names_a_dataset_with_a_damaged_chunk(separatrix, tmp_path):
     write_case(tmp_path)
     shape = ["--set", "axis[1].count=300", "--set", "axis[2].count=301"]
     succeed(separatrix, "basin", "case.toml", *shape, folder=tmp_path)
-    path = tmp_path / "case.h5"
+    path = tmp_path / "case.basin.h5"
     with h5py.File(path) as file:
         assert file["x_min"].compression == "gzip"
         chunk = file["x_min"].id.get_chunk_info(0)
     content = bytearray(path.read_bytes())
     content[chunk.byte_offset + chunk.size // 2] ^= 1
     path.write_bytes(content)
-    outcome = run(separatrix, "verify", "case.h5", folder=tmp_path)
+    outcome = run(separatrix, "verify", "case.basin.h5", folder=tmp_path)
     assert (outcome.code, outcome.out) == (74, "")
     assert "/x_min" in outcome.err
 

@@ -57,7 +57,7 @@ def test_a_body_at_rest_on_a_stop_is_pulled_off_it(separatrix, tmp_path):
     assert [row["kind"] for row in rows] == ["stick"]
     assert float(rows[0]["driver_x"]) == pytest.approx(0.08, abs=1e-14)
     assert float(rows[0]["driver_v"]) == 0.2
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file.attrs["reason"] == "time_over"
         assert abs(file.attrs["energy_closing_error"]) < 1e-15
 
@@ -66,7 +66,7 @@ def test_a_motion_given_up_at_once(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(PAIR + "[integrator]\nevent_budget = 1\n")
     told = succeed(separatrix, "trajectory", "case.toml", "--set", "body.blow=1", folder=tmp_path).out
     assert "given up before the end: event_budget (flights count" in told
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file["time"].size == 0
         assert file.attrs["reason"] == "event_budget"
         assert "energy_start" in file.attrs
@@ -77,7 +77,7 @@ def test_a_stiff_barrier_ends_by_the_step_budget(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(SOFT)
     told = succeed(separatrix, "trajectory", "case.toml", folder=tmp_path).out
     assert "so stiff that integrator.step_budget = 20000 lasts" in told
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file.attrs["reason"] == "step_budget"
     (tmp_path / "list.csv").write_text("x0,v0\n0,0.5\n0.01,0\n")
     succeed(separatrix, "points", "case.toml", "--list", "list.csv", "-o", "points.h5", folder=tmp_path)

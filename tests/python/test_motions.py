@@ -34,7 +34,7 @@ def test_the_drive_begins_at_the_crank_angle_of_the_start(separatrix, tmp_path, 
     write_case(tmp_path)
     start = options(f'start.crank_angle="{angle} deg"')
     succeed(separatrix, "trajectory", "case.toml", *start, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         time, drive = file["time"][()], file["drive"][()]
         period = file.attrs["drive_period"]
     expected = foot(np.radians(angle) + 2 * np.pi * time / period)
@@ -47,13 +47,13 @@ def test_a_body_that_never_moves_has_no_events(separatrix, tmp_path):
     write_case(tmp_path)
     held = options("friction.kinetic_coefficient=50")
     succeed(separatrix, "trajectory", "case.toml", *held, "--csv", "events.csv", folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
         for name in ("event_kind", "event_time", "event_x", "event_v_before", "event_v_after"):
             assert file[name].shape == (0,)
         assert (file["x"][()] == 0.4).all()
         assert (file["v"][()] == 0.0).all()
     assert (tmp_path / "events.csv").read_text().count("\n") == 1
-    succeed(separatrix, "verify", "case.h5", folder=tmp_path)
+    succeed(separatrix, "verify", "case.trajectory.h5", folder=tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_limits_have_the_unit_of_the_swept_parameter(separatrix, tmp_path, one_w
     swept = "sweep={parameter='contact.upper', from=0.7, to=1.5, count=5, starts=[0, 0]}"
     succeed(separatrix, "sweep", "case.toml", *options(swept), folder=tmp_path)
     for path, name, unit in (
-        (tmp_path / "case.h5", "contact_upper", "m"),
+        (tmp_path / "case.sweep.h5", "contact_upper", "m"),
         (one_way / "both.h5", "drive_ratio", "1"),
     ):
         with h5py.File(path) as file:
@@ -191,11 +191,11 @@ def test_another_list_of_the_same_length_cannot_go_on(separatrix, tmp_path):
     write_case(tmp_path)
     command = write_lists(tmp_path)
     assert run(separatrix, *command, "--time-limit", "0.001", folder=tmp_path).code == 75
-    before = (tmp_path / "case.h5.part").read_bytes()
+    before = (tmp_path / "case.points.h5.part").read_bytes()
     other = [*command[:-1], "b.csv", "--resume"]
     outcome = run(separatrix, *other, folder=tmp_path)
     assert (outcome.code, len(outcome.messages)) == (76, 1)
-    assert (tmp_path / "case.h5.part").read_bytes() == before
+    assert (tmp_path / "case.points.h5.part").read_bytes() == before
     succeed(separatrix, *command, "--resume", folder=tmp_path)
 
 
@@ -205,7 +205,7 @@ def test_a_table_that_exists_is_not_replaced_without_force_not_even_by_a_resumed
     assert run(separatrix, *command, "--time-limit", "0.001", folder=tmp_path).code == 75
     (tmp_path / "out.csv").write_text("something dear")
     for more in ([], ["--resume"]):
-        outcome = run(separatrix, *command, *more, "-o", "case.h5", folder=tmp_path)
+        outcome = run(separatrix, *command, *more, "-o", "case.points.h5", folder=tmp_path)
         assert outcome.code == 73
         assert (tmp_path / "out.csv").read_text() == "something dear"
     succeed(separatrix, *command, "--force", folder=tmp_path)
@@ -223,7 +223,7 @@ TWO_PARAMETERS = (
 def test_a_branch_has_one_label_over_two_parameters(separatrix, tmp_path):
     write_case(tmp_path)
     succeed(separatrix, "basin", "case.toml", *options(TWO_PARAMETERS), folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.basin.h5") as file:
         catalogue = {name: file[f"catalogue/{name}"][()] for name in ("slice", "attractor", "regime")}
         period = file["catalogue/period"][()]
     assert set(catalogue["slice"]) == set(range(9))
@@ -240,7 +240,7 @@ def test_every_labelled_point_has_the_regime_of_its_attractor(separatrix, tmp_pa
     write_case(tmp_path)
     elastic = options(*COARSE, 'friction={law="none"}', "contact.restitution=1.0", "run.duration=20")
     succeed(separatrix, "basin", "case.toml", *elastic, folder=tmp_path)
-    with h5py.File(tmp_path / "case.h5") as file:
+    with h5py.File(tmp_path / "case.basin.h5") as file:
         label, regime = file["attractor"][()], file["regime"][()]
         of_label = dict(zip(file["catalogue/attractor"][()], file["catalogue/regime"][()], strict=True))
     for place in zip(*np.nonzero(label), strict=True):

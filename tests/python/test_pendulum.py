@@ -68,8 +68,8 @@ def test_lengths_are_refused_where_an_angle_is_meant(separatrix, source_dir, tmp
 
 def test_a_sweep_counts_the_turns(run, source_dir, separatrix, tmp_path):
     text = (source_dir / "examples" / "basin_pendulum.toml").read_text().split("[[axis]]")[0]
-    text += '[sweep]\nparameter = "friction.damping"\nfrom = 0.5\nto = 0.52\ncount = 2\nsamples = 8\nstarts = [0, 0]\n'
-    text += "x0 = [0, 0]\nv0 = [0, 0]\n"
+    text += '[sweep]\nparameter = "friction.damping"\nfrom = 0.5\nto = 0.52\ncount = 2\nsamples = 8\n'
+    text += "starts = [0, 0]\nx0 = [0, 0]\nv0 = [0, 0]\n"
     case = tmp_path / "sweep.toml"
     case.write_text(text)
     out = tmp_path / "sweep.h5"

@@ -104,12 +104,15 @@ def test_points_are_those_of_the_program(results: dict[str, Path], case: sx.Case
 
 
 @pytest.mark.parametrize(
-    "name", ["trajectory_coulomb_1.05", "pair_backlash", "contact_hunt_crossley", "pair_platform"]
+    "name",
+    ["trajectory_coulomb_1.05", "pair_backlash", "contact_hunt_crossley", "pair_platform", "whole periods"],
 )
 def test_a_trajectory_is_that_of_the_program(
     name: str, source_dir: Path, separatrix: Path, tmp_path: Path
 ) -> None:
     path = source_dir / "examples" / f"{name}.toml"
+    if name == "whole periods":
+        path = write_case(tmp_path)
     succeed(separatrix, "trajectory", path, "-o", "motion.h5", folder=tmp_path)
     theirs, mine = sx.open_result(tmp_path / "motion.h5"), sx.trajectory(path)
     assert_same(mine, theirs)

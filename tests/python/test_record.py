@@ -103,7 +103,7 @@ def test_noise_resolution_and_delay(separatrix, case):
 
 def test_record_agrees_with_the_history(separatrix, case):
     _, columns = record(separatrix, case, 'record={rate="200 Hz"}')
-    with h5py.File(case / "case.h5") as file:
+    with h5py.File(case / "case.trajectory.h5") as file:
         time, x = file["time"][:], file["x"][:]
     assert time == pytest.approx(columns["t"], abs=1e-12)
     assert x == pytest.approx(columns["x"], abs=1e-12)
@@ -135,7 +135,7 @@ def test_two_bodies_are_asked_for_what_they_have(separatrix, case):
 
 def test_book_of_energy(separatrix, case):
     succeed(separatrix, "trajectory", "case.toml", folder=case)
-    with h5py.File(case / "case.h5") as file:
+    with h5py.File(case / "case.trajectory.h5") as file:
         book = dict(file.attrs)
         names = ("energy", "friction_loss", "damping_loss", "contact_loss", "drive_work")
         losses = {name: file[name][:] for name in names}
@@ -170,4 +170,8 @@ def test_every_file_is_named_when_it_is_written(separatrix, case):
         separatrix, "trajectory", "case.toml", "--record", "record.csv", "--csv", "events.csv", folder=case
     ).out
     written = [line.split("wrote ")[1] for line in said.splitlines() if "wrote " in line]
-    assert sorted(path.split("/")[-1] for path in written) == ["case.h5", "events.csv", "record.csv"]
+    assert sorted(path.split("/")[-1] for path in written) == [
+        "case.trajectory.h5",
+        "events.csv",
+        "record.csv",
+    ]

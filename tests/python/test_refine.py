@@ -51,8 +51,8 @@ def test_the_file_says_how_much_was_computed(separatrix, tmp_path):
     for line in succeed(separatrix, *command, folder=tmp_path).out.splitlines():
         event = json.loads(line)
         events[event["event"]] = event
-    origin = origins(tmp_path / "case.h5")
-    with h5py.File(tmp_path / "case.h5") as file:
+    origin = origins(tmp_path / "case.basin.h5")
+    with h5py.File(tmp_path / "case.basin.h5") as file:
         facts = dict(file["refinement"].attrs)
         names = file["origin"].attrs["flag_meanings"].split()
     assert facts["points_computed"] == (origin <= CONTRADICTED).sum() == events["refined"]["computed"]
@@ -64,10 +64,12 @@ def test_the_file_says_how_much_was_computed(separatrix, tmp_path):
     limit = (1 - 0.05 ** (1 / (13 * 17))) * 13 * 17 * 64 / (97 * 131)
     assert facts["wrong_share_upper_limit"] == pytest.approx(limit, rel=1e-9)
     assert events["wrong"]["share_upper_limit"] == facts["wrong_share_upper_limit"]
-    told = json.loads(succeed(separatrix, "info", "case.h5", "--json", folder=tmp_path).out)["refinement"]
+    told = json.loads(succeed(separatrix, "info", "case.basin.h5", "--json", folder=tmp_path).out)[
+        "refinement"
+    ]
     assert told["points_computed"] == facts["points_computed"]
     assert told["percent_computed"] == pytest.approx(100 * (origin <= CONTRADICTED).mean())
-    assert "refined:" in succeed(separatrix, "info", "case.h5", folder=tmp_path).out
+    assert "refined:" in succeed(separatrix, "info", "case.basin.h5", folder=tmp_path).out
 
 
 def test_a_killed_run_goes_on_to_the_same_map(mpi_separatrix, tmp_path):

@@ -237,11 +237,11 @@ def test_without_a_run_to_resume_one_begins(separatrix, tmp_path):
     before = listing(tmp_path)
     outcome = run(separatrix, *SHORT, "--resume", folder=tmp_path)
     assert outcome.code == 73
-    assert "'case.h5' exists" in outcome.err
+    assert "'case.basin.h5' exists" in outcome.err
     assert listing(tmp_path) == before
 
 
 def test_a_stop_in_time_is_no_stop(separatrix, tmp_path):
     write_case(tmp_path)
     succeed(separatrix, *SHORT, "--time-limit", 1000, folder=tmp_path)
-    assert (tmp_path / "case.h5").exists()
+    assert (tmp_path / "case.basin.h5").exists()

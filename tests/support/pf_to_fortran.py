@@ -180,7 +180,7 @@ def check(suite: Suite) -> None:
 
 
 def surroundings(suite: Suite) -> list[str]:
-    """What pFUnit writes around a suite refers to these names: a suite that exports others does not compile."""
+    """What pFUnit writes around a suite refers to these names: a suite that exports others is refused."""
     return [
         f"subroutine {suite.name}_suite()",
         "  use funit",

@@ -204,11 +204,17 @@ def _order(name: str) -> tuple[int, str]:
 
 
 def _table(group: h5py.Group) -> dict[str, list]:
+    """Return the columns of a table that have a value for each row; others are lists of their own."""
     columns = {
         name: item[()] for name, item in group.items() if isinstance(item, h5py.Dataset) and item.ndim == 1
     }
-    columns = {name: values for name, values in columns.items() if name not in ("entry", "limit")}
-    return {name: [_plain(value) for value in values] for name, values in columns.items()}
+    rows = next((len(columns[name]) for name in ("attractor", "lower") if name in columns), 0)
+    columns = {name: values for name, values in columns.items() if len(values) == rows}
+    return {
+        name: [_plain(value) for value in values]
+        for name, values in columns.items()
+        if name not in ("entry", "limit")
+    }
 
 
 def _text(item: h5py.Dataset, key: str, otherwise: str) -> str:

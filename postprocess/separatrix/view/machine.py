@@ -78,7 +78,7 @@ class Machine:
             catalogue = Catalogue(self.model, values).search(stop=stop)
             known = self.source.tables.get("catalogue", {})
             slices = np.array(known.get("slice", []), int)
-            if slice_number is not None and slices.size and slices.max() > 0:
+            if slice_number is not None and slices.size:
                 near = np.abs(slices - slice_number) <= 1
                 starts = np.column_stack([known["x"], known["v"], np.zeros(len(slices))])[near]
                 catalogue.search(starts, stop)

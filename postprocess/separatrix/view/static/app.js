@@ -77,7 +77,7 @@ class Viewer {
     this.map = new MapView(this.canvas, {
       hover: (place, keyed) => this.inspector.hover(place, keyed), pick: (place) => this.starter.pick(place), moved: () => this.moved(),
     });
-    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => fill(this.told, text));
+    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => { fill(this.told, text); this.inspector.again(); });
     this.map.live = this.live;
   }
 

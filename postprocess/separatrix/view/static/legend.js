@@ -17,8 +17,8 @@ export function describeAttractor(one, regimes) {
 export function attractorTable({ entries, total, unlabelled, hidden, regimes, toggle, fromFile }) {
   const rows = entries.map((one) => row(one, total, hidden, regimes, toggle));
   if (unlabelled > 0) rows.push(row({ attractor: 0, count: unlabelled, none: true }, total, hidden, regimes, toggle));
-  const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], ["amplitude (m)", "number"], ["impacts/period", "number"], ["multiplier", "number"]];
-  const head = h("tr", {}, ...columns.map(([text, kind]) => h("th", { class: kind, scope: "col" }, text || h("span", { class: "sr" }, "shown"))));
+  const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], ["amplitude (m)", "number"], ["impacts", "number"], ["multiplier", "number"]];
+  const head = h("tr", {}, ...columns.map(([text, kind]) => h("th", { class: kind, scope: "col", title: text === "impacts" ? "impacts per drive period" : null }, text || h("span", { class: "sr" }, "shown"))));
   const chaotic = entries.some((one) => one.period === 0);
   return [
     h("table", {}, h("thead", {}, head), h("tbody", {}, ...rows)),

@@ -23,8 +23,8 @@ export function tickTexts({ values, step }) {
   const size = Math.max(...values.map(Math.abs), step);
   const digits = Math.ceil(Math.log10(size / step) + 1e-9) + 1;
   if (digits <= 7 || !values.length) return { texts: values.map((v) => number(Math.abs(v) < step / 1e3 ? 0 : v, Math.max(digits, 1))), offset: null };
-  const base = values[0];
-  return { texts: values.map((v) => number(Math.round((v - base) / step) * step, 3)), offset: base };
+  const base = values[0], power = Math.floor(Math.log10(step * values.length) + 1e-9);
+  return { texts: values.map((v) => number((Math.round((v - base) / step) * step) / 10 ** power, 3)), offset: base, power };
 }
 
 /** A frame with ticks. `box` = [left, top, width, height]; axes have low, high, label, and place(value) in pixels. */
@@ -45,7 +45,7 @@ export function frame(context, box, across, up) {
     line(context, x, top + height, x, top + height + 5);
     context.fillText(aText.texts[i], Math.min(x, left + width - 8), top + height + 7);
   });
-  const b = ticks(up.low, up.high, height / 55), bText = tickTexts(b);
+  const b = ticks(up.low, up.high, height / 42), bText = tickTexts(b);
   context.textAlign = "right";
   context.textBaseline = "middle";
   b.values.forEach((value, i) => {
@@ -56,16 +56,16 @@ export function frame(context, box, across, up) {
   });
   context.textAlign = "center";
   context.textBaseline = "bottom";
-  context.fillText(named(across.label, aText.offset), left + width / 2, top + height + 41);
+  context.fillText(named(across.label, aText), left + width / 2, top + height + 41);
   context.translate(1, top + height / 2);
   context.rotate(-Math.PI / 2);
   context.textBaseline = "top";
-  context.fillText(named(up.label, bText.offset), 0, 0);
+  context.fillText(named(up.label, bText), 0, 0);
   context.restore();
 }
 
-function named(label, offset) {
-  return offset === null ? label : `${label}  − (${number(offset, 15)})`;
+function named(label, { offset, power }) {
+  return offset === null ? label : `${label} = ${number(offset, 15)} + … · 10^${String(power).replace("-", "−")}`;
 }
 
 export function line(context, x0, y0, x1, y1) {

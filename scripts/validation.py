@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the cases of examples/validation/ and the referee of tests/referee/ and writes docs/validation.md.
+
+The numbers of others are in validation_numbers.py, ours come from validation_rows.py, the prose is in
+validation.md.in. The referee's reports are kept in the output folder until the program or the referee is newer.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+from itertools import groupby
+from pathlib import Path
+
+import validation_rows as rows
+from markdown import table
+from validation_numbers import NOT_YET, THEIRS
+from validation_rows import SOURCE, Program, Row
+
+sys.path.insert(0, str(SOURCE / "tests" / "referee"))
+import compare  # noqa: E402
+
+
+def line(row: Row) -> list[str]:
+    """A row as cells: number, theirs, ours, difference, bar, verdict."""
+    _, what, theirs, bar = THEIRS[row.key]
+    apart = f"{row.difference:.1e}" if row.difference else "0"
+    verdict = row.verdict if row.verdict == "agrees" else f"**{row.verdict}**"
+    return [what, f"{theirs:.12g}", f"{row.ours:.12g}", apart, f"{bar:g}", verdict]
+
+
+def section(source: str, found: list[Row]) -> str:
+    """The rows of one source under its name, and how ours were computed."""
+    head = ["number", "theirs", "ours", "difference", "bar", "verdict"]
+    ways: dict[str, list[str]] = {}
+    for row in found:
+        ways.setdefault(row.how, []).append(THEIRS[row.key][1])
+    told = "\n".join(
+        f"* {how}" + ("" if len(ways) == 1 else f": {'; '.join(what)}") for how, what in ways.items()
+    )
+    return f"### {source}\n\n{table(head, [line(row) for row in found])}\n\nHow ours were computed:\n\n{told}"
+
+
+def page(found: list[Row], report: dict, version: dict[str, str]) -> str:
+    """The text of docs/validation.md."""
+    order = list(THEIRS)
+    found = sorted(found, key=lambda row: order.index(row.key))
+    parts = [section(name, list(group)) for name, group in groupby(found, key=lambda row: THEIRS[row.key][0])]
+    missed = [[THEIRS[row.key][0], *line(row)] for row in found if row.verdict != "agrees"]
+    head = ["source", "number", "theirs", "ours", "difference", "bar", "verdict"]
+    return (
+        (SOURCE / "scripts" / "validation.md.in")
+        .read_text()
+        .format(
+            **version,
+            differs=table(head, missed) if missed else "Nothing.",
+            count=len(found),
+            tables="\n\n".join(parts),
+            not_yet=table(["source", "what", "why"], [list(item) for item in NOT_YET]),
+            referee=compare.summary_table(report),
+            disagreements=compare.disagreements(report),
+        )
+    )
+
+
+def version_of(program: Path) -> dict[str, str]:
+    """Name, commit and compiler of a program."""
+    if not program.is_file():
+        sys.exit(f"validation: {program} has not been built")
+    lines = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    return dict(item.split(" ", 1) for item in lines.splitlines())
+
+
+def main() -> int:
+    """Run everything; the exit code is 1 where a number differs or the referee finds something wrong."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--build", type=Path, default=SOURCE / "build", help="build folder [build]")
+    parser.add_argument(
+        "--out", type=Path, default=SOURCE / "out" / "validation", help="files [out/validation]"
+    )
+    options = parser.parse_args()
+    build, folder = options.build.resolve(), options.out.resolve()
+    version = version_of(build / "bin" / "separatrix")
+    os.environ["SEPARATRIX_LIBRARY"] = str(build / "lib" / "libseparatrix.so")
+    program = Program(build, folder)
+    found = []
+    for compute in rows.COMPUTED:
+        print(f"validation: {compute.__name__}", flush=True)
+        found += compute(program)
+    report = compare.kept_report(build, folder / "referee")
+    (SOURCE / "docs" / "validation.md").write_text(page(found, report, version))
+    print("validation: wrote docs/validation.md", flush=True)
+    bad = [row for row in found if row.verdict != "agrees"]
+    return 1 if bad or compare.wrong_in(report) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

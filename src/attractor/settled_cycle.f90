@@ -1,0 +1,41 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The cycle that one motion has come to by its end.
+module settled_cycle
+  use attractors, only: attractor_t, kind_cycle
+  use discover, only: discover_attractors, sort_attractors
+  use kinds, only: wp
+  use motion, only: motion_t
+  use status, only: reason_settled, reason_time_over
+  use trajectory, only: outcome_t, run_trajectory, span_t
+  implicit none
+  private
+
+  public :: describe_cycle
+
+contains
+
+  !> The cycle that the motion of `outcome` has come to by its end, period 0 if none; then the steady values are those of
+  !> the cycle. Not where they are asked for over the window as it is. `patience`: span of the case, with its extension;
+  !> `start`: x [m], v [m/s], crank angle [rad].
+  pure subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: patience, span
+    integer, intent(in) :: max_period
+    real(wp), intent(in) :: start(3)
+    type(outcome_t), intent(inout) :: outcome
+    type(attractor_t), intent(out) :: cycle
+    type(attractor_t), allocatable :: own(:)
+    type(outcome_t) :: again
+    if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
+    call discover_attractors(moving, patience, reshape(start, [3, 1]), max_period, own)
+    if (size(own) == 0) return
+    call sort_attractors(own)
+    call run_trajectory(moving, own, span, start(1), start(2), start(3), again)
+    if (again%reason /= reason_settled) return
+    cycle = own(again%attractor)
+    if (cycle%kind == kind_cycle) outcome%window = cycle%features
+  end subroutine describe_cycle
+
+end module settled_cycle

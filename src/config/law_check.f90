@@ -1,0 +1,171 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What must hold between the values of one choice of laws.
+module law_check
+  use build_jointed, only: is_jointed, jointed_of
+  use case_parameters, only: parameter_value
+  use case_source, only: case_source_t, has_problems, report
+  use case_type, only: contact_law, drive_position => drive_law, restoring_law
+  use drive_law, only: same_force
+  use effect_check, only: refuse_effects
+  use errors, only: error_t
+  use jointed, only: jointed_t
+  use kinds, only: wp
+  use law_table, only: law_choice_t, list_of, value_of
+  use lever_reach, only: check_assembly
+  use oscillator, only: refuse_pair
+  use pair, only: build_pair, is_pair, pair_t
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: check_laws, is_good
+
+contains
+
+  !> Whether no problem is known in any of these tables.
+  pure logical function is_good(source, tables)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: tables(:)
+    integer :: i
+    is_good = .true.
+    do i = 1, size(tables)
+      is_good = is_good .and. .not. has_problems(source, trim(tables(i)))
+    end do
+  end function is_good
+
+  !> The conditions within one choice of laws, of the tables without a problem; `at` names the combination of axis values.
+  subroutine check_laws(source, laws, at)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: at
+    logical :: good(3), whole
+    good = [is_good(source, ['friction']), is_good(source, ['contact']), is_good(source, ['drive'])]
+    whole = all(good) .and. is_good(source, ['body     ', 'restoring', 'effect   '])
+    if (good(1)) call check_friction(source, laws, at)
+    if (good(2)) call check_barriers(source, laws, at)
+    if (whole) call check_bodies(source, laws, at)
+    if (.not. good(3)) return
+    if (is_good(source, ['restoring']) .and. needs_spring(laws(drive_position)%name) .and. &
+        laws(restoring_law)%name /= 'linear') then
+      call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
+                  '", allowed with "linear": the ratio refers to its natural frequency')
+    end if
+    select case (laws(drive_position)%name)
+    case ('fourier')
+      call check_series(source, laws(drive_position))
+    case ('crank_lever_rod')
+      call check_lever(source, laws(drive_position), at)
+    case ('measured_force')
+      call check_force(source, laws(drive_position), at)
+    end select
+  end subroutine check_laws
+
+  subroutine check_friction(source, laws, at)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: at
+    real(wp) :: static, kinetic
+    kinetic = parameter_value(laws, 'friction.kinetic_coefficient', 0.0_wp)
+    static = parameter_value(laws, 'friction.static_coefficient', kinetic)
+    if (static < kinetic) then
+      call report(source, 'friction.static_coefficient', 'found '//to_text(static)// &
+                  ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
+    end if
+  end subroutine check_friction
+
+  subroutine check_barriers(source, laws, at)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: at
+    real(wp) :: upper, lower, tension
+    tension = parameter_value(laws, 'contact.tension', 1.0_wp)
+    if (tension > 0 .and. tension < 1) call report(source, 'contact.tension', 'found '//to_text(tension)//', allowed 0 or 1'//at)
+    if (laws(contact_law)%name == 'none') return
+    upper = value_of(laws(contact_law), 'upper')
+    lower = value_of(laws(contact_law), 'lower')
+    if (upper >= huge(upper) .and. lower <= -huge(lower)) then
+      call report(source, 'contact.law', 'found "'//trim(laws(contact_law)%name)// &
+                  '" without a barrier, allowed with upper, lower or both')
+    else if (lower > upper) then
+      call report(source, 'contact.lower', 'found '//to_text(lower)//' m, allowed at most upper = '// &
+                  to_text(upper)//' m'//at)
+    end if
+  end subroutine check_barriers
+
+  !> A record has a step, and one period does not have its first sample twice.
+  subroutine check_force(source, drive, at)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: drive
+    character(len=*), intent(in) :: at
+    real(wp) :: periodic
+    associate (force => list_of(drive, 'force'))
+      periodic = value_of(drive, 'periodic')
+      if (periodic > 0 .and. periodic < 1) then
+        call report(source, 'drive.periodic', 'found '//to_text(periodic)//', allowed 0 or 1'//at)
+      else if (size(force) < 2) then
+        call report(source, 'drive.force', 'found '//to_text(size(force))//' samples, allowed two or more')
+      else if (periodic > 0 .and. .not. abs(force(size(force)) - force(1)) > same_force*maxval(abs(force))) then
+        call report(source, 'drive.periodic', 'found 1 with the first sample, '//to_text(force(1))// &
+                    ' N, once more at the end of drive.force; allowed without it, or 0'//at)
+      end if
+    end associate
+  end subroutine check_force
+
+  !> One body and two have laws of their own, and effects laws that they belong to.
+  subroutine check_bodies(source, laws, at)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=*), intent(in) :: at
+    type(pair_t) :: pair
+    type(jointed_t) :: jointed
+    type(error_t), allocatable :: error
+    if (is_jointed(laws)) then
+      if (.not. is_good(source, ['spring'])) return
+      call jointed_of(laws, jointed, error)
+    else if (is_pair(laws)) then
+      call build_pair(laws, pair, error)
+    else
+      call refuse_pair(laws, error)
+      if (.not. allocated(error)) call refuse_effects(laws, error)
+    end if
+    if (.not. allocated(error)) return
+    call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:)//at)
+  end subroutine check_bodies
+
+  subroutine check_series(source, drive)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: drive
+    integer :: cosines, sines
+    cosines = size(list_of(drive, 'cosine'))
+    sines = size(list_of(drive, 'sine'))
+    if (sines /= cosines) then
+      call report(source, 'drive.sine', 'found '//to_text(sines)//' numbers, allowed as many as cosine has: '// &
+                  to_text(cosines))
+    end if
+  end subroutine check_series
+
+  subroutine check_lever(source, drive, at)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: drive
+    character(len=*), intent(in) :: at
+    character(len=:), allocatable :: problem
+    real(wp) :: side
+    side = value_of(drive, 'side')
+    if (abs(side) /= 1) call report(source, 'drive.side', 'found '//to_text(side)//', allowed +1 or -1'//at)
+    if (value_of(drive, 'crank') >= value_of(drive, 'pivot_distance')) then
+      call report(source, 'drive.crank', 'found '//to_text(value_of(drive, 'crank'))// &
+                  ' m, allowed less than pivot_distance = '//to_text(value_of(drive, 'pivot_distance'))//' m'//at)
+    else
+      problem = check_assembly(drive)
+      if (len(problem) > 0) call report(source, 'drive.rod', problem//at)
+    end if
+  end subroutine check_lever
+
+  pure logical function needs_spring(drive)
+    character(len=*), intent(in) :: drive
+    needs_spring = drive == 'harmonic' .or. drive == 'fourier' .or. drive == 'crank_lever_rod'
+  end function needs_spring
+
+end module law_check

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/validation.md: its cheap rows computed again, and that it has every row."""
+
+import importlib
+import sys
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def rows(source_dir):
+    sys.path.insert(0, str(source_dir / "scripts"))
+    yield importlib.import_module("validation_rows")
+    sys.path.remove(str(source_dir / "scripts"))
+
+
+@pytest.fixture
+def program(rows, library, separatrix, build_dir, tmp_path):
+    return rows.Program(build_dir, tmp_path)
+
+
+def test_orbits_of_budd_and_dux_are_theirs_and_stand_in_the_page(rows, program, source_dir):
+    page = (source_dir / "docs" / "validation.md").read_text()
+    found = [*rows.budd_dux(program), *rows.family(program)]
+    assert [row for row in found if row.verdict != "agrees"] == []
+    assert len(found) == 18
+    for row in found:
+        _, what, theirs, bar = rows.THEIRS[row.key]
+        (line,) = [item for item in page.splitlines() if item.startswith(f"| {what} | {theirs:.12g} |")]
+        printed = float(line.split("|")[3])
+        assert abs(printed - row.ours) <= bar, line
+
+
+def test_the_saddle_is_one(rows, program):
+    saddle = rows.Map(program.models["budd_dux"]).orbits((-3, -0.4), (-2, 2), 1)[1]
+    assert abs(saddle.multipliers[0]) > 1 > abs(saddle.multipliers[1])
+    # flights keep areas, an impact shrinks them by the square of the restitution
+    assert saddle.multipliers.prod().real == pytest.approx(0.64, abs=1e-9)
+
+
+def test_every_row_and_every_case_is_in_the_page(rows, source_dir):
+    page = (source_dir / "docs" / "validation.md").read_text()
+    for source, what, theirs, _ in rows.THEIRS.values():
+        assert f"### {source}" in page
+        assert f"| {what} | {theirs:.12g} |" in page
+    for path in rows.CASES.glob("*.toml"):
+        assert f"examples/validation/{path.name}" in page
