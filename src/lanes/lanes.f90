@@ -152,7 +152,7 @@ contains
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
-    if (flow%width <= 0 .or. allocated(moving%pair)) return
+    if (flow%width <= 0 .or. allocated(moving%pair) .or. allocated(moving%jointed)) return
     ! A table of the restitution is left to single flights.
     if (moving%machine%contact%kind == contact_curve) return
     if (moving%exact .and. .not. moving%machine%contact%soft) then
