@@ -279,6 +279,8 @@ contains
   subroutine take_choice(source, path, words, value)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path, words(:)
+    ! The settings have several lengths.
+    ! allow(C072)
     character(len=*), intent(inout) :: value
     integer :: at
     call look_up(source, path, at=at)
