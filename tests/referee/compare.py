@@ -8,7 +8,8 @@ both runs over the values of a parameter, and many starts at each value (`sweep`
 
     agrees      same cycle, period and impacts per period; or no cycle for both
     not known   no label, or one of a motion that the program calls neither periodic nor chaotic: silence
-    rounding    the referee itself ends elsewhere in extended precision, or 1e-12 beside the start
+    rounding    the referee ends on the program's motion too, in extended precision or 1e-12 beside the start
+    unfounded   a cycle that the referee never finds, while its own answer hangs on the last digits
     wrong       anything else
 """
 
@@ -109,11 +110,10 @@ class Court:
         subprocess.run(line, check=True)
         return path
 
-    def sensitive(self, machine: Machine, start: np.ndarray, found: Outcome) -> bool:
-        """Whether the referee's own answer hangs on the last digits of the start or of the arithmetic."""
-        beside = start + BESIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
-        others = referee.outcomes(self.extended, machine, beside, self.effort)
-        return any(not same_motion(machine, found, other) for other in others)
+    def beside(self, machine: Machine, start: np.ndarray) -> list[Outcome]:
+        """The referee's answers in more digits, and for starts a little beside."""
+        starts = start + BESIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+        return referee.outcomes(self.extended, machine, starts, self.effort)
 
     def judge(
         self,
@@ -125,7 +125,13 @@ class Court:
     ) -> str:
         """Hold a claim against the referee's outcome; `points` are the cycle that the program means."""
         verdict = judged(machine, found, claim, points)
-        return "rounding" if verdict == "wrong" and self.sensitive(machine, start, found) else verdict
+        if verdict != "wrong":
+            return verdict
+        others = self.beside(machine, start)
+        if all(same_motion(machine, found, other) for other in others):
+            return "wrong"
+        met = any(judged(machine, other, claim, points) == "agrees" for other in others)
+        return "rounding" if met or claim.period == 0 else "unfounded"
 
 
 def judged(machine: Machine, found: Outcome, claim: Claim, points: np.ndarray | None = None) -> str:
