@@ -20,7 +20,8 @@ module part_rows
   character(len=1), parameter :: drive_unit(2) = ['N', 'm']
 
   type(law_row_t), parameter, public :: part_laws(10) = [ &
-    law_row_t('body', 'structure', 'several bodies, [body.NAME] each, with springs, joints and drives between them', ''), &
+    law_row_t('body', 'structure', 'several bodies, [body.NAME] each, with springs, joints and drives between them', &
+              'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
     law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
     law_row_t('part', bodies(2), 'any other body', ''), &
     law_row_t('part', joints(1), 'spring k and damper c between two bodies, or one and the ground', ''), &
