@@ -9,6 +9,7 @@ both runs over the values of a parameter, and many starts at each value (`sweep`
     agrees      same cycle, period and impacts per period; or no cycle for both
     not known   no label, or one of a motion that the program calls neither periodic nor chaotic: silence
     rounding    the referee ends on the program's motion too, in extended precision or 1e-12 beside the start
+    window      in a run: the same cycle, its impacts over a window that is no multiple of its period
     unfounded   a cycle that the referee never finds, while its own answer hangs on the last digits
     wrong       anything else
 """
@@ -232,11 +233,26 @@ def compare_sweep(court: Court, path: Path, case: dict, kinds: Counter) -> tuple
         ]
         for i, (outcome, claim) in enumerate(zip(outcomes, claims, strict=True)):
             verdict = court.judge(machine, begun[i], outcome, claim)
+            if verdict == "wrong" and i < 2 and over_window(court, machine, case["run"], outcome, claim):
+                verdict = "window"
             where = {"run": ("up", "down")[i]} if i < 2 else {"start": begun[i].tolist()}
             group = runs if i < 2 else many
             group.add(verdict, value=value, **where, ours=str(claim), referee=told(outcome))
             kinds[outcome.kind] += 1
     return runs, many
+
+
+def over_window(court: Court, machine: Machine, run: dict, found: Outcome, claim: Claim) -> bool:
+    """Whether impacts are those of the cycle over a window of whole drive periods, not of whole cycles."""
+    if claim.period == 0 or found.period != claim.period:
+        return False
+    periods = round(run.get("window", run["duration"] / 4) / machine.period)
+    for length in (periods, periods + 1):
+        flown = referee.strobes(court.double, machine, *found.cycle[0], found.period + length)
+        counts = flown[length:, 2] - flown[:-length, 2]
+        if np.min(np.abs(counts / length - claim.impacts)) < 1e-9:
+            return True
+    return False
 
 
 def compare_points(court: Court, path: Path, case: dict) -> tuple[Verdicts, float]:
