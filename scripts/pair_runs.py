@@ -116,10 +116,10 @@ class Program:
         return Run(data, decode_flags(data["event_kind"]).values.astype(str), events)
 
     def limits(self, case: str, *settings: str) -> dict[str, float]:
-        """Run a sweep; return the middles of its brackets."""
+        """Run a sweep; return the middles of the brackets that it saw in steps."""
         with open_result(self.command("sweep", case, *settings)) as result:
             limits = table(result, "limits")
-            middles = (limits["lower"].values + limits["upper"].values) / 2
+            middles = (limits["observed_lower"].values + limits["observed_upper"].values) / 2
             return {str(name): float(at) for name, at in zip(limits["name"].values, middles, strict=True)}
 
     def record(self, case: str, *settings: str) -> np.ndarray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from separatrix.library import Model
+from separatrix.library import Model, Segments
 
 # steps of the differences, in the units of x and v, and their weights; a second pair removes the cubic error
 OFFSETS, WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 12
@@ -48,7 +48,7 @@ class Map:
         self.values = dict(values or {})
         self.duration = 2 * np.pi / model.drive_frequency(self.values)
 
-    def fly(self, starts: np.ndarray, times: np.ndarray | None = None):
+    def fly(self, starts: np.ndarray, times: np.ndarray | None = None) -> Segments:
         """Fly starts, rows of x and v; sampled after the period unless times of one start are given."""
         starts = np.atleast_2d(starts)
         count = len(starts)
@@ -82,11 +82,12 @@ class Map:
             # until rounding stops the steps from shrinking
             size = np.max(np.abs(move)) / max(1.0, np.max(np.abs(point)))
             if size == 0 or (size < 1e-11 and size >= last / 4):
-                return self._seen(point, step)
+                return self.seen(point, step)
             last = size
         raise ValueError(f"no orbit near {guess}")
 
-    def _seen(self, point: np.ndarray, step: float) -> Orbit:
+    def seen(self, point: np.ndarray, step: float) -> Orbit:
+        """The orbit through a fixed point."""
         flown = self.fly(point)
         phase = np.mod(self.angle + flown.impact.time * 2 * np.pi / self.duration, 2 * np.pi)
         return Orbit(point, self.matrix(point, step), np.abs(flown.impact.speed_before), phase)
@@ -196,4 +197,4 @@ def fold(at: Callable[[float], Map], value: float, guess: np.ndarray, step: floa
         if np.max(np.abs(change)) < 1e-13:
             break
     here = at(float(unknown[2]))
-    return float(unknown[2]), here._seen(unknown[:2], step)
+    return float(unknown[2]), here.seen(unknown[:2], step)

@@ -4,7 +4,7 @@
 """Runs the cases of examples/validation/ and the referee of tests/referee/ and writes docs/validation.md.
 
 The numbers of others are in validation_numbers.py, ours come from validation_rows.py, the prose is in
-validation.md.in. The referee's reports are kept in the output folder until the program or the referee is newer.
+validation.md.in. The referee's reports stay in the output folder until the program or the referee is newer.
 """
 
 import argparse

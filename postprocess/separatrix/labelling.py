@@ -23,10 +23,11 @@ _PIECE = 1024
 
 
 def can_label(case: Case) -> bool:
-    """Whether the library does it: one body, every point of the grid, an axis of starts."""
+    """Whether the library does it: one body on a line, every point of the grid, an axis of starts."""
     resolved = case.resolved
     starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
-    return starts and "refine" not in resolved and "driven_mass" not in resolved["body"]
+    angle = resolved["restoring"]["law"] == "pendulum"
+    return starts and not angle and "refine" not in resolved and "driven_mass" not in resolved["body"]
 
 
 class SecondLookError(Exception):

@@ -284,13 +284,14 @@ def _rows(function: str, count: int, *numbers: ctypes.Array) -> Iterator[list[st
 
 
 def library_path() -> Path:
-    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, in build/lib, beside the program."""
+    """Return where the library is: $SEPARATRIX_LIBRARY, in this package, beside the program, in build/lib."""
     asked = os.environ.get("SEPARATRIX_LIBRARY")
     if asked:
         return Path(asked)
     program = shutil.which("separatrix")
-    folders = [NATIVE / "lib", SOURCE_TREE / "build" / "lib"]
+    folders = [NATIVE / "lib"]
     folders += [Path(program).resolve().parent.parent / "lib"] if program else []
+    folders.append(SOURCE_TREE / "build" / "lib")
     for folder in folders:
         path = folder / "libseparatrix.so"
         if path.is_file():

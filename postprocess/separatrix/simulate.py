@@ -49,7 +49,7 @@ LABEL_VARIABLES = {
     "grazing_margin": np.float32,
 }  # fmt: skip
 # coordinates on the section, at most
-_COORDINATES = 5
+_COORDINATES = 16
 _WHOLE = {
     "impacts",
     "regime",

@@ -69,7 +69,7 @@ def read_case() -> dict:
     case = tomllib.loads(CASE.read_text())
     return {
         name: {
-            key: si(value) if key not in ("law", "cosine", "sine") else value for key, value in table.items()
+            key: si(value) if key not in ("law", "cosine", "sine", "average") else value for key, value in table.items()
         }
         for name, table in case.items()
         if isinstance(table, dict)

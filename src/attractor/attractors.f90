@@ -26,10 +26,10 @@ module attractors
   character(len=*), parameter, public :: kind_names(last_kind) = [character(len=9) :: 'cycle', 'rest', 'chaotic', 'not_known']
 
   !> Longest period in drive periods that is looked for near a return of the motion, and of one that returns to the bit.
-  integer, parameter, public :: longest_period = 64, longest_exact_period = 4096
+  integer, parameter, public :: longest_period = 64, longest_exact_period = 1024
 
-  !> Most coordinates of a point on the section: x and v of one body, up to five of two.
-  integer, parameter, public :: most_coordinates = 5
+  !> Most coordinates of a point on the section: x and v of one body, up to five of two, more of several.
+  integer, parameter, public :: most_coordinates = 16
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 

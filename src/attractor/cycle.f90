@@ -326,7 +326,7 @@ contains
       promised = promised + 0.75_wp*(1 - promised)
       do ring = 1, size(rings)
         radius = rings(ring)*attractor%capture_radius
-        do k = 1, directions
+        do k = 1, max(directions, 4*n)
           point = centre + attractor%scale(:n)*back_substituted(lower, radius*direction(k, n))
           if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
           call map_point(moving, point, attractor%period, image, tally, ok)
@@ -346,7 +346,8 @@ contains
     integer, intent(in) :: k, n
     real(wp) :: unit(n), sine, cosine
     integer :: j
-    real(wp), parameter :: irrational(most_coordinates) = sqrt([2.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 11.0_wp])
+    real(wp), parameter :: irrational(most_coordinates) = sqrt([2.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 11.0_wp, 13.0_wp, &
+      17.0_wp, 19.0_wp, 23.0_wp, 29.0_wp, 31.0_wp, 37.0_wp, 41.0_wp, 43.0_wp, 47.0_wp, 53.0_wp])
     if (n == 2) then
       call sine_cosine(k*two_pi/directions, sine, cosine)
       unit = [cosine, sine]

@@ -22,9 +22,14 @@ module exact_return
   !> Distance, in units of the motion's size, at which states of an exact cycle count as the same: rounding may carry it
   !> through neighbouring numbers, several rounds of which come back exactly.
   real(wp), parameter :: same_state = 1e-9_wp
-  !> Largest neighbourhood that is tried.
+  !> Largest neighbourhood that is tried. The smallest, after the halvings, is 2e-15, several roundings: where starts so near
+  !> do not stay with the cycle, the motion between two chatters magnifies rounding until another one could follow, and the
+  !> return tells nothing.
   real(wp), parameter :: largest_radius = 0.02_wp
-  integer, parameter :: most_halvings = 20
+  integer, parameter :: most_halvings = 43
+  !> A start has merged with the cycle when only this share of its distance is left, or rounding, and a chatter has been completed
+  !> if one belongs to the cycle.
+  real(wp), parameter :: merged = 1e-3_wp, rounding = 4e-15_wp
 
   !> Brent's search for a return: the state is compared with the one kept, which is replaced after 1, 2, 4, ... periods.
   type, public :: returns_t
@@ -63,7 +68,7 @@ contains
   end subroutine watch_returns
 
   !> The attractor of a state on the section that comes back after `period` drive periods. `found` is false if it is not
-  !> stable, or returned by chance. A cycle with a completed chatter has the multipliers 0.
+  !> stable, or its return owed to rounding. A cycle with a completed chatter has the multipliers 0.
   pure subroutine exact_cycle(moving, strobe, period, attractor, found)
     type(motion_t), intent(in) :: moving
     type(strobe_t), intent(in) :: strobe
@@ -71,6 +76,7 @@ contains
     type(attractor_t), intent(out) :: attractor
     logical, intent(out) :: found
     real(wp), allocatable :: points(:, :), jacobian(:, :)
+    logical, allocatable :: chattered(:)
     type(strobe_t) :: first
     type(tally_t) :: tally
     integer :: n, i, start, reason
@@ -79,8 +85,8 @@ contains
     n = coordinates_of(moving)
     attractor%coordinates = n
     attractor%turn = moving%machine%turn
-    allocate (points(most_coordinates, 0:period), jacobian(n, n))
-    call collect(moving, strobe, period, points, tally, found)
+    allocate (points(most_coordinates, 0:period), jacobian(n, n), chattered(period))
+    call collect(moving, strobe, period, points, chattered, tally, found)
     if (.not. found) return
     attractor%scale = scale_of(moving, tally)
     attractor%period = smallest_period(points(:n, 0:period - 1), attractor%scale(:n), attractor%turn)
@@ -92,7 +98,7 @@ contains
     call make_points(attractor, attractor%period)
     attractor%metric([(i*(i + 1)/2, i=1, n)], :) = 1
     tally%wants_v_max = .true.
-    call collect(moving, first, attractor%period, points(:, :attractor%period), tally, found)
+    call collect(moving, first, attractor%period, points(:, :attractor%period), chattered(:attractor%period), tally, found)
     attractor%points = points(:, :attractor%period - 1)
     attractor%features = features_over(moving, tally, real(attractor%period, wp))
     attractor%features%word = cycle_word(moving, first, attractor%period)
@@ -103,35 +109,68 @@ contains
       attractor%multipliers(:n) = eigenvalues(jacobian)
       attractor%multiplier = abs(attractor%multipliers(1))
     end if
-    attractor%capture_radius = largest_radius
-    do i = 1, most_halvings
-      found = all_follow(moving, attractor)
-      if (found) return
-      attractor%capture_radius = attractor%capture_radius/2
-    end do
-    ! Too near the edge of another course of events to tell: captured is what is on the cycle.
-    attractor%capture_radius = same_state
-    found = attractor%multiplier < 1
+    call verify(moving, attractor, chattered(:attractor%period), found)
   end subroutine exact_cycle
 
-  !> Section points of `periods` drive periods from a state on, and what happened meanwhile.
-  pure subroutine collect(moving, strobe, periods, points, tally, ok)
+  !> The largest neighbourhood that stays with the cycle, by halving the exponent of its radius: first around the points behind a
+  !> chatter, from which rounding grows longest, then around all of them. `found` is false if not even the smallest one does.
+  pure subroutine verify(moving, attractor, chattered, found)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(inout) :: attractor
+    logical, intent(in) :: chattered(:)
+    logical, intent(out) :: found
+    logical :: first(size(chattered)), every(size(chattered))
+    integer :: good, bad, middle
+    every = .true.
+    ! The body may still be at rest on the first section behind a chatter.
+    first = cshift(chattered, -1) .or. cshift(chattered, -2)
+    if (.not. any(chattered)) first = every
+    good = most_halvings
+    bad = -1
+    middle = good
+    do
+      attractor%capture_radius = largest_radius/2.0_wp**middle
+      if (all_follow(moving, attractor, first, any(chattered))) then
+        good = middle
+      else
+        bad = middle
+      end if
+      found = bad < most_halvings
+      if (.not. found) return
+      if (good - bad <= 1) exit
+      middle = (good + bad)/2
+    end do
+    do middle = good, most_halvings
+      attractor%capture_radius = largest_radius/2.0_wp**middle
+      found = all_follow(moving, attractor, every, any(chattered))
+      if (found) return
+    end do
+  end subroutine verify
+
+  !> Section points of `periods` drive periods from a state on, what happened meanwhile, and whether a chatter was completed in
+  !> each.
+  pure subroutine collect(moving, strobe, periods, points, chattered, tally, ok)
     type(motion_t), intent(in) :: moving
     type(strobe_t), intent(in) :: strobe
     integer, intent(in) :: periods
     real(wp), intent(out) :: points(:, 0:)
+    logical, intent(out) :: chattered(:)
     type(tally_t), intent(inout) :: tally
     logical, intent(out) :: ok
     type(strobe_t) :: later
+    integer(int64) :: before
     integer :: i, reason
     later = strobe
     call reset_tally(tally, later%state, allocated(moving%pair))
     points(:, 0) = section_point(moving, later)
+    chattered = .false.
     do i = 1, periods
+      before = tally%chatters
       call advance_strobe_period(moving, later, tally, reason)
       ok = reason == 0
       if (.not. ok) return
       points(:, i) = section_point(moving, later)
+      chattered(i) = tally%chatters > before
     end do
   end subroutine collect
 
@@ -152,32 +191,36 @@ contains
     period = whole
   end function smallest_period
 
-  !> Whether every sampled start on rings around every point of the cycle is on it within one round, or nearer by a quarter
-  !> after it.
-  pure logical function all_follow(moving, attractor)
+  !> Whether every sampled start on rings around the `chosen` points of the cycle merges with it within one round, or is nearer by a
+  !> quarter after it.
+  pure logical function all_follow(moving, attractor, chosen, chatters)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
+    logical, intent(in) :: chosen(:), chatters
     real(wp) :: point(attractor%coordinates)
     integer :: i, ring, k, n
     n = attractor%coordinates
     all_follow = .false.
     do i = 1, attractor%period
+      if (.not. chosen(i)) cycle
       do ring = 1, size(rings)
         do k = 1, directions
           point = attractor%points(:n, i) + attractor%scale(:n)*rings(ring)*attractor%capture_radius*direction(k, n)
           if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
-          if (.not. follows(moving, attractor, i, point, rings(ring)*attractor%capture_radius)) return
+          if (.not. follows(moving, attractor, i, point, rings(ring)*attractor%capture_radius, chatters)) return
         end do
       end do
     end do
     all_follow = .true.
   end function all_follow
 
-  pure logical function follows(moving, attractor, i, point, radius)
+  !> Whether a start `point` at a distance `radius` from the `i`-th point of the cycle does.
+  pure logical function follows(moving, attractor, i, point, radius, chatters)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     integer, intent(in) :: i
     real(wp), intent(in) :: point(:), radius
+    logical, intent(in) :: chatters
     type(strobe_t) :: strobe
     type(tally_t) :: tally
     real(wp) :: reached(most_coordinates), distance
@@ -193,7 +236,7 @@ contains
         reached = point_near(section_point(moving, strobe), wanted, attractor%turn)
         distance = norm2((reached(:n) - wanted(:n))/attractor%scale(:n))
       end associate
-      follows = distance <= same_state
+      follows = distance <= max(merged*radius, rounding) .and. (tally%chatters > 0 .or. .not. chatters)
       if (follows) return
     end do
     follows = distance <= 0.75_wp*radius

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A machine of one body or two as the stroboscopic map sees it: a state that moves from section to section, and the
+!> A machine of one body, two or several as the stroboscopic map sees it: a state that moves from section to section, and the
 !> coordinates that fix it there. Those of one body are x and v. Of two, what nothing depends on is left out: the driving
 !> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
 !> velocity of both where nothing ties either to the ground.
@@ -10,6 +10,11 @@ module strobe
   use contact_law, only: contact_t
   use energy, only: energy_of_body, record_with_book
   use event_words, only: canonical_word
+  use jointed_log, only: energy_of_jointed, log_sample, watched_state
+  use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
+  use jointed_section, only: coordinates_of_jointed, fits_section, jointed_at, jointed_point, scales_of_jointed, &
+    start_of_jointed
+  use jointed_state, only: jointed_state_t
   use kinds, only: int64, wp
   use motion, only: advance, advance_period, motion_t, start_state
   use motion_state, only: log_t, record_sample, reset_tally, state_t, take_turns, tally_t
@@ -24,12 +29,13 @@ module strobe
     scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, cycle_word, rest_lasts, energy_now, record_end
 
   !> Coordinates of two bodies.
-  integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5
+  integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5, of_two = 5
 
   !> `state` is that of the body, or of the driven one of two.
   type :: strobe_t
     type(state_t) :: state
     type(pair_state_t) :: pair
+    type(jointed_state_t) :: jointed
   end type strobe_t
 
 contains
@@ -37,7 +43,7 @@ contains
   !> Which coordinates of two bodies count.
   pure function counts_of(moving) result(counts)
     type(motion_t), intent(in) :: moving
-    logical :: counts(most_coordinates)
+    logical :: counts(of_two)
     real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
     associate (machine => moving%pair%machine)
       counts = .false.
@@ -84,6 +90,7 @@ contains
     type(motion_t), intent(in) :: moving
     n = 2
     if (allocated(moving%pair)) n = count(counts_of(moving))
+    if (allocated(moving%jointed)) n = coordinates_of_jointed(moving%jointed)
   end function coordinates_of
 
   !> Whether the state on the section tells what follows: not with a controller that acts at times of its own, nor before
@@ -91,6 +98,7 @@ contains
   pure logical function has_section(moving)
     type(motion_t), intent(in) :: moving
     has_section = .true.
+    if (allocated(moving%jointed)) has_section = fits_section(moving%jointed)
     if (.not. allocated(moving%pair)) return
     associate (machine => moving%pair%machine)
       has_section = .not. machine%sample_time > 0 .and. .not. abs(machine%blow) > 0
@@ -102,7 +110,10 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     type(strobe_t) :: strobe
-    if (allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      strobe%jointed = start_of_jointed(moving%jointed, start(1), start(2), start(3))
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    else if (allocated(moving%pair)) then
       associate (machine => moving%pair%machine)
         strobe%pair = start_pair(moving%pair, start(1), start(2), [machine%driver_x0, machine%driver_v0], start(3))
       end associate
@@ -120,6 +131,10 @@ contains
     type(strobe_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(strobe_t) :: strobe
+    if (allocated(moving%jointed) .and. before%jointed%time >= 0) then
+      strobe = resume_jointed(moving, before, angle)
+      return
+    end if
     if (.not. allocated(moving%pair) .or. before%pair%mode == 0) then
       strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
       return
@@ -131,14 +146,33 @@ contains
     strobe%state = body_state(strobe%pair)
   end function resume_strobe
 
+  !> The same of several bodies: all keep their places and velocities.
+  pure function resume_jointed(moving, before, angle) result(strobe)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: before
+    real(wp), intent(in) :: angle
+    type(strobe_t) :: strobe
+    logical :: ok
+    associate (n => moving%jointed%machine%n)
+      call start_jointed(moving%jointed, before%jointed%q(:n), before%jointed%v(:n), angle, strobe%jointed, ok)
+    end associate
+    strobe%jointed%slider = before%jointed%slider
+    strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (.not. ok) strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
+  end function resume_jointed
+
   !> The state on the section with the coordinates `point`; what they leave open is zero.
   pure function strobe_at(moving, point) result(strobe)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(strobe_t) :: strobe
-    real(wp) :: all_of_them(most_coordinates)
+    real(wp) :: all_of_them(of_two)
     integer :: n
-    if (.not. allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      strobe%jointed = jointed_at(moving%jointed, point)
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      return
+    else if (.not. allocated(moving%pair)) then
       strobe%state = start_state(moving, point(1), point(2), 0.0_wp)
       call take_turns(moving%machine%turn, strobe%state)
       return
@@ -160,10 +194,13 @@ contains
   pure function section_point(moving, strobe) result(point)
     type(motion_t), intent(in) :: moving
     class(strobe_t), intent(in) :: strobe
-    real(wp) :: point(most_coordinates), all_of_them(most_coordinates)
+    real(wp) :: point(most_coordinates), all_of_them(of_two)
     integer :: n
     point = 0
-    if (.not. allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      point = jointed_point(moving%jointed, strobe%jointed)
+      return
+    else if (.not. allocated(moving%pair)) then
       point(:2) = [strobe%state%x, strobe%state%v]
       return
     end if
@@ -194,11 +231,13 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates), w, length
-    logical :: counts(most_coordinates)
+    logical :: counts(of_two)
     integer :: n
     w = moving%machine%drive_frequency
     scales = 1
-    if (.not. allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      scales = scales_of_jointed(moving%jointed, half_range)
+    else if (.not. allocated(moving%pair)) then
       length = half_range
       if (moving%machine%turn > 0) length = min(length, moving%machine%turn/2)
       scales(:2) = length*[1.0_wp, w]
@@ -220,7 +259,10 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    if (allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      call advance_jointed(moving%jointed, strobe%jointed, time_end, tally, reason, log)
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    else if (allocated(moving%pair)) then
       call advance_pair(moving%pair, strobe%pair, time_end, tally, reason, log)
       strobe%state = body_state(strobe%pair)
     else
@@ -235,7 +277,10 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    if (allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      call advance_jointed_period(moving%jointed, strobe%jointed, tally, reason, log)
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    else if (allocated(moving%pair)) then
       call advance_pair_period(moving%pair, strobe%pair, tally, reason, log)
       strobe%state = body_state(strobe%pair)
     else
@@ -288,7 +333,9 @@ contains
   pure real(wp) function energy_now(moving, strobe) result(energy)
     type(motion_t), intent(in) :: moving
     class(strobe_t), intent(in) :: strobe
-    if (allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      energy = energy_of_jointed(moving%jointed%machine, strobe%jointed)
+    else if (allocated(moving%pair)) then
       energy = energy_of(moving%pair, strobe%pair)
     else
       energy = energy_of_body(moving%machine, strobe%state)
@@ -303,7 +350,9 @@ contains
     type(log_t), intent(inout) :: log
     log%book%at_end = energy_now(moving, strobe)
     if (.not. sampled) return
-    if (allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      call log_sample(moving%jointed%machine, strobe%jointed, log)
+    else if (allocated(moving%pair)) then
       call record_sample(log, strobe%state, driver_of(strobe%pair), log%book)
     else
       call record_with_book(moving%machine, strobe%state, log)

@@ -11,6 +11,8 @@ module c_machine
   use contact_law, only: barrier_positions
   use errors, only: error_t
   use grid, only: grid_t, slice_motion
+  use jointed_section, only: start_of_jointed
+  use jointed_state, only: jointed_state_t
   use kinds, only: int64, wp
   use lanes, only: prepare_lanes
   use model_type, only: check_values, model_t
@@ -76,9 +78,13 @@ contains
     real(wp), intent(in) :: start(3)
     character(len=:), allocatable :: problem
     type(axis_t) :: no_axes(0)
+    type(jointed_state_t) :: state
     real(wp) :: barriers(2)
     problem = ''
-    if (all(ieee_is_finite(start))) then
+    if (all(ieee_is_finite(start)) .and. allocated(prepared%journey%moving%jointed)) then
+      state = start_of_jointed(prepared%journey%moving%jointed, start(1), start(2), start(3))
+      if (any(state%q /= state%q)) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
+    else if (all(ieee_is_finite(start))) then
       ! The names of the barriers are looked up only where they may be needed.
       associate (moving => prepared%journey%moving)
         if (.not. allocated(moving%pair)) then

@@ -163,15 +163,15 @@ contains
     end if
     rows = parameters_of(effect_family, name)
     do i = 1, size(keys)
-      if (any(rows%name == keys(i))) cycle
+      if (any(rows%name == name_of(keys(i)))) cycle
       call fail(error, exit_bad_case, 'effect.'//name//': parameter '''//trim(keys(i))//''': unknown; allowed '// &
                 join(rows%name, ', '))
       return
     end do
     added = law_choice(effect_family, name)
     do i = 1, size(rows)
-      if (any(keys == rows(i)%name)) then
-        call set_value(added, trim(rows(i)%name), [values(findloc(keys == rows(i)%name, .true., dim=1))])
+      if (any(name_of(keys) == rows(i)%name)) then
+        call set_value(added, trim(rows(i)%name), pack(values, name_of(keys) == rows(i)%name))
       else if (.not. rows(i)%optional) then
         call fail(error, exit_bad_case, 'effect.'//name//': '''//trim(rows(i)%name)//''' is missing')
         return
@@ -182,5 +182,12 @@ contains
     call load_case_text(echo_case(changed), model%the_case%path, no_overrides, extended%the_case, error)
     if (.not. allocated(error)) extended%parameters = list_parameters(extended%the_case%laws)
   end subroutine model_with_effect
+
+  !> Name of a parameter without the place in its list: 'change' of 'change[2]'. Items are given in their order.
+  pure elemental function name_of(key) result(name)
+    character(len=*), intent(in) :: key
+    character(len=len(key)) :: name
+    name = key(:index(key//'[', '[') - 1)
+  end function name_of
 
 end module model_type

@@ -4,13 +4,19 @@
 !> What must hold between the values of a case, here and for every combination of its axes.
 module case_check
   use axis, only: axis_t
+  use build_jointed, only: is_jointed
+  use build_motion, only: machine_of
   use case_parameters, only: is_start, parameter_value, set_parameter
   use case_source, only: case_source_t, report
   use case_type, only: case_t
   use errors, only: error_t, fail
+  use jointed_section, only: start_of_jointed
+  use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use law_check, only: check_laws, is_good
   use law_table, only: effect_family, families, law_choice_t
+  use motion, only: motion_t
+  use motion_state, only: options_t
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -20,6 +26,9 @@ module case_check
 
   !> Combinations of axis values that are checked one by one; of more, the corners.
   integer, parameter :: most_combinations = 4096
+
+  !> Axes whose corners are looked at for bodies that overlap.
+  integer, parameter :: most_corner_axes = 6
 
   !> Most points of a tile.
   integer, parameter :: most_tile_points = 2**24
@@ -157,6 +166,10 @@ contains
     character(len=:), allocatable :: problem
     integer :: i, j
     logical :: is_axis
+    if (is_jointed(the_case%laws)) then
+      if (is_good(source, ['spring  ', 'friction', 'drive   ', 'watch   '])) call check_bodies_at_start(source, the_case)
+      return
+    end if
     is_axis = .false.
     do i = 1, size(the_case%axes)
       if (the_case%axes(i)%name /= 'x0') cycle
@@ -174,6 +187,48 @@ contains
     end if
     if (of_sweep) call check_sweep_starts(source, the_case, is_axis .or. len(problem) > 0)
   end subroutine check_starts
+
+  !> No bodies overlap at the start, at all corners of the axes (gaps are linear in positions and stops).
+  subroutine check_bodies_at_start(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(in) :: the_case
+    type(law_choice_t) :: laws(size(the_case%laws))
+    type(motion_t) :: moving
+    type(jointed_state_t) :: state
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: at
+    real(wp) :: start(3), value
+    integer :: corner, i
+    do corner = 0, 2**min(size(the_case%axes), most_corner_axes) - 1
+      laws = the_case%laws
+      start = [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle]
+      at = ''
+      do i = 1, size(the_case%axes)
+        associate (values => the_case%axes(i)%values)
+          value = values(merge(size(values), 1, btest(corner, i - 1)))
+        end associate
+        at = at//' '//trim(the_case%axes(i)%name)//' = '//to_text(value)
+        select case (the_case%axes(i)%name)
+        case ('x0')
+          start(1) = value
+        case ('v0')
+          start(2) = value
+        case ('crank_angle')
+          start(3) = value
+        case default
+          call set_parameter(laws, trim(the_case%axes(i)%name), value, error)
+        end select
+      end do
+      call machine_of(laws, options_t(), moving, error)
+      if (allocated(error)) return
+      state = start_of_jointed(moving%jointed, start(1), start(2), start(3))
+      if (.not. any(state%q /= state%q)) cycle
+      if (len(at) > 0) at = ' (at'//at//')'
+      call report(source, 'start.x0', 'found bodies beyond a stop of a [contact.NAME] at the start, allowed within all of '// &
+                  'them'//at)
+      return
+    end do
+  end subroutine check_bodies_at_start
 
   !> The same for the starts of the sweep; `skip_start`: do not look at start.x0.
   subroutine check_sweep_starts(source, the_case, skip_start)

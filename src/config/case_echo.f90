@@ -7,7 +7,8 @@ module case_echo
   use axis, only: axis_t, linear_values
   use case_type, only: case_t, sweep_t
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, parameter_row_t, parameters_of, table_of
+  use law_table, only: effect_family, is_hidden, label_length, law_choice_t, parameter_row_t, parameters_of, part_family, &
+    part_kind, part_law, path_of, value_of
   use refinement, only: refine_t
   use text, only: to_text
   use toml_bindings, only: hash_text
@@ -31,7 +32,7 @@ contains
     if (len(the_case%title) > 0) text = text//'title = '//quoted(the_case%title)//newline
     text = text//deciding_text(the_case, '')
     do i = 1, size(the_case%laws)
-      if (is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i))
+      if (is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i), body_names(the_case%laws))
     end do
     associate (record => the_case%record)
       text = text//newline//'[record]'//newline//line('rate', to_text(record%rate))//line('noise', to_text(record%noise))// &
@@ -59,7 +60,8 @@ contains
     integer :: i
     text = ''
     do i = 1, size(the_case%laws)
-      if (.not. is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i))
+      if (.not. is_sensor(the_case%laws(i)) .and. is_written(the_case, i)) text = text//law_text(the_case%laws(i), &
+                                                                                body_names(the_case%laws))
     end do
     text = text//settings_text(the_case)
     if (kind == '' .or. kind == 'trajectory') text = text//newline//'[trajectory]'//newline// &
@@ -79,25 +81,76 @@ contains
     is_sensor = law%family == effect_family .and. index(law%name, 'sensor_') == 1
   end function is_sensor
 
-  !> One table of a law; a barrier that is not there (at the largest number) is left out.
-  pure function law_text(law) result(text)
+  !> One table of a law; a barrier that is not there (at the largest number) is left out. `names` are those of the bodies.
+  pure function law_text(law, names) result(text)
     type(law_choice_t), intent(in) :: law
+    character(len=*), intent(in) :: names(:)
     character(len=:), allocatable :: text
     type(parameter_row_t), allocatable :: rows(:)
     integer :: i
-    text = newline//'['//table_of(law%family, law%name)//']'//newline
-    if (law%family /= effect_family) text = text//line('law', quoted(trim(law%name)))
+    text = newline//'['//path_of(law)//']'//newline
+    if (law%family == part_family) then
+      if (part_kind(law%name) /= 'body') text = text//line('law', quoted(part_law(law%name)))
+      text = text//ends_text(law, names)
+    else if (law%family /= effect_family .and. law%name /= 'structure') then
+      text = text//line('law', quoted(trim(law%name)))
+    end if
     rows = parameters_of(law%family, law%name)
     do i = 1, size(rows)
+      if (law%family == part_family .and. is_hidden(rows(i))) cycle
       associate (values => law%parameters(i)%values)
         if (rows(i)%list) then
-          text = text//line(trim(rows(i)%name), reals(values))
+          if (size(values) > 0 .or. law%family /= part_family) text = text//line(trim(rows(i)%name), reals(values))
         else if (abs(values(1)) < huge(1.0_wp)) then
           text = text//line(trim(rows(i)%name), to_text(values(1)))
         end if
       end associate
     end do
+    if (law%name == 'body:watched') text = text//newline//'[watch]'//newline//line('body', quoted(trim(law%label)))
   end function law_text
+
+  !> The ends of a part.
+  pure function ends_text(law, names) result(text)
+    type(law_choice_t), intent(in) :: law
+    character(len=*), intent(in) :: names(:)
+    character(len=:), allocatable :: text
+    select case (part_kind(law%name))
+    case ('body')
+      text = ''
+    case ('drive')
+      text = line('body', quoted(trim(names(nint(value_of(law, 'body'))))))
+    case default
+      text = line('between', '['//end_text('first')//', '//end_text('second')//']')
+    end select
+
+  contains
+
+    pure function end_text(which) result(name)
+      character(len=*), intent(in) :: which
+      character(len=:), allocatable :: name
+      integer :: number
+      number = nint(value_of(law, which))
+      name = quoted('ground')
+      if (number > 0) name = quoted(trim(names(number)))
+    end function end_text
+
+  end function ends_text
+
+  !> Names of the bodies of a machine of several.
+  pure function body_names(laws) result(names)
+    type(law_choice_t), intent(in) :: laws(:)
+    character(len=label_length), allocatable :: names(:)
+    names = pack(laws%label, index(laws%name, 'body:') == 1)
+  end function body_names
+
+  !> Whether the case has the table of a law: of several bodies, only those that it wrote.
+  pure logical function is_written(the_case, i)
+    type(case_t), intent(in) :: the_case
+    integer, intent(in) :: i
+    is_written = .true.
+    if (the_case%laws(1)%name /= 'structure') return
+    is_written = i == 1 .or. the_case%laws(i)%family == part_family .or. the_case%laws(i)%family == effect_family
+  end function is_written
 
   pure function settings_text(the_case) result(text)
     type(case_t), intent(in) :: the_case

@@ -7,7 +7,8 @@ module case_parameters
   use case_values, only: allowed_range, any_number, between, bounds_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: change_parameter, largest_angle, law_choice_t, parameter_row_t, parameters_of, table_of
+  use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
+    path_of
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
   implicit none
@@ -45,7 +46,8 @@ contains
     do i = 1, size(laws)
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
-        if (rows(j)%list .or. table_of(rows(j)%family, rows(j)%law)//'.'//trim(rows(j)%name) /= canonical_name(path)) cycle
+        if (rows(j)%list .or. path_of(laws(i))//'.'//trim(rows(j)%name) /= canonical_name(path)) cycle
+        if (is_hidden(rows(j))) cycle
         law = i
         row = j
       end do
@@ -93,9 +95,9 @@ contains
     do i = 1, size(laws)
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
-        if (rows(j)%list) cycle
+        if (rows(j)%list .or. is_hidden(rows(j))) cycle
         if (len(names) > 0) names = names//', '
-        names = names//table_of(rows(j)%family, rows(j)%law)//'.'//trim(rows(j)%name)
+        names = names//path_of(laws(i))//'.'//trim(rows(j)%name)
       end do
     end do
   end function parameter_names

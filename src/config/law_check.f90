@@ -3,12 +3,14 @@
 
 !> What must hold between the values of one choice of laws.
 module law_check
+  use build_jointed, only: is_jointed, jointed_of
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
   use drive_law, only: same_force
   use effect_check, only: refuse_effects
   use errors, only: error_t
+  use jointed, only: jointed_t
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
   use lever_reach, only: check_assembly
@@ -117,8 +119,12 @@ contains
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: at
     type(pair_t) :: pair
+    type(jointed_t) :: jointed
     type(error_t), allocatable :: error
-    if (is_pair(laws)) then
+    if (is_jointed(laws)) then
+      if (.not. is_good(source, ['spring'])) return
+      call jointed_of(laws, jointed, error)
+    else if (is_pair(laws)) then
       call build_pair(laws, pair, error)
     else
       call refuse_pair(laws, error)

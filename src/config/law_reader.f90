@@ -8,6 +8,7 @@ module law_reader
   use case_values, only: take_real, take_reals, take_text
   use force_record, only: read_force
   use kinds, only: wp
+  use part_reader, only: has_parts, read_parts
   use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
     parameters_of, set_value, table_of
   use suggest, only: nearest_word
@@ -26,6 +27,16 @@ contains
     type(law_choice_t), allocatable, intent(out) :: choices(:)
     integer :: i
     allocate (choices(size(families)))
+    if (has_parts(source)) then
+      choices(1) = law_choice('body', 'structure')
+      call read_parameters(source, choices(1))
+      do i = 2, size(families)
+        choices(i) = law_choice(families(i), 'none')
+      end do
+      call read_effects(source, choices)
+      call read_parts(source, choices)
+      return
+    end if
     do i = 1, size(families)
       call read_law(source, trim(families(i)), choices(i))
     end do

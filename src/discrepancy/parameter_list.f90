@@ -5,7 +5,7 @@
 !> 'drive.cosine[2]', 'effect.dahl.stiffness'.
 module parameter_list
   use kinds, only: wp
-  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of, table_of
+  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of, path_of, is_hidden
   use text, only: to_text
   implicit none
   private
@@ -38,14 +38,15 @@ contains
       rows = parameters_of(laws(i)%family, laws(i)%name)
       if (laws(i)%name == 'measured_force') cycle
       do j = 1, size(rows)
+        if (is_hidden(rows(j))) cycle
         one = parameter_t(unit=rows(j)%unit, lower=rows(j)%lower, upper=rows(j)%upper, lower_open=rows(j)%lower_open, &
                           law=i, row=j)
-        one%path = table_of(rows(j)%family, rows(j)%law)//'.'//rows(j)%name
+        one%path = path_of(laws(i))//'.'//rows(j)%name
         do k = 1, size(laws(i)%parameters(j)%values)
           one%value = laws(i)%parameters(j)%values(k)
           if (abs(one%value) >= huge(one%value)) cycle
           if (rows(j)%list) then
-            one%path = table_of(rows(j)%family, rows(j)%law)//'.'//trim(rows(j)%name)//'['//to_text(k)//']'
+            one%path = path_of(laws(i))//'.'//trim(rows(j)%name)//'['//to_text(k)//']'
             one%item = k
           end if
           list = [list, one]

@@ -91,7 +91,7 @@ contains
     plan = plan_t(laws, options, chosen, values, directions)
     call build(plan, values, .false., family%moving, error)
     if (allocated(error)) return
-    if (allocated(family%moving%pair)) then
+    if (allocated(family%moving%pair) .or. allocated(family%moving%jointed)) then
       call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
       return
     end if

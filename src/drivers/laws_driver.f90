@@ -5,7 +5,8 @@
 module laws_driver
   use journal, only: json_text
   use kinds, only: wp
-  use law_table, only: effect_family, families, laws, parameter_row_t, parameters_of, table_of
+  use law_table, only: effect_family, families, is_hidden, laws, parameter_row_t, parameters_of, part_family, part_kind, &
+    part_law, table_of
   use text, only: to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
@@ -18,7 +19,8 @@ contains
   !> Prints every law with parameters, units, bounds and source.
   subroutine run_laws(json)
     logical, intent(in) :: json
-    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: effect_family]]
+    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: part_family, &
+      effect_family]]
     integer :: i, k
     logical :: first
     if (json) write (output_unit, '(a)') '['
@@ -45,6 +47,8 @@ contains
     associate (row => laws(law))
       if (row%family == effect_family) then
         write (output_unit, '(a)') '  ['//table_of(row%family, row%name)//']: '//trim(row%meaning)
+      else if (row%family == part_family) then
+        write (output_unit, '(a)') '  '//part_text(trim(row%name))//': '//trim(row%meaning)
       else
         write (output_unit, '(a)') '  law = "'//trim(row%name)//'": '//trim(row%meaning)
       end if
@@ -52,10 +56,27 @@ contains
       rows = parameters_of(trim(row%family), trim(row%name))
     end associate
     do i = 1, size(rows)
+      if (is_hidden(rows(i))) cycle
       write (output_unit, '(4x,a20,1x,a9,1x,a)') rows(i)%name, rows(i)%unit, &
         range_text(rows(i))//default_text(rows(i))//': '//trim(rows(i)%meaning)
     end do
   end subroutine print_plain
+
+  !> How a part is written down.
+  pure function part_text(law) result(text)
+    character(len=*), intent(in) :: law
+    character(len=:), allocatable :: text
+    text = '['//part_kind(law)//'.NAME]'
+    select case (part_kind(law))
+    case ('body')
+      return
+    case ('drive')
+      text = text//' body = "BODY",'
+    case default
+      text = text//' between = ["BODY", "BODY" or "ground"],'
+    end select
+    text = text//' law = "'//part_law(law)//'"'
+  end function part_text
 
   subroutine print_json(law, first)
     integer, intent(in) :: law

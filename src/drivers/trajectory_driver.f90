@@ -13,6 +13,7 @@ module trajectory_driver
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
+  use jointed, only: jointed_t
   use journal, only: duration_text
   use kinds, only: int64, wp
   use map_final, only: write_whole
@@ -83,6 +84,7 @@ contains
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     if (allocated(moving%pair)) call add_driver_events(log, schema)
+    if (allocated(moving%jointed)) call add_joint_events(moving%jointed%machine, log, schema)
     call add_energy(moving, log, schema)
     call add_book(log%book, outcome%reason == reason_time_over, schema)
     call session%provenance%finish(schema)
@@ -174,7 +176,9 @@ contains
                              data=log%sample_data(2, :log%samples))
     call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
                              data=log%sample_data(3, :log%samples))
-    if (allocated(moving%pair)) then
+    if (allocated(moving%jointed)) then
+      call add_bodies(moving%jointed%machine, log, schema)
+    else if (allocated(moving%pair)) then
       call schema%add_variable('driver_x', type_float64, ['time'], units='m', long_name='position of the driving body', &
                                data=log%sample_driver(1, :log%samples))
       call schema%add_variable('driver_v', type_float64, ['time'], units='m/s', long_name='velocity of the driving body', &
@@ -206,6 +210,47 @@ contains
     call schema%add_attribute('', 'energy_end', book%at_end)
     call schema%add_attribute('', 'energy_closing_error', closing_error(book))
   end subroutine add_book
+
+  !> Position and velocity of every body of several.
+  subroutine add_bodies(machine, log, schema)
+    type(jointed_t), intent(in) :: machine
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    character(len=:), allocatable :: name
+    integer :: i
+    do i = 1, machine%n
+      name = trim(machine%names(i))
+      call schema%add_variable(name//'_x', type_float64, ['time'], units='m', long_name='position of '//name, &
+                               data=log%sample_coordinates(i, :log%samples))
+      call schema%add_variable(name//'_v', type_float64, ['time'], units='m/s', long_name='velocity of '//name, &
+                               data=log%sample_coordinates(machine%n + i, :log%samples))
+    end do
+  end subroutine add_bodies
+
+  !> The joint of each event.
+  subroutine add_joint_events(machine, log, schema)
+    type(jointed_t), intent(in) :: machine
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    character(len=:), allocatable :: names
+    real(wp), allocatable :: joints(:, :)
+    integer :: i
+    if (size(machine%joints) == 0) return
+    names = ''
+    do i = 1, size(machine%joints)
+      names = names//trim(machine%joints(i)%name)//' '
+    end do
+    allocate (joints(4, log%events))
+    if (log%events > 0) joints = log%event_joint(:, :log%events)
+    call schema%add_variable('event_joint', type_int8, ['event'], units='1', long_name='joint', &
+                             flag_values=[(i, i=1, size(machine%joints))], flag_meanings=trim(names), data=joints(1, :))
+    call schema%add_variable('event_joint_x', type_float64, ['event'], units='m', &
+                             long_name='joint coordinate: second body minus first', data=joints(2, :))
+    call schema%add_variable('event_joint_v_before', type_float64, ['event'], units='m/s', &
+                             long_name='its rate just before the event', data=joints(3, :))
+    call schema%add_variable('event_joint_v_after', type_float64, ['event'], units='m/s', &
+                             long_name='its rate just after the event', data=joints(4, :))
+  end subroutine add_joint_events
 
   !> The driving body of two at the events.
   subroutine add_driver_events(log, schema)

@@ -14,6 +14,7 @@ module motion
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
   use exact_flow, only: flow_t, prepare_flow
+  use jointed_motion, only: jointed_motion_t
   use kinds, only: wp
   use layer_transit, only: cross_layer, prepare_transit, transit_t
   use motion_state, only: append_word, event_barrier_release, event_chatter_lower, &
@@ -55,6 +56,8 @@ module motion
     real(wp) :: layer = 0
     !> Two bodies, which have an event loop of their own.
     type(pair_motion_t), allocatable :: pair
+    !> Several bodies with joints.
+    type(jointed_motion_t), allocatable :: jointed
   end type motion_t
 
 contains

@@ -46,6 +46,16 @@ contains
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     real(wp) :: kinetic(log%samples)
+    integer :: i
+    if (allocated(moving%jointed)) then
+      associate (machine => moving%jointed%machine)
+        do i = 1, log%samples
+          kinetic(i) = 0.5_wp*sum(log%sample_coordinates(machine%n + 1:, i) &
+                                  *matmul(machine%mass, log%sample_coordinates(machine%n + 1:, i)))
+        end do
+      end associate
+      return
+    end if
     kinetic = 0.5_wp*moving%machine%mass*log%sample_data(3, :log%samples)**2
     if (.not. allocated(moving%pair)) return
     if (moving%pair%machine%drive /= driven_by_motion) then

@@ -6,7 +6,7 @@
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
   use elementary, only: exponential, logarithm
-  use contact_law, only: contact_kelvin_voigt
+  use contact_law, only: contact_curve, contact_kelvin_voigt
   use effect_law, only: constant_force
   use exact_flow, only: flow_t, largest_damping_ratio
   use kinds, only: wp
@@ -152,7 +152,9 @@ contains
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
-    if (flow%width <= 0 .or. allocated(moving%pair)) return
+    if (flow%width <= 0 .or. allocated(moving%pair) .or. allocated(moving%jointed)) return
+    ! A table of the restitution is left to single flights.
+    if (moving%machine%contact%kind == contact_curve) return
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
     else

@@ -7,9 +7,10 @@
 !> and never pulls unless the law says so.
 module contact_law
   use contact_rows, only: restitution_formulas
+  use curve_law, only: curve_of, curve_t, value_at
   use elementary, only: exponential, logarithm
   use kinds, only: wp
-  use law_table, only: law_choice_t, value_of
+  use law_table, only: law_choice_t, list_of, value_of
   use restitution_law, only: formula_damping, kelvin_voigt_ratio
   implicit none
   private
@@ -18,7 +19,7 @@ module contact_law
     restitution_at, contact_force, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
-    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5
+    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6
 
   type, public :: contact_t
     integer :: kind = contact_constant
@@ -29,6 +30,8 @@ module contact_law
     real(wp) :: lower = -huge(1.0_wp)
     !> Two coefficients of a restitution that depends on the speed.
     real(wp) :: coefficients(2) = 0
+    !> Change of the restitution over the speed.
+    type(curve_t) :: change
     !> A barrier with a force over penetration: positions of its surfaces [m], huge means none.
     logical :: soft = .false.
     real(wp) :: soft_upper = huge(1.0_wp)
@@ -77,12 +80,20 @@ contains
   pure subroutine add_to_contact(law, choice)
     type(contact_t), intent(inout) :: law
     type(law_choice_t), intent(in) :: choice
-    real(wp) :: position
+    real(wp) :: position, given
     select case (choice%name)
     case ('restitution_slope')
       if (.not. value_of(choice, 'slope') > 0) return
       law%kind = contact_linear
       law%coefficients(1) = value_of(choice, 'slope')
+    case ('restitution_curve')
+      if (.not. any(abs(list_of(choice, 'change')) > 0)) return
+      law%kind = contact_curve
+      ! What is left at low speed is the restitution that chatter ends with.
+      given = law%restitution
+      law%change = curve_of(list_of(choice, 'speed'), list_of(choice, 'change'))
+      law%restitution = min(1.0_wp, max(0.0_wp, given + law%change%value(1)))
+      law%change = curve_of(list_of(choice, 'speed'), list_of(choice, 'change') - (law%restitution - given))
     case ('second_barrier')
       position = value_of(choice, 'position')
       if (law%upper < huge(1.0_wp)) then
@@ -175,6 +186,8 @@ contains
     select case (law%kind)
     case (contact_linear)
       k = max(0.0_wp, law%restitution - law%coefficients(1)*speed)
+    case (contact_curve)
+      k = min(1.0_wp, max(0.0_wp, law%restitution + value_at(law%change, speed)))
     case (contact_power)
       if (speed > law%coefficients(1)) k = k*exponential(-law%coefficients(2)*logarithm(speed/law%coefficients(1)))
     case (contact_viscoelastic)

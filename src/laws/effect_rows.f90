@@ -13,7 +13,7 @@ module effect_rows
   character(len=*), parameter :: sum_of_laws = 'sum of two laws'
   character(len=*), parameter :: sensor = 'what a sensor shows; the motion is the same'
 
-  type(law_row_t), parameter, public :: effect_laws(17) = [ &
+  type(law_row_t), parameter, public :: effect_laws(18) = [ &
     law_row_t('effect', 'viscous', '-b v', sum_of_laws), &
     law_row_t('effect', 'coulomb', '-F sgn v; adds to sliding and to break-away friction', sum_of_laws), &
     law_row_t('effect', 'quadratic_drag', '-c v |v|', 'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
@@ -30,6 +30,8 @@ module effect_rows
     law_row_t('effect', 'offset_force', 'constant force: preload or tilt', sum_of_laws), &
     law_row_t('effect', 'restitution_slope', 'k falls with the speed of impact: k - slope |v|, not below 0', &
               'Goldsmith, Impact (1960)'), &
+    law_row_t('effect', 'restitution_curve', 'k + change(|v|), between 0 and 1: a table over the speed of impact, C1', &
+              'Goldsmith, Impact (1960)'), &
     law_row_t('effect', 'compliant_contact', 'rigid barriers become soft: K p^n (1 + a p''), never pulls', &
               'Hunt, Crossley, J. Appl. Mech. 42 (1975)'), &
     law_row_t('effect', 'second_barrier', 'a barrier on the free side, with the same law', sum_of_laws), &
@@ -39,7 +41,7 @@ module effect_rows
     law_row_t('effect', 'sensor_gain', 'a record shows (1 + gain) x', sensor), &
     law_row_t('effect', 'sensor_delay', 'a record shows x(t - delay)', sensor)]
 
-  type(parameter_row_t), parameter, public :: effect_parameters(24) = [ &
+  type(parameter_row_t), parameter, public :: effect_parameters(26) = [ &
     parameter_row_t('effect', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
                     'b'), &
     parameter_row_t('effect', 'coulomb', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
@@ -68,6 +70,10 @@ module effect_rows
                     'constant force upwards'), &
     parameter_row_t('effect', 'restitution_slope', 'slope', 's/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
                     'loss of restitution per speed'), &
+    parameter_row_t('effect', 'restitution_curve', 'speed', 'm/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
+                    'speeds of impact, ascending; constant beyond the first and the last'), &
+    parameter_row_t('effect', 'restitution_curve', 'change', '1', -1.0_wp, 1.0_wp, .false., .false., 0.0_wp, .true., &
+                    'change of the restitution at these speeds'), &
     parameter_row_t('effect', 'compliant_contact', 'stiffness', 'N/m^n', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'K'), &
     parameter_row_t('effect', 'compliant_contact', 'damping', 's/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
@@ -103,6 +109,7 @@ module effect_rows
     effect_trait_t('cubic_spring', 'spring over stretch', 'flight', 'stiffness', '', ''), &
     effect_trait_t('offset_force', 'constant force', 'flight', 'force', '', ''), &
     effect_trait_t('restitution_slope', over_impacts, 'barrier', 'slope', '', 'contact.restitution'), &
+    effect_trait_t('restitution_curve', over_impacts, 'barrier', 'change', '', 'contact.restitution'), &
     effect_trait_t('compliant_contact', 'contact over penetration', 'barrier', '', 'stiffness damping', 'contact.restitution'), &
     effect_trait_t('second_barrier', 'contact over place', 'barrier', '', '', 'contact.restitution'), &
     effect_trait_t('drive_ripple', 'drive over phase', 'flight', 'sine cosine', '', 'drive.ratio'), &

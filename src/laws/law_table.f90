@@ -10,12 +10,14 @@ module law_table
   use kinds, only: wp
   use law_row, only: family_length, law_length, law_row_t, none_above, none_below, parameter_row_t
   use pair_rows, only: pair_laws, pair_parameters
+  use part_rows, only: part_laws, part_parameters
   use text, only: join
   implicit none
   private
 
   public :: law_row_t, parameter_row_t
-  public :: find_law, law_names, parameters_of, table_of, law_choice, value_of, list_of, set_value, change_parameter
+  public :: find_law, law_names, parameters_of, table_of, path_of, part_kind, part_law, is_hidden, law_choice, value_of, list_of, &
+    set_value, change_parameter
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
@@ -23,6 +25,11 @@ module law_table
 
   !> What may be added to a machine of one body: any number of laws.
   character(len=*), parameter, public :: effect_family = 'effect'
+
+  !> The parts of a machine of several bodies: any number of laws, each with a name of its own. Their laws are named
+  !> 'table:law'.
+  character(len=*), parameter, public :: part_family = 'part'
+  integer, parameter, public :: label_length = 32
 
   !> Largest |angle| [rad]: beyond it the rounding of the angle shows in its sine.
   real(wp), parameter, public :: largest_angle = 1e4_wp
@@ -36,6 +43,8 @@ module law_table
   type, public :: law_choice_t
     character(len=family_length) :: family = ''
     character(len=law_length) :: name = ''
+    !> Name of a part.
+    character(len=label_length) :: label = ''
     type(parameter_value_t), allocatable :: parameters(:)
   end type law_choice_t
 
@@ -139,11 +148,11 @@ module law_table
                     '1: samples of one period, a last step leads back to the first; 0: up to the last')]
 
   type(law_row_t), parameter, public :: laws( &
-    size(other_laws) + size(contact_laws) + size(pair_laws) + size(effect_laws)) = &
-    [other_laws, contact_laws, pair_laws, effect_laws]
+    size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws)) = &
+    [other_laws, contact_laws, pair_laws, part_laws, effect_laws]
   type(parameter_row_t), parameter, public :: parameters( &
-    size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(effect_parameters)) = &
-    [other_parameters, contact_parameters, pair_parameters, effect_parameters]
+    size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(part_parameters) + &
+    size(effect_parameters)) = [other_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters]
 
 contains
 
@@ -191,6 +200,38 @@ contains
     table = trim(family)
     if (family == effect_family) table = table//'.'//trim(law)
   end function table_of
+
+  !> Table of a choice in a case file: that of its law, of a part 'table.NAME'.
+  pure function path_of(choice) result(path)
+    type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: path
+    if (choice%family == part_family) then
+      path = part_kind(choice%name)//'.'//trim(choice%label)
+    else
+      path = table_of(choice%family, choice%name)
+    end if
+  end function path_of
+
+  !> The table that the law of a part stands in: 'friction' of 'friction:coulomb'.
+  pure function part_kind(law) result(table)
+    character(len=*), intent(in) :: law
+    character(len=:), allocatable :: table
+    table = law(:index(law, ':') - 1)
+  end function part_kind
+
+  !> The law of a part without its table: 'coulomb' of 'friction:coulomb'.
+  pure function part_law(law) result(name)
+    character(len=*), intent(in) :: law
+    character(len=:), allocatable :: name
+    name = trim(law(index(law, ':') + 1:))
+  end function part_law
+
+  !> Whether a row is set by names of bodies, not by a number.
+  pure logical function is_hidden(row)
+    type(parameter_row_t), intent(in) :: row
+    is_hidden = row%law == 'structure' .or. &
+      (row%family == part_family .and. (row%name == 'first' .or. row%name == 'second' .or. row%name == 'body'))
+  end function is_hidden
 
   !> A law with every parameter at its default (zero where it has none, empty lists): set the
   !> others before use. Stops nothing: an unknown law has no parameters.
@@ -250,15 +291,15 @@ contains
     mark = index(path, '.', back=.true.)
     name = trim(path(mark + 1:))
     do i = 1, size(choices)
-      if (table_of(choices(i)%family, choices(i)%name) /= path(:mark - 1)) cycle
+      if (path_of(choices(i)) /= path(:mark - 1)) cycle
       rows = parameters_of(choices(i)%family, choices(i)%name)
       k = findloc(rows%name == name .and. .not. rows%list, .true., dim=1)
       if (k == 0) cycle
       found = .true.
       before = choices(i)%parameters(k)%values(1)
       choices(i)%parameters(k)%values = [value]
-      k = findloc(rows%name == 'static_coefficient', .true., dim=1)
-      if (name /= 'kinetic_coefficient' .or. k == 0) cycle
+      k = findloc(rows%name == 'static_coefficient' .or. rows%name == 'static_force', .true., dim=1)
+      if ((name /= 'kinetic_coefficient' .and. name /= 'force') .or. k == 0) cycle
       if (.not. abs(choices(i)%parameters(k)%values(1) - before) > 0) choices(i)%parameters(k)%values = [value]
     end do
   end subroutine change_parameter

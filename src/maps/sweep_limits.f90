@@ -5,14 +5,14 @@
 !> settled motion itself comes to an end. A step disturbs a motion; near the end of its branch the smallest disturbance is
 !> enough to throw it off, so that the two differ by more than the step.
 module sweep_limits
-  use attractors, only: most_coordinates
+  use circle, only: point_near
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
   use motion, only: motion_t
   use settling, only: settle, settled_t
   use status, only: reason_time_over
-  use strobe, only: resume_strobe, section_point, strobe_at, strobe_t
+  use strobe, only: resume_strobe, strobe_at, strobe_t
   use sweep, only: hold_parameter, hold_t
   use trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -84,14 +84,17 @@ contains
     real(wp), intent(out) :: bracket(2)
     integer, intent(out) :: outcome
     type(error_t), allocatable, intent(out) :: error
-    type(settled_t) :: there
-    real(wp) :: none(0)
+    type(settled_t) :: there, next
     integer :: from
     bracket = ieee_value(1.0_wp, ieee_quiet_nan)
     outcome = limit_not_known
     from = size(settled)
     there = settled(from)
-    if (there%period == 0) call settle_at(grid, path, course(from), none, state, longest, patience, there, error)
+    if (there%period == 0) then
+      there%state = state
+      call settle_at(grid, path, course(from), there, longest, patience, next, error)
+      if (.not. allocated(error)) there = next
+    end if
     if (allocated(error)) return
     if (there%period == 0 .and. there%mark == mark) return
     do while (there%period == 0 .or. there%mark /= mark)
@@ -117,7 +120,7 @@ contains
     integer, intent(out) :: outcome
     type(error_t), allocatable, intent(out) :: error
     type(settled_t) :: here, next, before
-    real(wp) :: near, far, behind, h, smallest
+    real(wp) :: near, far, behind, h, smallest, ahead
     integer :: i
     bracket = ieee_value(1.0_wp, ieee_quiet_nan)
     outcome = limit_not_known
@@ -134,7 +137,9 @@ contains
       smallest = max(least_step*tolerance, 4*spacing(near))
       far = near + h
       if (abs(h) >= abs(last - near)) far = last
-      call settle_at(grid, path, far, predicted(before, here, behind, near, far), here%state, longest, 0, next, error)
+      ahead = 0
+      if (abs(near - behind) > 0) ahead = (far - near)/(near - behind)
+      call settle_at(grid, path, far, here, longest, 0, next, error, before, ahead)
       if (allocated(error)) return
       if (.not. keeps(next, here) .and. abs(far - near) <= smallest) then
         call look_beyond(grid, path, near, last, step, here, longest, tolerance, far, next, error)
@@ -175,12 +180,12 @@ contains
     real(wp), intent(out) :: far
     type(settled_t), intent(out) :: next
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: none(0), width
+    real(wp) :: width
     ! A little less than the tolerance: sums are rounded.
     width = max(min((1 - least_step)*tolerance, step), 4*spacing(near))
     do
       far = near + sign(min(width, abs(last - near)), last - near)
-      call settle_at(grid, path, far, none, here%state, longest, patience, next, error)
+      call settle_at(grid, path, far, here, longest, patience, next, error)
       if (allocated(error)) return
       if (next%period > 0 .or. next%mark /= here%mark .or. .not. next%near_cycle) return
       if (width >= min(step, abs(last - near))) return
@@ -188,38 +193,32 @@ contains
     end do
   end subroutine look_beyond
 
-  !> The section point at which a branch should be at `far`, on the line through those at `behind` and `near`; without numbers
-  !> where there is no such line.
-  pure function predicted(before, here, behind, near, far) result(point)
-    type(settled_t), intent(in) :: before, here
-    real(wp), intent(in) :: behind, near, far
-    real(wp), allocatable :: point(:)
-    allocate (point(0))
-    if (.not. abs(near - behind) > 0 .or. before%period /= here%period .or. here%state%pair%mode /= 0) return
-    associate (a => before%state%state, b => here%state%state)
-      point = [b%x, b%v] + ([b%x, b%v] - [a%x, a%v])*((far - near)/(near - behind))
-    end associate
-  end function predicted
-
-  !> Where the motion at `value` ends that starts from a section point, or where that has no numbers from the state before.
-  subroutine settle_at(grid, path, value, point, state, longest, patience, settled, error)
+  !> Where the motion at `value` ends that starts from a settled one, `from`; with `ahead` from the section point at which the
+  !> branch should be, `ahead` times as far from `from` as that is from `before`, if both have the same period.
+  subroutine settle_at(grid, path, value, from, longest, patience, settled, error, before, ahead)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path
-    real(wp), intent(in) :: value, point(:)
-    type(strobe_t), intent(in) :: state
+    real(wp), intent(in) :: value
+    type(settled_t), intent(in) :: from
     integer, intent(in) :: longest, patience
     type(settled_t), intent(out) :: settled
     type(error_t), allocatable, intent(out) :: error
+    type(settled_t), intent(in), optional :: before
+    real(wp), intent(in), optional :: ahead
     type(motion_t) :: moving
     type(strobe_t) :: start
+    real(wp) :: here(2), behind(2)
     call machine_with(grid, path, value, moving, error)
     if (allocated(error)) return
-    if (size(point) > 0) then
-      associate (contact => moving%machine%contact)
-        start = strobe_at(moving, [min(max(point(1), contact%lower), contact%upper), point(2)])
-      end associate
-    else
-      start = resume_strobe(moving, state, 0.0_wp)
+    start = resume_strobe(moving, from%state, 0.0_wp)
+    if (present(ahead) .and. .not. allocated(moving%pair)) then
+      if (before%period == from%period) then
+        here = [from%state%state%x, from%state%state%v]
+        behind = point_near([before%state%state%x, before%state%state%v], here, moving%machine%turn)
+        here = here + ahead*(here - behind)
+        here(1) = min(max(here(1), moving%machine%contact%lower), moving%machine%contact%upper)
+        start = strobe_at(moving, here)
+      end if
     end if
     call settle(moving, start, longest, patience, settled)
   end subroutine settle_at

@@ -3,10 +3,11 @@
 
 !> Which effects the laws of a machine have a place for.
 module effect_check
+  use curve_law, only: knots_problem
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: real64, wp
-  use law_table, only: effect_family, law_choice_t, value_of
+  use law_table, only: effect_family, law_choice_t, list_of, value_of
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -25,7 +26,7 @@ contains
     do i = 1, size(choices)
       if (choices(i)%family /= effect_family) cycle
       select case (choices(i)%name)
-      case ('restitution_slope', 'compliant_contact', 'second_barrier')
+      case ('restitution_slope', 'restitution_curve', 'compliant_contact', 'second_barrier')
         problem = contact_problem(choices, choices(i))
       case ('drive_ripple')
         problem = ripple_problem(choices, choices(i))
@@ -50,7 +51,13 @@ contains
     problem = ''
     law = name_of(choices, 'contact')
     select case (effect%name)
-    case ('restitution_slope')
+    case ('restitution_slope', 'restitution_curve')
+      if (effect%name == 'restitution_curve') then
+        problem = knots_problem(list_of(effect, 'speed'), size(list_of(effect, 'change')))
+        if (len(problem) > 0) problem = '.speed: found '//to_text(size(list_of(effect, 'speed')))//' knots and '// &
+                                        to_text(size(list_of(effect, 'change')))//' values of change, '//problem
+        if (has_effect(choices, 'restitution_slope')) problem = ': found with effect.restitution_slope, allowed one of them'
+      end if
       if (law /= 'newton') problem = ': found with contact.law = "'//law//'", allowed with "newton"'
       if (has_effect(choices, 'compliant_contact')) problem = ': found with effect.compliant_contact, allowed one of them'
     case ('compliant_contact')

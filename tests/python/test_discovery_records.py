@@ -175,7 +175,8 @@ def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys
         raise OSError(28, "No space left on device")
 
     verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
-    verdict |= {"reasons": [], "separating_experiment": "", "warnings": [], "asked_for": None, "remains": []}
+    verdict |= {"reasons": [], "separating_experiment": "", "warnings": [], "asked_for": None}
+    verdict |= {"remains": [], "families": [], "function": None}
     monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
     monkeypatch.setattr(cli, "write_results", write)
     monkeypatch.setattr(cli, "write_report", fail)

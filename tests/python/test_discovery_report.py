@@ -146,6 +146,8 @@ def verdict(outcome: str) -> dict:
         "held_out_chosen": "as asked for",
         "seed": 1,
         "asked_for": None,
+        "families": ["friction over speed"],
+        "function": None,
         "remains": [{"text": "in training, 99 % of the gap is closed; what remains is below the noise"}],
         "units": {"position": "m", "velocity": "m/s", "force": "N"},
         "version": "0.1.0",

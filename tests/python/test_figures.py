@@ -16,7 +16,7 @@ from sample_files import write_basin, write_points, write_sweep, write_trajector
 from separatrix import cli, style
 from separatrix.figures import basin, points, sweep, trajectory
 from separatrix.figures.look import Look
-from separatrix.figures.regions import Boundary, boundaries, regions
+from separatrix.figures.regions import Boundary, boundaries, brackets, limit_texts, regions
 from separatrix.open import open_result, table
 
 
@@ -75,6 +75,21 @@ def test_brackets_that_touch_are_one_line_and_open_ones_none() -> None:
         {"lower": ("limit", [2.0, 1.0, np.nan, 5.0]), "upper": ("limit", [3.0, 2.0, 4.0, 4.5])}
     )
     assert boundaries(limits) == [Boundary(1.0, 3.0), Boundary(4.5, 5.0)]
+
+
+def test_a_limit_is_that_of_the_settled_motion_where_it_is_known() -> None:
+    ends = {
+        "lower": [1.0, np.nan],
+        "upper": [1.5, np.nan],
+        "observed_lower": [0.5, 3.0],
+        "observed_upper": [0.6, 4.0],
+    }
+    limits = xr.Dataset({"name": ("limit", ["impacts_start_up", "impacts_stop_up"])})
+    limits = limits.assign({name: ("limit", values) for name, values in ends.items()})
+    assert boundaries(limits) == [Boundary(1.0, 1.5), Boundary(3.0, 4.0)]
+    assert limit_texts(limits) == ["impacts start up 1 to 1.5", "in steps impacts stop up 3 to 4"]
+    assert brackets(limits, in_steps=True).tolist() == [[0.5, 0.6], [3.0, 4.0]]
+    assert limit_texts(xr.Dataset()) == []
 
 
 def test_the_phase_portrait_jumps_at_each_impact_of_the_window(tmp_path: Path) -> None:

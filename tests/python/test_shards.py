@@ -132,9 +132,9 @@ def test_a_share_takes_the_attractors_of_another(separatrix, folder):
     succeed(separatrix, "merge", "map.h5", *(part(i, 3) for i in (1, 2, 3)), folder=folder)
     assert differences(folder / "whole.h5", folder / "map.h5") == []
     with h5py.File(folder / part(1, 3), "r+") as file:
-        # The second attractor's label; slice, number and the first one are before it.
+        # The second attractor's label; slice, number and the first one are before it, and its length.
         size = (len(searched) - 2) // 2
-        file["shard/catalogue"][2 + size] = 7
+        file["shard/catalogue"][2 + size + 1] = 7
     succeed(separatrix, *taking, "--force", folder=folder)
     with h5py.File(folder / part(2, 3)) as file:
         assert set(np.unique(file["attractor"][()])) <= {0, 1, 7}

@@ -217,7 +217,7 @@ def test_a_motion_ends_as_points_says(desk: Desk, separatrix: Path, tmp_path: Pa
     text = ask(desk, "download", **start, what="case")[0]["text"]
     assert tomllib.loads(text)["start"] == {"x0": 0.31, "v0": -1.7, "crank_angle": 0.0}
     (tmp_path / "again.toml").write_text(text)
-    succeed(separatrix, "trajectory", "again.toml", "--csv", "events.csv", folder=tmp_path)
+    succeed(separatrix, "trajectory", "again.toml", "--csv", "events.csv", "-o", "again.h5", folder=tmp_path)
     events = ask(desk, "download", **start, what="events")[0]["text"]
     assert events == (tmp_path / "events.csv").read_text()
     samples = ask(desk, "download", **start, what="samples")[0]["text"].splitlines()

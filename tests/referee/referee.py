@@ -108,7 +108,7 @@ def build(folder: Path, long: bool = False) -> ctypes.CDLL:
 
 
 def machine_of(case: dict, step: float = 0.8) -> Machine:
-    """The machine of a case: one body, linear spring (or pendulum), harmonic or Fourier drive of its foot."""
+    """The machine of a case: one body on a spring or a pendulum, a drive of the foot or a measured force."""
     body, restoring, drive = case["body"], case["restoring"], case["drive"]
     friction, contact = case.get("friction", {"law": "none"}), case.get("contact", {"law": "none"})
     mass = body["mass"]
@@ -129,6 +129,14 @@ def machine_of(case: dict, step: float = 0.8) -> Machine:
         machine.wall_stiffness = contact["stiffness"] / mass
     elif contact["law"] != "none":
         raise ValueError(f"the referee has no contact law {contact['law']}")
+    if drive["law"] == "measured_force":
+        # the last sample ends the period, or a step back to the first one
+        forces = [*drive["force"], *(drive["force"][:1] if drive.get("periodic", 0) else [])]
+        machine.samples, machine.interval = len(forces), drive["interval"]
+        machine.frequency = 2 * math.pi / ((machine.samples - 1) * machine.interval)
+        machine.kept = (ctypes.c_double * machine.samples)(*(force / mass for force in forces))
+        machine.force = machine.kept
+        return machine
     machine.frequency = drive["ratio"] * math.sqrt(spring)
     if drive["law"] == "harmonic":
         cosine, sine = [drive["amplitude"]], [0.0]

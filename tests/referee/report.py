@@ -8,8 +8,10 @@ PARTS = ("basin", "points", "runs", "starts")
 # Disagreements that were looked into: (case, part) and why, with the evidence.
 EXPLAINED: dict[tuple[str, str], str] = {}
 CAUSES = {
-    "not known": "silence: no label, or a period beyond `max_period`",
-    "rounding": "the referee ends elsewhere in extended precision or 1e-12 beside the start",
+    "not known": "silence: the program does not say what it is",
+    "rounding": "the referee agrees in extended precision or 1e-12 beside the start",
+    "window": "the same cycle; impacts over the window of the hold, which is no multiple of its period",
+    "unfounded": "a cycle closed by rounding: the motion is unstable for too long between two chatters",
     "wrong": "**not explained**",
 }
 
@@ -105,8 +107,9 @@ def where(item: dict) -> str:
 def wrong_in(reports: dict[str, dict]) -> int:
     """How many comparisons are wrong and not explained."""
     return sum(
-        report[part]["counts"].get("wrong", 0)
+        report[part]["counts"].get(verdict, 0)
         for name, report in reports.items()
         for part in PARTS
+        for verdict in ("wrong", "unfounded")
         if (name, part) not in EXPLAINED
     )

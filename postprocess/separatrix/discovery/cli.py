@@ -127,6 +127,8 @@ def summary(verdict: dict) -> list[str]:
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):
             lines.append(f"  {path} = {with_error(found)}")
+    if verdict["function"]:
+        lines.append(f"  {verdict['families'][-1]}: {verdict['function']['text']}")
     for use, gap in verdict["gap"].items():
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"

@@ -73,6 +73,10 @@ def describe_case(result: xr.Dataset) -> list[str]:
     axes = _axes(result, case)
     if "driven_mass" in case.get("body", {}):
         return _two_bodies(case, axes)
+    if several_bodies(case):
+        joints = len(case.get("friction", {})) + len(case.get("contact", {}))
+        bodies = sum(isinstance(one, dict) for one in case["body"].values())
+        return [f"{bodies} {'body' if bodies == 1 else 'bodies'}, {joints} joint{'' if joints == 1 else 's'}"]
     pieces = []
     friction = case.get("friction")
     if isinstance(friction, dict):
@@ -107,10 +111,13 @@ def machine_pieces(result: xr.Dataset) -> list[str]:
     case = resolved_case(result)
     axes, units = _axes(result, case), _units(str(result.attrs.get("resolved_case", "")))
     pieces = []
-    for family in ("body", "restoring", "friction", "contact", "drive"):
+    several = several_bodies(case)
+    for family in () if several else ("body", "restoring", "friction", "contact", "drive"):
         law = case.get(family)
         if isinstance(law, dict):
             pieces += _law_pieces(family, law, axes, units)
+    if several:
+        pieces += _parts(case, axes)
     for name, effect in case.get("effect", {}).items():
         pieces += _law_pieces(f"effect.{name}", effect, axes, units)
     run = case.get("run", {})
@@ -163,6 +170,34 @@ def _units(resolved: str) -> dict[str, str]:
 def raised(unit: str) -> str:
     """Return a unit with its powers raised."""
     return re.sub(r"\^(-?[\d.]+)", lambda power: f"$^{{{power[1]}}}$", unit)
+
+
+def several_bodies(case: dict) -> bool:
+    """Whether a case has tables [body.NAME]."""
+    body = case.get("body")
+    return isinstance(body, dict) and any(isinstance(one, dict) for one in body.values())
+
+
+def _parts(case: dict, axes: set[str]) -> list[str]:
+    """Every part of a machine of several bodies with its numbers, but zeros and what is an axis."""
+    pieces = []
+    for kind in ("body", "spring", "friction", "contact", "drive"):
+        for name, part in case.get(kind, {}).items():
+            if not isinstance(part, dict):
+                continue
+            numbers = [
+                f"{key.replace('_', ' ')} {value:.6g}"
+                for key, value in part.items()
+                if isinstance(value, int | float)
+                and 0 < abs(value) < _HUGE
+                and f"{kind}_{name}_{key}" not in axes
+                and not (key == "static_force" and value == part.get("force"))
+            ]
+            if kind != "body" or numbers:
+                pieces.append(
+                    f"{kind if kind != 'body' else ''} {name}: {', '.join(numbers)}".strip().rstrip(":")
+                )
+    return pieces
 
 
 def _two_bodies(case: dict, axes: set[str]) -> list[str]:

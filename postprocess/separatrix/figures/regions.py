@@ -51,7 +51,7 @@ def limit_texts(limits: xr.Dataset) -> list[str]:
     """Return each limit as text, with how it is known where that is in steps only."""
     known = np.isfinite(limits["lower"].values + limits["upper"].values) if "lower" in limits else []
     return [
-        f"{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}{'' if settled else ' (in steps)'}"
+        f"{'' if settled else 'in steps '}{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}"
         for name, (lower, upper), settled in zip(
             limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
         )

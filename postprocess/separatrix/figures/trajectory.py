@@ -22,6 +22,8 @@ from separatrix.open import flag_names
 ZOOM_PERIODS = 5
 _MOST_SAMPLES = 4000
 _MOST_MARKERS = 150
+# lines of the bodies beside the watched one, as many as can be told apart
+_OTHER_LINES = ("-", (0, (4, 2)), (0, (1, 1)), (0, (6, 2, 1, 2)))
 # these change the velocity at once
 _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 
@@ -53,9 +55,18 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
     last = time >= start
     zoom.plot(time[last], position[last], color=style.MOTION)
     foot = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (4, 2))}
-    driven = resolved_case(result).get("drive", {}).get("law") != "none"
+    driven = resolved_case(result).get("drive", {}).get("law") != "none" and "drive" in result
     if driven:
         zoom.plot(time[last], result["drive"].values[last], **foot)
+    others = other_bodies(result)
+    for style_of_line, name in zip(_OTHER_LINES, others, strict=False):
+        zoom.plot(
+            time[last],
+            result[f"{name}_x"].values[last],
+            color="#555555",
+            linewidth=0.7,
+            linestyle=style_of_line,
+        )
     zoom.set_xlim(start, end)
     marked = False
     for letter, ax in zip("ab", (whole, zoom), strict=True):
@@ -65,7 +76,11 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
         ax.set_xlabel(axis_label(result["time"]))
         ax.set_ylabel(axis_label(result["x"]))
     handles = [
-        Line2D([], [], color=style.MOTION, label="body"),
+        Line2D([], [], color=style.MOTION, label=watched_body(result)),
+        *[
+            Line2D([], [], color="#555555", linewidth=0.7, linestyle=style_of_line, label=name)
+            for style_of_line, name in zip(_OTHER_LINES, others, strict=False)
+        ],
         *([Line2D([], [], **foot, label="foot of the spring $x_A$")] if driven else []),
         *_barrier_handle(result),
     ]
@@ -76,6 +91,18 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
     caption = [f"b) the last {ZOOM_PERIODS} drive periods", *_caption(result, look)]
     compose(figure, title, shown(caption, look), handles, columns=4)
     return figure
+
+
+def other_bodies(result: xr.Dataset) -> list[str]:
+    """Return the names of the bodies beside the watched one; empty unless there are several."""
+    case = resolved_case(result)
+    names = [name for name, one in case.get("body", {}).items() if isinstance(one, dict)]
+    return [name for name in names if f"{name}_x" in result and name != watched_body(result)]
+
+
+def watched_body(result: xr.Dataset) -> str:
+    """Return the name of the body that x and v belong to; 'body' where there is one."""
+    return resolved_case(result).get("watch", {}).get("body", "body")
 
 
 def _end(result: xr.Dataset) -> float:

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.judge import (
     Judged,
     adequate,
@@ -64,6 +65,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     if not first.judged:
         return _without_name(bench, decision)
     best, rivals = _lead(bench, first)
+    found = first
     if not _detected(best):
         return _without_name(bench, decision)
     if not (best.gates["adequate"] or bench.options.quick):
@@ -73,13 +75,29 @@ def decide(bench: Bench, base: Fitted) -> Decision:
         better, others = _lead(bench, whole)
         decision = _begun(bench, whole)
         if _detected(better):
-            best, rivals = better, others
+            best, rivals, found = better, others, whole
         elif whole.base is not first.base:
             # the base itself explains what the effect did
             return _without_name(bench, decision)
     if best.gates["adequate"]:
         return _conclude(bench, decision, best, rivals)
+    shaped = _shaped(bench, found)
+    if shaped is not None:
+        return _conclude(bench, decision, *shaped)
     return _with_more(bench, decision, best)
+
+
+def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
+    """A family whose built-in shapes are wrong and that closes the gap as a function."""
+    member = flexible_member(bench, found)
+    if member is None:
+        return None
+    one, rivals = member
+    pass_gates(bench, one, found.base, rivals, found.screened.tests)
+    if not _detected(one):
+        return None
+    _judge_ceiling(bench, one)
+    return member if one.gates["adequate"] and one.gates["admissible"] and one.gates["converged"] else None
 
 
 def _begun(bench: Bench, first: Round) -> Decision:

@@ -15,11 +15,13 @@ from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine
 from separatrix.discovery.decision.where import Map, sentences, where_maps
+from separatrix.discovery.fitting.curves import function_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.wording import unit_of, units_of
+from separatrix.library import effects
 from separatrix.version import __version__
 
 
@@ -54,6 +56,8 @@ def verdict_of(findings: Findings) -> dict:
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
+        "families": [effects()[name].family for name in final.names],
+        "function": _function(final),
         "gates": best.gates if best else {},
         "p_value": best.p if best else None,
         "reasons": decision.reasons,
@@ -85,6 +89,27 @@ def _remaining(findings: Findings) -> list[Remains]:
         return []
     mass = findings.bench.scales.mass
     return remains_of(findings.base, decision.foretold, decision.accepted[0], mass)
+
+
+def _function(fitted: Fitted) -> dict | None:
+    """The function that the accepted effect is, with its 95 % band and the closed forms that fit it."""
+    found = function_of(fitted)
+    if found is None:
+        return None
+    band = 1.96 * found.error
+    fitting = [name for name, one in found.forms.items() if one["fits"]]
+    shape = f"as {' or '.join(fitting)}" if fitting else "as no closed form that is known"
+    return {
+        "effect": found.effect,
+        "variable": found.variable,
+        "unit": found.unit,
+        "at": found.at,
+        "value": found.value,
+        "band_95": [found.value - band, found.value + band],
+        "closed_forms": found.forms,
+        "text": f"restitution {found.value[0]:.4g} at {found.at[0]:.3g} m/s to {found.value[-1]:.4g} at "
+        f"{found.at[-1]:.3g} m/s, {shape}",
+    }
 
 
 def d_prime(found: Round) -> dict[str, float]:

@@ -77,6 +77,9 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
 def _is_fitted(path: str, measured_force: bool) -> bool:
     if path == "body.mass":
         return measured_force
+    if ".speed[" in path:
+        # knots of a table
+        return False
     if path.startswith((*_AMPLITUDES, "drive.force")) or path in _FIXED or path.endswith(_FIXED_ENDS):
         return False
     return path.split(".")[0] in ("restoring", "friction", "contact", "drive", "effect")

@@ -190,16 +190,17 @@ def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fit
 
 
 def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
-    return _values_of(base, candidate.free)
+    return values_of(base, candidate.free)
 
 
 def shared_values(base: Fitted, other: Fitted) -> np.ndarray:
     """Values of the base's parameters as another machine has them, its own where that has none."""
     own = [replace(one, value=value) for one, value in zip(base.problem.free, base.fit.values, strict=True)]
-    return _values_of(other, own)
+    return values_of(other, own)
 
 
-def _values_of(fitted: Fitted, free: list[Free]) -> np.ndarray:
+def values_of(fitted: Fitted, free: list[Free]) -> np.ndarray:
+    """Values of free parameters as a fitted machine has them, their own where it has none."""
     known = {
         (one.path, one.record): value
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)

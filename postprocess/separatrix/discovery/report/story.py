@@ -64,6 +64,8 @@ def _summary(verdict: dict) -> Section:
             lines.append(
                 f"{path} = {with_unit(one['value'], one['unit'], digits)}, {known}{interval(one, digits)}."
             )
+    if verdict["function"]:
+        lines.append(f"{verdict['families'][-1].capitalize()}: {verdict['function']['text']}.")
     for use, one in verdict["gap"].items():
         change = (
             f"stays {number(one['before'])}"

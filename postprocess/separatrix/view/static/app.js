@@ -9,7 +9,7 @@ import { Inspector } from "./inspector.js";
 import { LiveLayer } from "./live.js";
 import { marksOf } from "./marks.js";
 import { MapView, axisLabel, indexOf, valueAt } from "./mapview.js";
-import { MotionPanel } from "./motion.js";
+import { MotionPanel, units } from "./motion.js";
 import { Painter, rangeOf } from "./palette.js";
 import { PointsPanel, SweepPanel } from "./series.js";
 import { Starter, asMotion } from "./starter.js";
@@ -353,7 +353,7 @@ class Viewer {
     const labels = [...known.map((one) => one.attractor), 0];
     fill(this.table, ...(known.length ? attractorTable({
       entries: known, total: this.fromFile ? this.total : 0, unlabelled: this.fromFile ? this.total - counted : 0, hidden,
-      regimes: this.described.regimes, fromFile: this.fromFile, toggle: (label, alone) => { if (this.variable.name === "attractor") this.toggle(label, alone, labels); },
+      regimes: this.described.regimes, fromFile: this.fromFile, unit: units(this.file.machine)[0], toggle: (label, alone) => { if (this.variable.name === "attractor") this.toggle(label, alone, labels); },
     }) : [h("p", { class: "note" }, "No attractors are listed for this picture.")]));
     const shares = known.filter((one) => one.count).map((one) => `${describeAttractor(one, this.described.regimes)}: ${((100 * one.count) / this.total).toFixed(1)} %`).join("; ");
     this.canvas.setAttribute("aria-label", `Map of ${words(this.variable.name)} over ${axisLabel(this.file.axes[this.across])} and ${axisLabel(this.file.axes[this.up])}. ${shares}`);

@@ -14,10 +14,10 @@ export function describeAttractor(one, regimes) {
 }
 
 /** The table of a slice's attractors. `entries` have label, regime, period, ..., count; `toggle(label, alone)`. */
-export function attractorTable({ entries, total, unlabelled, hidden, regimes, toggle, fromFile }) {
+export function attractorTable({ entries, total, unlabelled, hidden, regimes, toggle, fromFile, unit }) {
   const rows = entries.map((one) => row(one, total, hidden, regimes, toggle));
   if (unlabelled > 0) rows.push(row({ attractor: 0, count: unlabelled, none: true }, total, hidden, regimes, toggle));
-  const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], ["amplitude (m)", "number"], ["impacts", "number"], ["multiplier", "number"]];
+  const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], [`amplitude (${unit})`, "number"], ["impacts", "number"], ["multiplier", "number"]];
   const head = h("tr", {}, ...columns.map(([text, kind]) => h("th", { class: kind, scope: "col", title: text === "impacts" ? "impacts per drive period" : null }, text || h("span", { class: "sr" }, "shown"))));
   const chaotic = entries.some((one) => one.period === 0);
   return [

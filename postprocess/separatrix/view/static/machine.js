@@ -78,7 +78,7 @@ function drawPair(context, { place, size, ground, machine, summary, state }) {
 }
 
 function drawPendulum(context, width, height, summary, state) {
-  const pivot = [width / 2, height * 0.12], length = height * 0.7;
+  const pivot = [width / 2, height / 2], length = height * 0.4;
   const end = (angle) => [pivot[0] + length * Math.sin(angle), pivot[1] + length * Math.cos(angle)];
   context.strokeStyle = INK;
   for (const barrier of [summary.barrier_upper, summary.barrier_lower]) {

@@ -190,7 +190,7 @@ export class MotionPanel {
     this.canvases.history.setAttribute("aria-label", `Time history of the position from ${number(this.part[0], 4)} to ${number(this.part[1], 4)} s; blue: body, grey: ${summary.two_bodies ? "driving body" : "foot of the spring"}, dots: impacts`);
   }
 
-  unitText() { return (this.machine.restoring || {}).law === "pendulum" ? "angle x (rad)" : "position x (m)"; }
+  unitText() { return isAngle(this.machine) ? "angle x (rad)" : "position x (m)"; }
 
   fixedBarriers() {
     const { summary } = this.motion;
@@ -203,7 +203,7 @@ export class MotionPanel {
     const arrays = this.plane, { summary } = this.motion;
     const part = (values) => values.subarray(this.from, this.to);
     const barriers = this.relative ? finite([summary.barrier_upper, summary.barrier_lower]) : this.fixedBarriers();
-    const labels = this.relative ? ["relative position (m)", "relative velocity (m/s)"] : [this.unitText(), "velocity v (m/s)"];
+    const labels = this.relative ? ["relative position (m)", "relative velocity (m/s)"] : [this.unitText(), `velocity v (${units(this.machine)[1]})`];
     const plot = new Plot(context, width, height, extent(part(arrays.x), barriers), extent(part(arrays.v)), labels);
     plot.clip(() => {
       context.strokeStyle = LINE;
@@ -238,17 +238,17 @@ export class MotionPanel {
       side = arrays.event_kind[k] % 2 ? 1 : -1;
     }
     drawMachine(context, width, height, this.machine, summary, this.reach, { x: arrays.x[i], driver: arrays.driver[i] - this.apart, hit, side });
-    this.canvases.machine.setAttribute("aria-label", `The machine at ${number(this.time, 4)} s: x = ${number(arrays.x[i], 4)} m`);
+    this.canvases.machine.setAttribute("aria-label", `The machine at ${number(this.time, 4)} s: x = ${quantity(arrays.x[i], units(this.machine)[0], 4)}`);
   }
 
   listEvents() {
-    const { arrays } = this.motion, kinds = arrays.event_kind, rows = [];
+    const { arrays } = this.motion, kinds = arrays.event_kind, rows = [], [length, speed] = units(this.machine);
     for (let k = 0; k < Math.min(kinds.length, SHOWN); k++) {
       const cells = [arrays.event_time[k], arrays.event_x[k], arrays.event_v_before[k], arrays.event_v_after[k]];
       rows.push(h("tr", { onclick: () => this.setTime(cells[0]) }, h("td", {}, words(this.codes.events[kinds[k] - 1] || kinds[k])),
         ...cells.map((value) => h("td", { class: "number" }, number(value, 8)))));
     }
-    const head = h("tr", {}, h("th", { scope: "col" }, "event"), ...["time (s)", "x (m)", "v before (m/s)", "v after (m/s)"].map((text) => h("th", { class: "number", scope: "col" }, text)));
+    const head = h("tr", {}, h("th", { scope: "col" }, "event"), ...["time (s)", `x (${length})`, `v before (${speed})`, `v after (${speed})`].map((text) => h("th", { class: "number", scope: "col" }, text)));
     const more = kinds.length > SHOWN ? h("p", { class: "note" }, `${kinds.length - SHOWN} more in the CSV`) : null;
     fill(this.events, h("table", {}, h("thead", {}, head), h("tbody", {}, ...rows)), more);
   }
@@ -257,6 +257,15 @@ export class MotionPanel {
     const text = await this.download(what);
     if (text !== null) save(text, { samples: "motion.csv", events: "events.csv", case: "case.toml" }[what], what === "case" ? "application/toml" : "text/csv");
   }
+}
+
+function isAngle(machine) {
+  return (machine.restoring || {}).law === "pendulum";
+}
+
+/** Units of position and velocity of a machine. */
+export function units(machine) {
+  return isAngle(machine) ? ["rad", "rad/s"] : ["m", "m/s"];
 }
 
 function finite(values) {

@@ -4,6 +4,7 @@
 // Motions from starts that are picked in the map, or under the mouse.
 import { fill, number, quantity, words } from "./dom.js";
 import { valueAt } from "./mapview.js";
+import { units } from "./motion.js";
 
 export class Starter {
   constructor(viewer) {
@@ -57,11 +58,12 @@ export class Starter {
     const section = arrays.section || [];
     this.points = Array.from(section).slice(-64).map((i) => [arrays.x[i], arrays.v[i]]);
     const end = arrays.time[arrays.time.length - 1];
-    const text = [`From x₀ = ${quantity(start[0], "m", 9)}, v₀ = ${quantity(start[1], "m/s", 9)}${start[2] ? `, φ₀ = ${quantity(start[2], "rad", 6)}` : ""}`];
+    const [length, speed] = units(this.viewer.file.machine);
+    const text = [`From x₀ = ${quantity(start[0], length, 9)}, v₀ = ${quantity(start[1], speed, 9)}${start[2] ? `, φ₀ = ${quantity(start[2], "rad", 6)}` : ""}`];
     const parameters = Object.entries(answer.parameters || {}).filter(([path]) => path in this.viewer.with || this.viewer.file.axes.some((axis) => axis.path === path));
     if (parameters.length) text.push(`, ${parameters.map(([path, value]) => `${path} = ${number(value, 8)}`).join(", ")}`);
     if (!quiet && this.viewer.transport.live) {
-      text.push(` to x = ${number(summary.x, 17)} m, v = ${number(summary.v, 17)} m/s after ${number(end, 6)} s: ${summary.impacts} ${summary.impacts === 1 ? "impact" : "impacts"}, ${words(this.viewer.described.regimes[summary.regime])}, ${words(this.viewer.described.reasons[summary.reason])}; the numbers of “separatrix points”.`);
+      text.push(` to x = ${quantity(summary.x, length, 17)}, v = ${quantity(summary.v, speed, 17)} after ${number(end, 6)} s: ${summary.impacts} ${summary.impacts === 1 ? "impact" : "impacts"}, ${words(this.viewer.described.regimes[summary.regime])}, ${words(this.viewer.described.reasons[summary.reason])}; the numbers of “separatrix points”.`);
     } else if (!this.viewer.transport.live) text.push(": the stored motion nearest to the click.");
     this.viewer.panel.show(answer, this.viewer.file.machine, text.join(""), quiet);
     this.viewer.mark();

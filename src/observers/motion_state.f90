@@ -10,7 +10,7 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
-    place_of, take_turns, append_word, open_log, record_event, record_sample, put_sample_book
+    place_of, take_turns, append_word, open_log, record_event, record_sample, put_sample_book, put_column
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -112,6 +112,9 @@ module motion_state
     real(wp), allocatable :: sample_book(:, :)
     !> Speed at which the last contact with a soft barrier began, at samples; one row.
     real(wp), allocatable :: sample_touch(:, :)
+    !> Of several bodies: coordinates and speeds at samples; number, coordinate, and speed before and after of the joint of an
+    !> event.
+    real(wp), allocatable :: sample_coordinates(:, :), event_joint(:, :)
   end type log_t
 
 contains

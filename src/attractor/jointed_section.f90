@@ -1,0 +1,166 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
+!> stretch of the springs of elastic friction.
+module jointed_section
+  use attractors, only: most_coordinates
+  use eigen, only: symmetric_eigen
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees
+  use jointed_motion, only: jointed_motion_t, start_jointed
+  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use kinds, only: wp
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed
+
+contains
+
+  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count.
+  pure subroutine directions_of(machine, directions, count_directions)
+    type(jointed_t), intent(in) :: machine
+    real(wp), intent(out) :: directions(most_degrees, most_degrees)
+    integer, intent(out) :: count_directions
+    real(wp), dimension(machine%n, machine%n) :: depends, vectors
+    real(wp) :: values(machine%n)
+    integer :: i, j, n
+    n = machine%n
+    depends = machine%stiffness/max(maxval(abs(machine%stiffness)), tiny(1.0_wp))
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind == joint_friction) cycle
+      do i = 1, n
+        depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
+      end do
+    end do
+    call symmetric_eigen(depends, values, vectors)
+    count_directions = count(abs(values) > 1e-12_wp*maxval(abs(values)))
+    directions = 0
+    if (count_directions == n) then
+      do i = 1, n
+        directions(i, i) = 1
+      end do
+    else
+      directions(:n, :count_directions) = vectors(:, pack([(i, i=1, n)], abs(values) > 1e-12_wp*maxval(abs(values))))
+    end if
+  end subroutine directions_of
+
+  !> Number of coordinates on the section.
+  pure integer function coordinates_of_jointed(moving) result(n)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp) :: directions(most_degrees, most_degrees)
+    call directions_of(moving%machine, directions, n)
+    n = n + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
+  end function coordinates_of_jointed
+
+  !> Whether there is room for the coordinates.
+  pure logical function fits_section(moving)
+    type(jointed_motion_t), intent(in) :: moving
+    fits_section = coordinates_of_jointed(moving) <= most_coordinates
+  end function fits_section
+
+  !> A state with the watched body at `x` [m], `v` [m/s], the others where the machine says, and the drive at `angle` [rad].
+  !> One that no mode fits, or that lies beyond a stop, is not a number.
+  pure function start_of_jointed(moving, x, v, angle) result(state)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: x, v, angle
+    type(jointed_state_t) :: state
+    real(wp) :: start(2, moving%machine%n)
+    logical :: ok
+    start = moving%machine%start
+    start(:, moving%machine%watched) = [x, v]
+    call start_jointed(moving, start(1, :), start(2, :), angle, state, ok)
+    if (ok) ok = is_allowed(moving, start(1, :), state%time)
+    if (.not. ok) state%q = ieee_value(1.0_wp, ieee_quiet_nan)
+  end function start_of_jointed
+
+  !> Whether no rigid stop is violated by the positions `q` at `time`.
+  pure logical function is_allowed(moving, q, time)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: q(:), time
+    complex(wp) :: turning(moving%harmonics)
+    real(wp) :: s, u, near
+    integer :: j
+    is_allowed = .true.
+    turning = turning_at(moving%machine%frequency, time, moving%harmonics)
+    do j = 1, size(moving%machine%joints)
+      associate (joint => moving%machine%joints(j))
+        if (joint%kind /= joint_contact) cycle
+        call joint_motion(moving%machine, j, q, 0*q, time, turning, s, u)
+        near = 64*epsilon(1.0_wp)*(sum(abs(joint%row*q)) + abs(joint%offset%mean))
+        if (s > joint%upper + near .or. s < joint%lower - near) is_allowed = .false.
+      end associate
+    end do
+  end function is_allowed
+
+  !> The state on the section with the coordinates `point`; what they leave open is zero.
+  pure function jointed_at(moving, point) result(state)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    type(jointed_state_t) :: state
+    real(wp) :: directions(most_degrees, most_degrees), q(moving%machine%n), v(moving%machine%n), s, u, limit
+    complex(wp) :: turning(moving%harmonics)
+    integer :: n, places, j, k
+    logical :: ok
+    n = moving%machine%n
+    call directions_of(moving%machine, directions, places)
+    q = matmul(directions(:n, :places), point(:places))
+    v = point(places + 1:places + n)
+    call start_jointed(moving, q, v, 0.0_wp, state, ok)
+    turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
+    k = places + n
+    do j = 1, size(moving%machine%joints)
+      associate (joint => moving%machine%joints(j))
+        if (joint%kind /= joint_elastic) cycle
+        k = k + 1
+        call joint_motion(moving%machine, j, state%q, state%v, 0.0_wp, turning, s, u)
+        limit = joint%friction%kinetic/joint%stiffness
+        state%slider(j) = s - point(k)
+        ! Stretched by friction and on its way: it slides.
+        if (abs(point(k)) >= limit*(1 - 64*epsilon(1.0_wp)) .and. point(k)*u > 0) state%phase(j) = merge(1, -1, u > 0)
+      end associate
+    end do
+    if (.not. ok) state%q = ieee_value(1.0_wp, ieee_quiet_nan)
+  end function jointed_at
+
+  !> Coordinates of a state on the section, zeros after the last.
+  pure function jointed_point(moving, state) result(point)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    real(wp) :: point(most_coordinates), directions(most_degrees, most_degrees), s, u
+    complex(wp) :: turning(moving%harmonics)
+    integer :: n, places, j, k
+    point = 0
+    n = moving%machine%n
+    call directions_of(moving%machine, directions, places)
+    if (places + n + count(moving%machine%joints%kind == joint_elastic) > most_coordinates) return
+    point(:places) = matmul(transpose(directions(:n, :places)), state%q(:n))
+    point(places + 1:places + n) = state%v(:n)
+    k = places + n
+    turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
+    do j = 1, size(moving%machine%joints)
+      associate (joint => moving%machine%joints(j))
+        if (joint%kind /= joint_elastic) cycle
+        k = k + 1
+        call joint_motion(moving%machine, j, state%q, state%v, state%time, turning, s, u)
+        point(k) = s - state%slider(j)
+        if (state%phase(j) /= 0) point(k) = state%phase(j)*joint%friction%kinetic/joint%stiffness
+      end associate
+    end do
+  end function jointed_point
+
+  !> Sizes of the coordinates in a motion over `half_range` [m].
+  pure function scales_of_jointed(moving, half_range) result(scales)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: half_range
+    real(wp) :: scales(most_coordinates), directions(most_degrees, most_degrees), length
+    integer :: places, n
+    n = moving%machine%n
+    call directions_of(moving%machine, directions, places)
+    length = max(half_range, 1e-3_wp*moving%machine%length_scale)
+    scales = length
+    scales(places + 1:places + n) = length*moving%machine%frequency
+  end function scales_of_jointed
+
+end module jointed_section

@@ -1,0 +1,273 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The tables of a machine of several bodies: [body.NAME], [spring.NAME], [friction.NAME], [contact.NAME], [drive.NAME] and
+!> [watch].
+module part_reader
+  use case_parameters, only: row_bounds
+  use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, report
+  use case_values, only: take_real, take_reals, take_text
+  use kinds, only: wp
+  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
+    parameters_of, part_family, part_kind, part_law, set_value, value_of
+  use suggest, only: nearest_word
+  use text, only: join, starts_with, to_text
+  use toml_bindings, only: toml_array, toml_string, toml_table
+  implicit none
+  private
+
+  public :: has_parts, read_parts
+
+  !> Tables of parts, in the order in which they are kept; laws where a table gives none.
+  character(len=8), parameter :: kinds_of_parts(5) = ['body    ', 'spring  ', 'friction', 'contact ', 'drive   ']
+  character(len=8), parameter :: default_law(5) = ['mass    ', 'linear  ', 'coulomb ', '        ', '        ']
+  character(len=*), parameter :: ground = 'ground'
+  !> Name and number of every body.
+  type :: bodies_t
+    character(len=label_length), allocatable :: names(:)
+  end type bodies_t
+
+contains
+
+  !> Whether a case has tables [body.NAME]. A table in the place of a key of [body] is none.
+  pure logical function has_parts(source)
+    type(case_source_t), intent(in) :: source
+    character(len=label_length), allocatable :: names(:)
+    integer :: i
+    has_parts = .false.
+    names = names_of(source, 'body')
+    do i = 1, size(names)
+      if (.not. any(parameters%family == 'body' .and. parameters%name == names(i))) has_parts = .true.
+    end do
+  end function has_parts
+
+  !> Names of the tables [kind.NAME], in the order of the text.
+  pure function names_of(source, kind) result(names)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: kind
+    character(len=label_length), allocatable :: names(:)
+    character(len=label_length) :: found(size(source%entries)), name
+    integer :: i, last, count_names
+    count_names = 0
+    do i = 1, size(source%entries)
+      associate (path => source%entries(i)%entry%path)
+        if (.not. starts_with(path, kind//'.')) cycle
+        ! A key below a table that an override alone makes speaks for it, too.
+        last = scan(path(len(kind) + 2:), '.[') - 1
+        if (last < 0 .and. source%entries(i)%entry%kind /= toml_table) cycle
+        if (last < 0) last = len(path) - len(kind) - 1
+        name = path(len(kind) + 2:len(kind) + 1 + last)
+        if (any(found(:count_names) == name)) cycle
+        count_names = count_names + 1
+        found(count_names) = name
+      end associate
+    end do
+    names = found(:count_names)
+  end function names_of
+
+  !> The laws of the five families, none but 'structure', then every part.
+  subroutine read_parts(source, choices)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), allocatable, intent(inout) :: choices(:)
+    type(bodies_t) :: bodies
+    character(len=label_length), allocatable :: names(:)
+    character(len=:), allocatable :: watched
+    integer :: i, k
+    bodies%names = names_of(source, 'body')
+    call check_names(source, 'body', bodies%names)
+    call read_watch(source, bodies, watched)
+    do i = 1, size(kinds_of_parts)
+      names = names_of(source, trim(kinds_of_parts(i)))
+      if (i > 1) call check_names(source, trim(kinds_of_parts(i)), names)
+      do k = 1, size(names)
+        call read_part(source, trim(kinds_of_parts(i)), trim(default_law(i)), trim(names(k)), watched, bodies, choices)
+      end do
+    end do
+  end subroutine read_parts
+
+  !> Names that can be told apart in paths and messages.
+  subroutine check_names(source, kind, names)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: kind
+    character(len=label_length), intent(in) :: names(:)
+    integer :: i
+    do i = 1, size(names)
+      if (verify(trim(names(i)), 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-') > 0) then
+        call report(source, kind//'.'//trim(names(i)), 'found the name "'//trim(names(i))//'", allowed letters, digits, _ and -')
+      else if (kind == 'body' .and. names(i) == ground) then
+        call report(source, kind//'.'//trim(names(i)), 'found a body with the name "ground", allowed any other: it is what '// &
+                    'stands still')
+      end if
+    end do
+  end subroutine check_names
+
+  !> The body that the start and the results refer to: the first, unless [watch] names another.
+  subroutine read_watch(source, bodies, watched)
+    type(case_source_t), intent(inout) :: source
+    type(bodies_t), intent(in) :: bodies
+    character(len=:), allocatable, intent(out) :: watched
+    logical :: found
+    call enter_table(source, 'watch', found)
+    watched = trim(bodies%names(1))
+    call take_text(source, 'watch.body', watched)
+    if (.not. any(bodies%names == watched)) call report(source, 'watch.body', 'found "'//watched//'"'// &
+      hint(watched, bodies%names)//', allowed '//join(bodies%names, ', '))
+  end subroutine read_watch
+
+  pure function hint(word, names) result(text)
+    character(len=*), intent(in) :: word
+    character(len=label_length), intent(in) :: names(:)
+    character(len=:), allocatable :: text, meant
+    meant = nearest_word(word, names)
+    text = ''
+    if (len(meant) > 0) text = ' (did you mean "'//meant//'"?)'
+  end function hint
+
+  subroutine read_part(source, kind, default, name, watched, bodies, choices)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: kind, default, name, watched
+    type(bodies_t), intent(in) :: bodies
+    type(law_choice_t), allocatable, intent(inout) :: choices(:)
+    type(law_choice_t) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    character(len=:), allocatable :: law, path
+    integer :: i
+    logical :: found
+    path = kind//'.'//name
+    call enter_table(source, path, found)
+    law = default
+    if (kind == 'body') then
+      if (name == watched) law = 'watched'
+      if (name == watched) call refuse_start(source, path)
+    else
+      call take_text(source, path//'.law', law)
+    end if
+    if (find_law(part_family, kind//':'//law) == 0 .or. len(law) == 0) then
+      if (len(law) == 0 .and. find(source, path//'.law') == 0) then
+        call report(source, path//'.law', 'missing, allowed '//laws_of(kind))
+      else
+        call report(source, path//'.law', 'found "'//law//'", allowed '//laws_of(kind))
+      end if
+      call know_all_below(source, path)
+      return
+    end if
+    choice = law_choice(part_family, kind//':'//law)
+    choice%label = name
+    if (kind == 'drive') call read_body(source, path, bodies, choice)
+    if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
+    rows = parameters_of(choice%family, choice%name)
+    do i = 1, size(rows)
+      if (is_hidden(rows(i))) cycle
+      if (rows(i)%list) then
+        call take_reals(source, path//'.'//trim(rows(i)%name), row_bounds(rows(i)), choice%parameters(i)%values, &
+                        required=.not. rows(i)%optional)
+      else
+        call take_real(source, path//'.'//trim(rows(i)%name), row_bounds(rows(i)), choice%parameters(i)%values(1), &
+                       required=.not. rows(i)%optional)
+      end if
+    end do
+    if (kind == 'friction') then
+      ! Break-away friction that is not given equals sliding friction.
+      if (value_of(choice, 'static_force') < 0) call set_value(choice, 'static_force', [value_of(choice, 'force')])
+    end if
+    choices = [choices, choice]
+  end subroutine read_part
+
+  !> The watched body starts where [start] says.
+  subroutine refuse_start(source, path)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    character(len=2), parameter :: keys(2) = ['x0', 'v0']
+    integer :: i
+    do i = 1, size(keys)
+      call know(source, path//'.'//keys(i))
+      if (find(source, path//'.'//keys(i)) > 0) call report(source, path//'.'//keys(i), 'found for the watched body, allowed '// &
+        'as start.'//keys(i)//', or with another body in watch.body')
+    end do
+  end subroutine refuse_start
+
+  !> Laws of a table of parts, for messages.
+  pure function laws_of(kind) result(names)
+    character(len=*), intent(in) :: kind
+    character(len=:), allocatable :: names
+    integer :: i
+    names = ''
+    do i = 1, size(laws)
+      if (laws(i)%family /= part_family) cycle
+      if (part_kind(laws(i)%name) /= kind) cycle
+      if (len(names) > 0) names = names//', '
+      names = names//part_law(laws(i)%name)
+    end do
+  end function laws_of
+
+  !> body = "NAME" of a drive.
+  subroutine read_body(source, path, bodies, choice)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    type(bodies_t), intent(in) :: bodies
+    type(law_choice_t), intent(inout) :: choice
+    character(len=:), allocatable :: name
+    integer :: problems
+    name = ''
+    problems = size(source%problems)
+    call take_text(source, path//'.body', name, required=.true.)
+    if (size(source%problems) > problems) return
+    call set_value(choice, 'body', [real(number_of(source, path//'.body', name, .false., bodies), wp)])
+  end subroutine read_body
+
+  !> between = ["A", "B"], or ["A"] for the ground and A.
+  subroutine read_ends(source, path, bodies, choice)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    type(bodies_t), intent(in) :: bodies
+    type(law_choice_t), intent(inout) :: choice
+    character(len=:), allocatable :: key, element
+    integer :: at, i, count_ends, ends(2)
+    key = path//'.between'
+    call know(source, key)
+    at = find(source, key)
+    if (at == 0) then
+      call report(source, key, 'missing, allowed one or two of '//join(bodies%names, ', ')//', ground')
+      return
+    end if
+    count_ends = 0
+    if (source%entries(at)%entry%kind == toml_array) count_ends = int(source%entries(at)%entry%integer)
+    if (count_ends < 1 .or. count_ends > 2) then
+      call report(source, key, 'found '//description(source%entries(at)%entry)//', allowed a list of one or two bodies')
+      call know_all_below(source, key)
+      return
+    end if
+    ends = 0
+    do i = 1, count_ends
+      element = key//'['//to_text(i)//']'
+      call know(source, element)
+      at = find(source, element)
+      if (source%entries(at)%entry%kind /= toml_string) then
+        call report(source, element, 'found '//description(source%entries(at)%entry)//', allowed the name of a body')
+        return
+      end if
+      ends(i + 2 - count_ends) = number_of(source, element, source%entries(at)%entry%string, .true., bodies)
+      if (ends(i + 2 - count_ends) < 0) return
+    end do
+    if (ends(1) == ends(2)) then
+      call report(source, key, 'found the same end twice, allowed two bodies, or one for it and the ground')
+      return
+    end if
+    call set_value(choice, 'first', [real(ends(1), wp)])
+    call set_value(choice, 'second', [real(ends(2), wp)])
+  end subroutine read_ends
+
+  !> Number of a body, 0 the ground, -1 if there is none of that name.
+  integer function number_of(source, key, name, or_ground, bodies) result(number)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: key, name
+    logical, intent(in) :: or_ground
+    type(bodies_t), intent(in) :: bodies
+    number = findloc(bodies%names, name, 1)
+    if (number > 0 .or. (or_ground .and. name == ground)) return
+    number = -1
+    call report(source, key, 'found "'//name//'"'//hint(name, bodies%names)//', allowed '//join(bodies%names, ', ')// &
+                trim(merge(', ground', '        ', or_ground)))
+  end function number_of
+
+end module part_reader

@@ -1,0 +1,299 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The motion of a linear mode from a state on: exponentials, powers of time up to the third, and harmonics, or the
+!> exponential series.
+module flight_path
+  use elementary, only: exponential, sine_cosine
+  use jointed, only: joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees, most_joints
+  use jointed_state, only: acts_as_spring, is_held, joint_force, jointed_state_t, turning_at
+  use kinds, only: wp
+  use mode_flow, only: harmonics_of, mode_flow_t
+  implicit none
+  private
+
+  public :: begin_path, path_at, place_powers, force_powers, unknowns_of, series_step, constant_forces
+
+  !> Terms of the exponential series over a stretch no longer than 1/rate.
+  integer, parameter, public :: terms = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)
+
+  type, public :: path_t
+    !> Time of the start since the section [s].
+    real(wp) :: start = 0
+    !> Amplitudes of the exponentials, harmonics at the start, powers of the time since then.
+    complex(wp), allocatable :: amplitude(:), turning(:)
+    real(wp) :: powers(most_degrees, 0:3) = 0
+    !> Constant forces on the coordinates and their rates [N, N/s].
+    real(wp) :: force(most_degrees) = 0, force_rate(most_degrees) = 0
+    !> Unknowns of the series at the start, and the matrix with its constant columns.
+    real(wp), allocatable :: unknowns(:), matrix(:, :)
+  end type path_t
+
+contains
+
+  !> The motion from `state` on.
+  pure subroutine begin_path(machine, flow, state, path)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(path_t), intent(out) :: path
+    integer :: n
+    n = machine%n
+    path%start = state%time
+    path%turning = turning_at(machine%frequency, state%time, harmonics_of(machine))
+    call constant_forces(machine, state, path%force(:n), path%force_rate(:n))
+    if (flow%modal) then
+      call begin_modal(machine, flow, state, path)
+    else
+      call begin_series(machine, flow, state, path)
+    end if
+  end subroutine begin_path
+
+  !> Forces of the joints that do not depend on the state within the mode, and the load.
+  pure subroutine constant_forces(machine, state, force, rate)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(out) :: force(:), rate(:)
+    real(wp) :: r, now, zero, k, c
+    integer :: j
+    force = machine%load
+    rate = 0
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        if (is_held(joint, state%phase(j))) cycle
+        if (acts_as_spring(joint, state%phase(j))) then
+          now = joint%offset%mean + joint%offset%rate*state%time
+          if (joint%kind == joint_soft) then
+            zero = merge(joint%upper, joint%lower, state%phase(j) > 0)
+            k = joint%contact%stiffness
+            c = joint%contact%damping
+          else
+            zero = state%slider(j)
+            k = joint%stiffness
+            c = 0
+          end if
+          force = force - (k*(now - zero) + c*joint%offset%rate)*joint%row
+          rate = rate - k*joint%offset%rate*joint%row
+        else if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
+          call joint_force(joint, state%phase(j), 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, r)
+          force = force + r*joint%row
+        end if
+      end associate
+    end do
+  end subroutine constant_forces
+
+  pure subroutine begin_modal(machine, flow, state, path)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(path_t), intent(inout) :: path
+    real(wp), dimension(most_degrees) :: q, v, place, speed, push, push_rate
+    real(wp) :: held_at(most_joints), held_rate(most_joints), b0, b1, w
+    complex(wp) :: forced, forced_rate, lambda
+    integer :: n, m, i, k, f, d, r, j, free
+    n = machine%n
+    f = flow%flexible
+    d = flow%damped
+    free = size(flow%basis, 2)
+    ! What is left of the state without the periodic response.
+    q(:n) = state%q(:n)
+    v(:n) = state%v(:n)
+    do m = 1, size(path%turning)
+      w = m*machine%frequency
+      q(:n) = q(:n) - real(flow%response(:, m)*path%turning(m))
+      v(:n) = v(:n) + w*aimag(flow%response(:, m)*path%turning(m))
+    end do
+    path%powers(:n, :) = 0
+    push(:n) = path%force(:n)
+    push_rate(:n) = path%force_rate(:n)
+    do i = 1, size(flow%independent)
+      j = flow%held(flow%independent(i))
+      held_at(i) = sum(machine%joints(j)%row*q(:n))
+      held_rate(i) = -machine%joints(j)%offset%rate
+      path%powers(:n, 0) = path%powers(:n, 0) + flow%carried(:, i)*held_at(i)
+      path%powers(:n, 1) = path%powers(:n, 1) + flow%carried(:, i)*held_rate(i)
+    end do
+    push(:n) = push(:n) - matmul(flow%stiffness, path%powers(:n, 0)) - matmul(flow%damping, path%powers(:n, 1))
+    push_rate(:n) = push_rate(:n) - matmul(flow%stiffness, path%powers(:n, 1))
+    ! In basis coordinates.
+    place(:n) = matmul(machine%mass, q(:n))
+    speed(:n) = matmul(machine%mass, v(:n))
+    place(:free) = matmul(transpose(flow%basis), place(:n))
+    speed(:free) = matmul(transpose(flow%basis), speed(:n))
+    push(:free) = matmul(transpose(flow%basis), push(:n))
+    push_rate(:free) = matmul(transpose(flow%basis), push_rate(:n))
+    allocate (path%amplitude(size(flow%exponent)))
+    do k = 1, size(flow%exponent)
+      lambda = flow%exponent(k)
+      path%amplitude(k) = sum(flow%left(k, :f)*flow%frequency*place(:f)) + sum(flow%left(k, f + 1:)*speed(:f + d))
+      forced = -sum(flow%left(k, f + 1:)*push(:f + d))/lambda
+      forced_rate = -sum(flow%left(k, f + 1:)*push_rate(:f + d))/lambda
+      forced = forced + forced_rate/lambda
+      ! Damped rigid coordinates: what the exponentials carry of them, and what drives the rest.
+      do i = 1, d
+        place(f + i) = place(f + i) - real(flow%drift(i, k)*path%amplitude(k))
+      end do
+      path%amplitude(k) = path%amplitude(k) - forced
+      path%powers(:n, 0) = path%powers(:n, 0) + real(flow%shape(:, k)*forced)
+      path%powers(:n, 1) = path%powers(:n, 1) + real(flow%shape(:, k)*forced_rate)
+    end do
+    do i = 1, d
+      b0 = 0
+      b1 = 0
+      do k = 1, size(flow%exponent)
+        b0 = b0 - real(flow%drift(i, k)*sum(flow%left(k, f + 1:)*push(:f + d)))
+        b1 = b1 - real(flow%drift(i, k)*sum(flow%left(k, f + 1:)*push_rate(:f + d)))
+      end do
+      path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, f + i)*place(f + i)
+      path%powers(:n, 1) = path%powers(:n, 1) + flow%basis(:, f + i)*b0
+      path%powers(:n, 2) = path%powers(:n, 2) + flow%basis(:, f + i)*(b1/2)
+    end do
+    do r = f + d + 1, free
+      path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, r)*place(r)
+      path%powers(:n, 1) = path%powers(:n, 1) + flow%basis(:, r)*speed(r)
+      path%powers(:n, 2) = path%powers(:n, 2) + flow%basis(:, r)*(push(r)/2)
+      path%powers(:n, 3) = path%powers(:n, 3) + flow%basis(:, r)*(push_rate(r)/6)
+    end do
+  end subroutine begin_modal
+
+  !> The unknowns of the series, and its matrix with what is constant in this flight.
+  pure subroutine begin_series(machine, flow, state, path)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(path_t), intent(inout) :: path
+    real(wp) :: push(machine%n), push_rate(machine%n)
+    integer :: n, i
+    n = machine%n
+    path%unknowns = unknowns_of(machine, state, path%turning)
+    path%matrix = flow%matrix
+    push = matmul(machine%mobility, path%force(:n))
+    push_rate = matmul(machine%mobility, path%force_rate(:n))
+    push = push - matmul(flow%carried, [(sum(machine%joints(flow%held(flow%independent(i)))%row*push), &
+                                         i=1, size(flow%independent))])
+    push_rate = push_rate - matmul(flow%carried, [(sum(machine%joints(flow%held(flow%independent(i)))%row*push_rate), &
+                                                   i=1, size(flow%independent))])
+    path%matrix(n + 1:2*n, 2*n + 1) = push
+    path%matrix(n + 1:2*n, 2*n + 2) = push_rate
+  end subroutine begin_series
+
+  !> Coordinates, speeds, one, time since the start, cosines and sines.
+  pure function unknowns_of(machine, state, turning) result(y)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp) :: y(2*machine%n + 2 + 2*size(turning))
+    integer :: n, m
+    n = machine%n
+    y(:n) = state%q(:n)
+    y(n + 1:2*n) = state%v(:n)
+    y(2*n + 1) = 1
+    y(2*n + 2) = 0
+    do m = 1, size(turning)
+      y(2*n + 1 + 2*m) = real(turning(m))
+      y(2*n + 2 + 2*m) = aimag(turning(m))
+    end do
+  end function unknowns_of
+
+  !> The unknowns over a stretch of `length` [s] by rising powers of its fraction.
+  pure subroutine series_step(matrix, y, length, powers)
+    real(wp), intent(in) :: matrix(:, :), y(:), length
+    real(wp), intent(out) :: powers(:, 0:)
+    integer :: i, k
+    powers(:, 0) = y
+    do k = 1, ubound(powers, 2)
+      powers(:, k) = 0
+      do i = 1, size(y)
+        if (abs(powers(i, k - 1)) > 0) powers(:, k) = powers(:, k) + matrix(:, i)*(powers(i, k - 1)*(length/k))
+      end do
+    end do
+  end subroutine series_step
+
+  !> Coordinates and speeds `t` [s] after the start of the path.
+  pure subroutine path_at(machine, flow, path, t, q, v)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    real(wp), intent(in) :: t
+    real(wp), intent(out) :: q(:), v(:)
+    complex(wp) :: now
+    real(wp) :: sine, cosine, w
+    integer :: k, n
+    n = machine%n
+    if (.not. flow%modal) then
+      call series_at(machine, flow, path, t, q, v)
+      return
+    end if
+    associate (p => path%powers)
+      q(:n) = p(:n, 0) + t*(p(:n, 1) + t*(p(:n, 2) + t*p(:n, 3)))
+      v(:n) = p(:n, 1) + t*(2*p(:n, 2) + 3*t*p(:n, 3))
+    end associate
+    do k = 1, size(flow%exponent)
+      associate (lambda => flow%exponent(k))
+        call sine_cosine(aimag(lambda)*t, sine, cosine)
+        now = path%amplitude(k)*(exponential(real(lambda)*t)*cmplx(cosine, sine, wp))
+        q(:n) = q(:n) + real(flow%shape(:, k)*now)
+        v(:n) = v(:n) + real(flow%shape(:, k)*(lambda*now))
+      end associate
+    end do
+    do k = 1, size(path%turning)
+      w = k*machine%frequency
+      call sine_cosine(w*t, sine, cosine)
+      now = path%turning(k)*cmplx(cosine, sine, wp)
+      q(:n) = q(:n) + real(flow%response(:, k)*now)
+      v(:n) = v(:n) - w*aimag(flow%response(:, k)*now)
+    end do
+  end subroutine path_at
+
+  !> The same by stretches of the series.
+  pure subroutine series_at(machine, flow, path, t, q, v)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    real(wp), intent(in) :: t
+    real(wp), intent(out) :: q(:), v(:)
+    real(wp) :: y(size(path%unknowns)), powers(size(path%unknowns), 0:terms), length
+    integer :: stretches, i, n
+    n = machine%n
+    y = path%unknowns
+    stretches = max(1, ceiling(flow%rate*t))
+    length = t/stretches
+    do i = 1, stretches
+      call series_step(path%matrix, y, length, powers)
+      y = sum(powers, dim=2)
+    end do
+    q(:n) = y(:n)
+    v(:n) = y(n + 1:2*n)
+  end subroutine series_at
+
+  !> Powers of time in a joint coordinate.
+  pure function place_powers(machine, path, j) result(p)
+    type(jointed_t), intent(in) :: machine
+    type(path_t), intent(in) :: path
+    integer, intent(in) :: j
+    real(wp) :: p(0:3)
+    associate (joint => machine%joints(j))
+      p = matmul(joint%row, path%powers(:machine%n, :))
+      p(0) = p(0) + joint%offset%mean + joint%offset%rate*path%start
+      p(1) = p(1) + joint%offset%rate
+    end associate
+  end function place_powers
+
+  !> Powers of time in the force of constraint number `i` of the mode.
+  pure function force_powers(machine, flow, path, i) result(p)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    integer, intent(in) :: i
+    real(wp) :: p(0:3), by_place(machine%n), by_speed(machine%n)
+    integer :: n
+    n = machine%n
+    by_place = matmul(flow%reaction(i, :), flow%stiffness)
+    by_speed = matmul(flow%reaction(i, :), flow%damping)
+    p = matmul(by_place, path%powers(:n, :))
+    p(0:2) = p(0:2) + [1, 2, 3]*matmul(by_speed, path%powers(:n, 1:3))
+    p(0) = p(0) - sum(flow%reaction(i, :)*path%force(:n))
+    p(1) = p(1) - sum(flow%reaction(i, :)*path%force_rate(:n))
+  end function force_powers
+
+end module flight_path

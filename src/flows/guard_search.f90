@@ -1,0 +1,421 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The first fall of guards to zero along a path, proven: nothing lies before it. Over panels the quintic through value, slope
+!> and curvature at both ends, in Bernstein's form, and a bound on the sixth derivative show that a guard stays positive;
+!> where they do not, steps certified by the third derivative lead to its zero from the left.
+module guard_search
+  use certified_step, only: positive_step
+  use eigen, only: modulus
+  use elementary, only: exponential, logarithm, sine_cosine
+  use flight_path, only: force_powers, path_t, place_powers
+  use guards, only: joint_guard_t, most_guards
+  use jointed, only: jointed_t
+  use kinds, only: wp
+  use mode_flow, only: mode_flow_t
+  implicit none
+  private
+
+  public :: prepare_search, find_first, departure
+
+  !> Rounding of sums, as a share of the sum of absolute values.
+  real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+  !> Remainder of the quintic: |y - H| <= max|y^(6)| L^6/46080 in the middle of a panel.
+  real(wp), parameter :: remainder = 46080
+  integer, parameter :: most_steps = 200
+
+  !> All functions of a path that are looked at, as sums: the guards, and after them watched coordinates.
+  type, public :: search_t
+    integer :: guards = 0, functions = 0
+    complex(wp), allocatable :: exponent(:), term(:, :), turn(:, :)
+    real(wp), allocatable :: decay(:), size_of_exponent(:), size_of_term(:, :)
+    !> Angular frequency of the first harmonic [rad/s].
+    real(wp) :: frequency = 0
+    real(wp), allocatable :: power(:, :)
+    !> Bounds from the powers and harmonics on derivatives 0 to 6.
+    real(wp), allocatable :: steady(:, :)
+  end type search_t
+
+contains
+
+  !> The guards `list` of a path; row `watched` of the coordinates is the last function.
+  pure subroutine prepare_search(machine, flow, path, list, count_guards, watched, search)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: list(:)
+    integer, intent(in) :: count_guards, watched
+    type(search_t), intent(out) :: search
+    real(wp) :: place(0:3), force(0:3), w
+    integer :: g, k, m, order
+    search%guards = count_guards
+    search%functions = count_guards + 1
+    search%exponent = flow%exponent
+    search%frequency = machine%frequency
+    search%decay = real(flow%exponent)
+    search%size_of_exponent = modulus(flow%exponent)
+    associate (functions => search%functions, terms => size(flow%exponent), harmonics => size(path%turning))
+      allocate (search%term(terms, functions), search%size_of_term(terms, functions), search%turn(harmonics, functions), &
+                search%power(0:3, functions), search%steady(0:6, functions))
+    end associate
+    do g = 1, count_guards
+      associate (guard => list(g))
+        place = place_powers(machine, path, guard%joint)
+        search%power(:, g) = guard%place*place
+        search%power(0:2, g) = search%power(0:2, g) + guard%speed*[1, 2, 3]*place(1:3)
+        search%power(0, g) = search%power(0, g) + guard%constant
+        search%term(:, g) = (guard%place + guard%speed*flow%exponent)*flow%joint_shape(:, guard%joint)
+        do m = 1, size(path%turning)
+          w = m*machine%frequency
+          search%turn(m, g) = (guard%place + guard%speed*cmplx(0.0_wp, w, wp))*flow%joint_response(m, guard%joint)
+        end do
+        if (guard%held > 0) then
+          force = force_powers(machine, flow, path, guard%held)
+          search%power(:, g) = search%power(:, g) + guard%force*force
+          search%term(:, g) = search%term(:, g) + guard%force*flow%force_shape(:, guard%held)
+          search%turn(:, g) = search%turn(:, g) + guard%force*flow%force_response(:, guard%held)
+        end if
+      end associate
+    end do
+    g = search%functions
+    search%power(:, g) = path%powers(watched, :)
+    search%term(:, g) = flow%shape(watched, :)
+    search%turn(:, g) = flow%response(watched, :)
+    do g = 1, search%functions
+      search%term(:, g) = search%term(:, g)*path%amplitude
+      search%size_of_term(:, g) = modulus(search%term(:, g))
+      search%turn(:, g) = search%turn(:, g)*path%turning
+      search%steady(:, g) = 0
+      do k = 1, size(path%turning)
+        do order = 0, 6
+          search%steady(order, g) = search%steady(order, g) + modulus(search%turn(k, g))*(k*machine%frequency)**order
+        end do
+      end do
+    end do
+  end subroutine prepare_search
+
+  !> Exponentials and harmonics at `t` [s] after the start.
+  pure subroutine bases_at(search, t, growth, turning)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: t
+    complex(wp), intent(out) :: growth(:), turning(:)
+    real(wp) :: sine, cosine
+    integer :: k
+    do k = 1, size(growth)
+      call sine_cosine(aimag(search%exponent(k))*t, sine, cosine)
+      growth(k) = exponential(search%decay(k)*t)*cmplx(cosine, sine, wp)
+    end do
+    do k = 1, size(turning)
+      call sine_cosine(k*search%frequency*t, sine, cosine)
+      turning(k) = cmplx(cosine, sine, wp)
+    end do
+  end subroutine bases_at
+
+  !> Value and first three derivatives of a function.
+  pure function derivatives(search, g, t, growth, turning) result(d)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: g
+    real(wp), intent(in) :: t
+    complex(wp), intent(in) :: growth(:), turning(:)
+    real(wp) :: d(0:3), w, p(0:3)
+    complex(wp) :: now
+    integer :: k
+    p = search%power(:, g)
+    d = [p(0) + t*(p(1) + t*(p(2) + t*p(3))), p(1) + t*(2*p(2) + 3*t*p(3)), 2*p(2) + 6*t*p(3), 6*p(3)]
+    do k = 1, size(growth)
+      associate (lambda => search%exponent(k))
+        now = search%term(k, g)*growth(k)
+        d(0) = d(0) + real(now)
+        now = now*lambda
+        d(1) = d(1) + real(now)
+        now = now*lambda
+        d(2) = d(2) + real(now)
+        now = now*lambda
+        d(3) = d(3) + real(now)
+      end associate
+    end do
+    do k = 1, size(turning)
+      w = k*search%frequency
+      now = search%turn(k, g)*turning(k)
+      d(0) = d(0) + real(now)
+      d(1) = d(1) - w*aimag(now)
+      d(2) = d(2) - w**2*real(now)
+      d(3) = d(3) + w**3*aimag(now)
+    end do
+  end function derivatives
+
+  !> Bound on derivative number `order` from `t` to `t` + `length`.
+  pure real(wp) function bound(search, g, order, t, length)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: g, order
+    real(wp), intent(in) :: t, length
+    real(wp) :: p(0:3), last
+    integer :: k
+    bound = search%steady(order, g)
+    do k = 1, size(search%exponent)
+      bound = bound + search%size_of_term(k, g)*search%size_of_exponent(k)**order &
+              *exponential(search%decay(k)*t + max(search%decay(k), 0.0_wp)*length)
+    end do
+    p = abs(search%power(:, g))
+    last = t + length
+    select case (order)
+    case (0)
+      bound = bound + p(0) + last*(p(1) + last*(p(2) + last*p(3)))
+    case (1)
+      bound = bound + p(1) + last*(2*p(2) + 3*last*p(3))
+    case (2)
+      bound = bound + 2*p(2) + 6*last*p(3)
+    case (3)
+      bound = bound + 6*p(3)
+    end select
+  end function bound
+
+  !> The first falls within `duration` [s]: `time` is that of the first, `fallen` all guards that fall with it by no more than
+  !> rounding; time = duration and none fallen if there is none. `extremes` are those of the watched coordinate on the way,
+  !> `top_speed` the largest of its speeds if `wants_speed`.
+  pure subroutine find_first(search, list, origin, duration, wants_speed, time, fallen, extremes, top_speed, evaluations)
+    type(search_t), intent(in) :: search
+    type(joint_guard_t), intent(in) :: list(:)
+    real(wp), intent(in) :: origin, duration
+    logical, intent(in) :: wants_speed
+    real(wp), intent(out) :: time
+    logical, intent(out) :: fallen(:)
+    real(wp), intent(inout) :: extremes(2), top_speed
+    integer, intent(out) :: evaluations
+    complex(wp) :: growth(size(search%exponent)), turning(size(search%turn, 1))
+    real(wp), dimension(0:3, search%functions) :: here, there
+    real(wp), dimension(most_guards) :: certified, root
+    real(wp) :: a, b, length, tie
+    logical :: idle(most_guards)
+    integer :: g
+    evaluations = 1
+    fallen = .false.
+    a = 0
+    call bases_at(search, a, growth, turning)
+    do g = 1, search%functions
+      here(:, g) = derivatives(search, g, a, growth, turning)
+    end do
+    length = panel_length(search, duration)
+    tie = 8*spacing(max(origin, origin + duration))
+    time = duration
+    certified = 0
+    idle = .false.
+    do g = 1, search%guards
+      if (list(g)%from_zero .or. here(0, g) <= rounding*(bound(search, g, 0, 0.0_wp, 0.0_wp) + list(g)%blur(0))) then
+        call departure(here(1:3, g), [bound(search, g, 1, 0.0_wp, length) + list(g)%blur(1), &
+                                      bound(search, g, 2, 0.0_wp, length) + list(g)%blur(2), &
+                                      bound(search, g, 3, 0.0_wp, length)], bound(search, g, 4, 0.0_wp, length), length, &
+                       certified(g), idle(g))
+        if (.not. idle(g) .and. certified(g) <= 0) then
+          fallen(g) = .true.
+          time = 0
+        end if
+      end if
+    end do
+    call note_extremes(search, here(:, search%functions), extremes, top_speed)
+    if (any(fallen)) return
+    do while (a < time)
+      b = min(a + length, time)
+      if (time - b < 1e-6_wp*length) b = time
+      call bases_at(search, b, growth, turning)
+      evaluations = evaluations + 1
+      do g = 1, search%functions
+        there(:, g) = derivatives(search, g, b, growth, turning)
+      end do
+      root = huge(1.0_wp)
+      do g = 1, search%guards
+        if (idle(g)) cycle
+        if (certified(g) >= b) cycle
+        if (certified(g) <= a) then
+          if (stays_positive(search, g, a, b, here(:, g), there(:, g))) cycle
+        end if
+        call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
+        if (root(g) < time) time = root(g)
+      end do
+      if (any(root(:search%guards) <= time)) then
+        do g = 1, search%guards
+          fallen(g) = root(g) <= time + tie
+        end do
+        call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
+                   top_speed, evaluations)
+        return
+      end if
+      call watch(search, a, b, here(:, search%functions), there(:, search%functions), .false., wants_speed, extremes, &
+                 top_speed, evaluations)
+      a = b
+      here = there
+    end do
+  end subroutine find_first
+
+  pure subroutine note_extremes(search, now, extremes, top_speed)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: now(0:3)
+    real(wp), intent(inout) :: extremes(2), top_speed
+    if (search%functions == 0) return
+    extremes = [min(extremes(1), now(0)), max(extremes(2), now(0))]
+    top_speed = max(top_speed, now(1))
+  end subroutine note_extremes
+
+  !> Extremes of the watched coordinate between `a` and `b`, with its derivatives there.
+  pure subroutine watch(search, a, b, here, there, stale, wants_speed, extremes, top_speed, evaluations)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: a, b, here(0:3), there(0:3)
+    logical, intent(in) :: stale, wants_speed
+    real(wp), intent(inout) :: extremes(2), top_speed
+    integer, intent(inout) :: evaluations
+    complex(wp) :: growth(size(search%exponent)), turning(size(search%turn, 1))
+    real(wp) :: last(0:3), d(0:3)
+    last = there
+    if (stale) then
+      call bases_at(search, b, growth, turning)
+      evaluations = evaluations + 1
+      last = derivatives(search, search%functions, b, growth, turning)
+    end if
+    call note_extremes(search, last, extremes, top_speed)
+    if (here(1)*last(1) < 0) then
+      d = turning_point(1)
+      call note_extremes(search, d, extremes, top_speed)
+    end if
+    if (wants_speed .and. here(2) > 0 .and. last(2) < 0) then
+      d = turning_point(2)
+      call note_extremes(search, d, extremes, top_speed)
+    end if
+  contains
+    !> Derivatives where number `order` of them is zero: a safeguarded secant.
+    pure function turning_point(order) result(found)
+      integer, intent(in) :: order
+      real(wp) :: found(0:3), low, high, at_low, at_high, t
+      complex(wp) :: now(size(search%exponent)), turn(size(search%turn, 1))
+      integer :: i
+      low = a
+      high = b
+      at_low = here(order)
+      at_high = last(order)
+      do i = 1, 8
+        t = low + (high - low)*min(0.95_wp, max(0.05_wp, at_low/(at_low - at_high)))
+        call bases_at(search, t, now, turn)
+        found = derivatives(search, search%functions, t, now, turn)
+        if (order == 1 .and. abs(found(1))*(high - low) <= 1e-10_wp*(extremes(2) - extremes(1) + abs(found(0)))) exit
+        if (found(order)*at_low > 0) then
+          low = t
+          at_low = found(order)
+        else
+          high = t
+          at_high = found(order)
+        end if
+      end do
+    end function turning_point
+  end subroutine watch
+
+  !> Length of the panels: the quintic is to be good to about a thousandth of each guard's size.
+  pure real(wp) function panel_length(search, duration) result(length)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: duration
+    real(wp) :: size_now, sixth
+    integer :: g
+    length = duration
+    do g = 1, search%functions
+      sixth = bound(search, g, 6, 0.0_wp, 0.0_wp)
+      size_now = bound(search, g, 0, 0.0_wp, 0.0_wp)
+      if (.not. sixth*length**6 > 46*size_now) cycle
+      length = min(length, exponential(logarithm(46*size_now/sixth)/6))
+    end do
+    length = max(length, 1e-6_wp*duration, tiny(length))
+    if (length < duration) length = duration/ceiling(duration/length)
+  end function panel_length
+
+  !> A time up to which a function that is zero at 0 stays positive, from its first three derivatives and a bound on the
+  !> fourth, `longest` at most; `sizes` bound the derivatives for their rounding. 0 if it falls at once; `idle` if nothing
+  !> but rounding is there.
+  pure subroutine departure(d, sizes, fourth, longest, certified, idle)
+    real(wp), intent(in) :: d(3), sizes(3), fourth, longest
+    real(wp), intent(out) :: certified
+    logical, intent(out) :: idle
+    real(wp), parameter :: factorial(4) = [1.0_wp, 2.0_wp, 6.0_wp, 24.0_wp]
+    real(wp) :: against
+    integer :: first, i
+    certified = 0
+    idle = .false.
+    do first = 1, 3
+      if (abs(d(first)) > rounding*sizes(first)) exit
+    end do
+    if (first > 3) then
+      idle = .true.
+      return
+    end if
+    if (d(first) < 0) return
+    certified = longest
+    do i = first + 1, 4
+      if (i == 4) against = fourth
+      if (i < 4) against = max(-d(i), 0.0_wp)
+      if (.not. against > 0) cycle
+      ! A share of the first term for each of the others.
+      associate (ratio => 0.3_wp*d(first)/factorial(first)*factorial(i)/against)
+        select case (i - first)
+        case (1)
+          certified = min(certified, ratio)
+        case (2)
+          certified = min(certified, sqrt(ratio))
+        case default
+          certified = min(certified, exponential(logarithm(max(ratio, tiny(ratio)))/3))
+        end select
+      end associate
+    end do
+  end subroutine departure
+
+  !> Whether Bernstein's coefficients of the quintic lie above its remainder.
+  pure logical function stays_positive(search, g, a, b, here, there)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: g
+    real(wp), intent(in) :: a, b, here(0:3), there(0:3)
+    real(wp) :: h, least, miss
+    h = b - a
+    least = min(here(0), here(0) + h*here(1)/5, here(0) + h*(2*here(1)/5 + h*here(2)/20), &
+                there(0) - h*(2*there(1)/5 - h*there(2)/20), there(0) - h*there(1)/5, there(0))
+    stays_positive = .false.
+    if (.not. least > 0) return
+    miss = bound(search, g, 6, a, h)*h**6/remainder
+    stays_positive = least > miss
+  end function stays_positive
+
+  !> From `a`, where guard `g` is positive, to its first zero before `b`; huge if there is none.
+  pure subroutine approach(search, g, a, b, root, evaluations)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: g
+    real(wp), intent(in) :: a, b
+    real(wp), intent(out) :: root
+    integer, intent(inout) :: evaluations
+    complex(wp) :: growth(size(search%exponent)), turning(size(search%turn, 1))
+    real(wp) :: d(0:3), third, t, step, falling
+    integer :: i
+    root = huge(root)
+    if (a >= b) return
+    third = bound(search, g, 3, a, b - a)
+    t = a
+    do i = 1, most_steps
+      call bases_at(search, t, growth, turning)
+      evaluations = evaluations + 1
+      d = derivatives(search, g, t, growth, turning)
+      if (d(0) <= 0) then
+        root = t
+        if (d(1) < 0) root = max(a, t - d(0)/d(1))
+        return
+      end if
+      ! Within the next stretch no curvature is below this.
+      falling = max(0.0_wp, -d(2) + third*(b - t)/3)
+      step = positive_step(d(0), d(1), falling)
+      if (t + step > b) return
+      if (step <= 1e-9_wp*(b - a) .and. d(1) < 0) then
+        root = t - d(0)/d(1)
+        return
+      end if
+      if (t + step <= t) then
+        root = t
+        return
+      end if
+      t = t + step
+    end do
+    root = t
+  end subroutine approach
+
+end module guard_search

@@ -1,0 +1,181 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What ends a flight of a jointed structure: functions that are positive as long as the joints stay in their phases, all
+!> of one form, constant + place s + speed u + force lambda of a joint.
+module guards
+  use contact_law, only: contact_kelvin_voigt
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_joints
+  use jointed_state, only: jointed_state_t
+  use kinds, only: wp
+  use mode_flow, only: mode_flow_t
+  implicit none
+  private
+
+  public :: guards_of
+
+  integer, parameter, public :: most_guards = 3*most_joints
+
+  !> What a fallen guard means: a slide ends; friction gives way upwards or downwards; the upper or lower stop is reached; a
+  !> closed contact is let go; a pressed one is without force; one without force pushes again; a soft stop is left.
+  integer, parameter, public :: slide_ends = 1, slides_up = 2, slides_down = 3, meets_upper = 4, meets_lower = 5, &
+    lets_go = 6, force_ends = 7, force_returns = 8, leaves = 9
+
+  type, public :: joint_guard_t
+    integer :: joint = 0, meaning = 0
+    real(wp) :: constant = 0, place = 0, speed = 0, force = 0
+    !> Number of the joint among the constraints of the mode.
+    integer :: held = 0
+    !> It is zero now and rises.
+    logical :: from_zero = .false.
+    !> Size of the terms that its value, rate and curvature are sums of, beyond what the motion shows: large coordinates
+    !> that cancel.
+    real(wp) :: blur(0:2) = 0
+  end type joint_guard_t
+
+contains
+
+  !> The guards of a state.
+  pure subroutine guards_of(machine, flow, state, list, count_guards)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(joint_guard_t), intent(out) :: list(most_guards)
+    integer, intent(out) :: count_guards
+    integer :: j, phase, held
+    real(wp) :: level, d, k
+    logical :: changed
+    count_guards = 0
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        phase = state%phase(j)
+        changed = state%left(j) /= 0
+        held = findloc(flow%held, j, 1)
+        d = sign(1, phase)
+        level = joint%friction%break_away
+        select case (joint%kind)
+        case (joint_friction)
+          if (phase == 0) then
+            call put(list, count_guards, joint_guard_t(j, slides_up, constant=level, force=1.0_wp, held=held))
+            call put(list, count_guards, joint_guard_t(j, slides_down, constant=level, force=-1.0_wp, held=held))
+          else
+            call put(list, count_guards, joint_guard_t(j, slide_ends, speed=d, from_zero=changed))
+          end if
+        case (joint_elastic)
+          if (phase == 0) then
+            ! r = -k (s - z) is above -level and below level.
+            k = joint%stiffness
+            call put(list, count_guards, joint_guard_t(j, slides_up, constant=level + k*state%slider(j), place=-k, &
+                                                       from_zero=state%left(j) > 0))
+            call put(list, count_guards, joint_guard_t(j, slides_down, constant=level - k*state%slider(j), place=k, &
+                                                       from_zero=state%left(j) < 0))
+          else
+            call put(list, count_guards, joint_guard_t(j, slide_ends, speed=d, from_zero=changed))
+          end if
+        case (joint_contact)
+          if (phase == 0) then
+            call gap_guards(machine, state, j, list, count_guards)
+          else
+            call put(list, count_guards, joint_guard_t(j, lets_go, force=-d, held=held))
+          end if
+        case (joint_soft)
+          call soft_guards(machine, state, j, list, count_guards)
+        end select
+      end associate
+    end do
+    call set_blur(machine, flow, state, list(:count_guards))
+  end subroutine guards_of
+
+  !> Sizes of sums for their rounding.
+  pure subroutine set_blur(machine, flow, state, list)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(joint_guard_t), intent(inout) :: list(:)
+    real(wp) :: force(machine%n), acceleration(machine%n), place, speed, change
+    integer :: g, n
+    n = machine%n
+    force = abs(machine%load) + matmul(abs(flow%stiffness), abs(state%q(:n))) + matmul(abs(flow%damping), abs(state%v(:n)))
+    acceleration = matmul(abs(machine%mobility), force)
+    do g = 1, size(list)
+      associate (guard => list(g), row => abs(machine%joints(list(g)%joint)%row))
+        place = sum(row*abs(state%q(:n)))
+        speed = sum(row*abs(state%v(:n)))
+        change = sum(row*acceleration)
+        guard%blur = abs(guard%place)*[place, speed, change] + abs(guard%speed)*[speed, change, change*machine%frequency]
+        if (guard%held > 0) then
+          change = sum(abs(flow%reaction(guard%held, :))*force)
+          guard%blur = guard%blur + change*[1.0_wp, machine%frequency, machine%frequency**2]
+        end if
+      end associate
+    end do
+  end subroutine set_blur
+
+  pure subroutine put(list, count_guards, guard)
+    type(joint_guard_t), intent(inout) :: list(:)
+    integer, intent(inout) :: count_guards
+    type(joint_guard_t), intent(in) :: guard
+    count_guards = count_guards + 1
+    list(count_guards) = guard
+  end subroutine put
+
+  !> The gaps to both stops.
+  pure subroutine gap_guards(machine, state, j, list, count_guards)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: j
+    type(joint_guard_t), intent(inout) :: list(:)
+    integer, intent(inout) :: count_guards
+    associate (joint => machine%joints(j))
+      if (joint%upper < huge(1.0_wp)) call put(list, count_guards, &
+        joint_guard_t(j, meets_upper, constant=joint%upper, place=-1.0_wp, from_zero=state%left(j) > 0))
+      if (joint%lower > -huge(1.0_wp)) call put(list, count_guards, &
+        joint_guard_t(j, meets_lower, constant=-joint%lower, place=1.0_wp, from_zero=state%left(j) < 0))
+    end associate
+  end subroutine gap_guards
+
+  !> A soft contact: its gap, or its penetration p = d (s - stop), and its force k p + c p', or 1 + a p'.
+  pure subroutine soft_guards(machine, state, j, list, count_guards)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: j
+    type(joint_guard_t), intent(inout) :: list(:)
+    integer, intent(inout) :: count_guards
+    real(wp) :: stop, k, c, d
+    integer :: phase
+    logical :: changed
+    phase = state%phase(j)
+    d = sign(1, phase)
+    changed = state%left(j) /= 0
+    associate (joint => machine%joints(j))
+      if (phase == 0) then
+        call gap_guards(machine, state, j, list, count_guards)
+        return
+      end if
+      stop = merge(joint%upper, joint%lower, phase > 0)
+      k = joint%contact%stiffness
+      c = joint%contact%damping
+      if (joint%contact%by_impact) c = c/max(state%touch_speed(j), tiny(1.0_wp))
+      if (abs(phase) == 1) then
+        if (joint%contact%kind /= contact_kelvin_voigt) then
+          call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, place=d, from_zero=changed))
+          if (c > 0) call put(list, count_guards, joint_guard_t(j, force_ends, constant=1.0_wp, speed=d*c))
+        else if (joint%contact%tension .or. .not. c > 0) then
+          call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, place=d, from_zero=changed))
+        else
+          ! Without tension the force ends before the surface is free.
+          call put(list, count_guards, joint_guard_t(j, force_ends, constant=-k*d*stop, place=k*d, speed=c*d))
+        end if
+      else
+        call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, place=d))
+        if (joint%contact%kind /= contact_kelvin_voigt) then
+          call put(list, count_guards, joint_guard_t(j, force_returns, constant=-1.0_wp, speed=-d*c, from_zero=changed))
+        else
+          call put(list, count_guards, joint_guard_t(j, force_returns, constant=k*d*stop, place=-k*d, speed=-c*d, &
+                                                     from_zero=changed))
+        end if
+      end if
+    end associate
+  end subroutine soft_guards
+
+end module guards

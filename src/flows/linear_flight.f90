@@ -1,0 +1,184 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One flight of a linear mode: to the first guard that falls, or to a time.
+module linear_flight
+  use flight_path, only: begin_path, path_at, path_t, series_step, terms
+  use guard_search, only: find_first, prepare_search, search_t
+  use guards, only: guards_of, joint_guard_t, most_guards
+  use jointed, only: jointed_t
+  use jointed_state, only: jointed_state_t
+  use kinds, only: wp
+  use linear_flow, only: first_zero, order
+  use mode_flow, only: mode_flow_t
+  implicit none
+  private
+
+  public :: fly_linear
+
+  !> Extremes of the watched coordinate and its largest speed, and what a flight cost.
+  type, public :: watch_t
+    real(wp) :: extremes(2) = [huge(1.0_wp), -huge(1.0_wp)]
+    real(wp) :: top_speed = -huge(1.0_wp)
+    logical :: wants_speed = .false.
+    integer :: evaluations = 0
+  end type watch_t
+
+  real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+
+contains
+
+  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `fallen` those that fell together at
+  !> the end, none if the time is over. `path` is the way.
+  pure subroutine fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(in) :: until
+    type(joint_guard_t), intent(out) :: list(most_guards)
+    integer, intent(out) :: count_guards
+    logical, intent(out) :: fallen(most_guards)
+    type(path_t), intent(out) :: path
+    type(watch_t), intent(inout) :: watch
+    type(search_t) :: search
+    real(wp) :: time
+    integer :: evaluations
+    call guards_of(machine, flow, state, list, count_guards)
+    call begin_path(machine, flow, state, path)
+    if (flow%modal) then
+      call prepare_search(machine, flow, path, list, count_guards, machine%watched, search)
+      call find_first(search, list, path%start, until - path%start, watch%wants_speed, time, fallen, watch%extremes, &
+                      watch%top_speed, evaluations)
+      watch%evaluations = watch%evaluations + evaluations
+      call path_at(machine, flow, path, time, state%q, state%v)
+    else
+      call fly_series(machine, flow, path, list, count_guards, until - path%start, state, time, fallen, watch)
+    end if
+    state%time = path%start + time
+    if (.not. any(fallen)) state%time = until
+  end subroutine fly_linear
+
+  !> The same by stretches of the exponential series.
+  pure subroutine fly_series(machine, flow, path, list, count_guards, duration, state, time, fallen, watch)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: list(:)
+    integer, intent(in) :: count_guards
+    real(wp), intent(in) :: duration
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(out) :: time
+    logical, intent(out) :: fallen(:)
+    type(watch_t), intent(inout) :: watch
+    real(wp) :: y(size(path%unknowns)), powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
+    real(wp) :: length, p(0:order), root(most_guards), first, fraction
+    integer :: g, i, k, n, stretches
+    n = machine%n
+    fallen = .false.
+    y = path%unknowns
+    do g = 1, count_guards
+      row(:, g) = row_of(machine, flow, path, list(g))
+    end do
+    stretches = max(1, ceiling(flow%rate*duration))
+    length = duration/stretches
+    time = 0
+    do i = 1, stretches
+      call series_step(path%matrix, y, length, powers)
+      root = 2
+      do g = 1, count_guards
+        p = 0
+        p(:terms) = matmul(row(:, g), powers)
+        if (i == 1) then
+          if (list(g)%from_zero) p(0) = 0
+          call drop_rounding(row(:, g), path%matrix, y, length, p)
+        end if
+        root(g) = first_zero(p)
+      end do
+      call watch_series(powers(machine%watched, :), powers(n + machine%watched, :), min(1.0_wp, minval(root)), watch)
+      first = minval(root(:max(count_guards, 1)))
+      if (count_guards > 0 .and. first <= 1) then
+        fallen(:count_guards) = root(:count_guards) <= first + 8*spacing(path%start + duration)/length
+        fraction = first
+        y = powers(:, terms)
+        do k = terms - 1, 0, -1
+          y = y*fraction + powers(:, k)
+        end do
+        time = time + fraction*length
+        exit
+      end if
+      y = sum(powers, dim=2)
+      time = time + length
+      watch%evaluations = watch%evaluations + 1
+    end do
+    state%q(:n) = y(:n)
+    state%v(:n) = y(n + 1:2*n)
+  end subroutine fly_series
+
+  !> Extremes of the watched coordinate up to a fraction of a stretch, from its series and that of its speed.
+  pure subroutine watch_series(place, speed, fraction, watch)
+    real(wp), intent(in) :: place(0:), speed(0:), fraction
+    type(watch_t), intent(inout) :: watch
+    real(wp) :: at, low, high
+    integer :: i
+    watch%extremes = [min(watch%extremes(1), place(0), value(place, fraction)), &
+                      max(watch%extremes(2), place(0), value(place, fraction))]
+    watch%top_speed = max(watch%top_speed, speed(0), value(speed, fraction))
+    if (value(speed, 0.0_wp)*value(speed, fraction) >= 0) return
+    low = 0
+    high = fraction
+    do i = 1, 40
+      at = (low + high)/2
+      if (value(speed, at)*value(speed, low) > 0) then
+        low = at
+      else
+        high = at
+      end if
+    end do
+    watch%extremes = [min(watch%extremes(1), value(place, at)), max(watch%extremes(2), value(place, at))]
+  contains
+    pure real(wp) function value(p, t)
+      real(wp), intent(in) :: p(0:), t
+      integer :: k
+      value = p(ubound(p, 1))
+      do k = ubound(p, 1) - 1, 0, -1
+        value = value*t + p(k)
+      end do
+    end function value
+  end subroutine watch_series
+
+  !> The row of a guard over the unknowns.
+  pure function row_of(machine, flow, path, guard) result(row)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: guard
+    real(wp) :: row(size(path%unknowns))
+    integer :: one
+    one = 2*machine%n + 1
+    associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
+      row = guard%place*flow%place_row(:, guard%joint) + guard%speed*flow%speed_row(:, guard%joint)
+      row(one) = row(one) + guard%constant + guard%place*(offset%mean + offset%rate*path%start) + guard%speed*offset%rate
+      row(one + 1) = row(one + 1) + guard%place*offset%rate
+      if (guard%held > 0) then
+        row = row + guard%force*flow%force_row(:, guard%held)
+        row(one) = row(one) - guard%force*sum(flow%reaction(guard%held, :)*path%force(:n))
+        row(one + 1) = row(one + 1) - guard%force*sum(flow%reaction(guard%held, :)*path%force_rate(:n))
+      end if
+    end associate
+  end function row_of
+
+  !> Drops the leading terms of a series that are no more than the rounding of what they are sums of.
+  pure subroutine drop_rounding(row, matrix, y, length, p)
+    real(wp), intent(in) :: row(:), matrix(:, :), y(:), length
+    real(wp), intent(inout) :: p(0:)
+    real(wp) :: term(size(y))
+    integer :: k
+    term = abs(y)
+    do k = 0, 3
+      if (k > 0) term = matmul(abs(matrix), term)*(length/k)
+      if (abs(p(k)) > rounding*sum(abs(row)*term)) return
+      p(k) = 0
+    end do
+  end subroutine drop_rounding
+
+end module linear_flight

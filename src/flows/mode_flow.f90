@@ -1,0 +1,485 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The linear motion of a jointed structure in one mode: which joints are constraints or springs. The constrained structure
+!> is taken apart into modes: pairs of complex exponentials, exponentials, and rigid motions; the response to each harmonic
+!> of the drive is periodic. Where the modes are too near to being one, or the drive to one of them, `modal` is false and
+!> the motion is the exponential series of `matrix`, which every linear structure has.
+module mode_flow
+  use eigen, only: general_eigen, modulus, solve_complex, symmetric_eigen, undamped_modes
+  use jointed, only: joint_contact, joint_soft, jointed_t, offset_of
+  use jointed_state, only: is_held
+  use kinds, only: wp
+  use matrices, only: solve
+  implicit none
+  private
+
+  public :: build_flow, harmonics_of
+
+  !> Modes nearer to each other than this share are left to the series; stiffness and damping below this share are none.
+  real(wp), parameter :: worst_condition = 1e5_wp, none_at_all = 1e-12_wp, nearest_resonance = 1e-5_wp
+
+  type, public :: mode_flow_t
+    integer :: key = -1
+    logical :: modal = .false.
+    !> Joints that are constraints, and those of them that do not depend on the others.
+    integer, allocatable :: held(:), independent(:)
+    !> Structure with the springs of the joints.
+    real(wp), allocatable :: stiffness(:, :), damping(:, :)
+    !> Where unit coordinates of the independent constraints move the structure, statically in the metric of the masses.
+    real(wp), allocatable :: carried(:, :)
+    !> Forces of the constraints per force on the coordinates, and per acceleration of their surfaces.
+    real(wp), allocatable :: reaction(:, :), hold(:, :)
+    !> Free directions (columns, orthonormal in the metric of the masses): flexible, damped rigid, rigid.
+    real(wp), allocatable :: basis(:, :)
+    integer :: flexible = 0, damped = 0, rigid = 0
+    !> Natural frequencies of the flexible ones [rad/s].
+    real(wp), allocatable :: frequency(:)
+    !> Exponents, shapes in the coordinates (of a conjugate pair one, twofold), and rows that give their amplitudes
+    !> from basis coordinates times frequency and their speeds.
+    complex(wp), allocatable :: exponent(:), shape(:, :), left(:, :)
+    !> Amplitude of the damped rigid coordinates per amplitude of the exponentials.
+    complex(wp), allocatable :: drift(:, :)
+    !> Periodic response of the coordinates to the harmonics.
+    complex(wp), allocatable :: response(:, :)
+    !> Shapes and responses along the rows of the joints, and of the forces of the constraints.
+    complex(wp), allocatable :: joint_shape(:, :), joint_response(:, :), force_shape(:, :), force_response(:, :)
+    !> Matrix of the coordinates, their speeds, 1, the time, cosines and sines; bound on its rate [1/s].
+    real(wp), allocatable :: matrix(:, :)
+    real(wp) :: rate = 0
+    !> Rows of the joint coordinates, their speeds, and the forces of the constraints over the same unknowns.
+    real(wp), allocatable :: place_row(:, :), speed_row(:, :), force_row(:, :)
+  end type mode_flow_t
+
+contains
+
+  !> Number of harmonics that a machine knows.
+  pure integer function harmonics_of(machine) result(harmonics)
+    type(jointed_t), intent(in) :: machine
+    integer :: j
+    harmonics = size(machine%force, 2)
+    do j = 1, size(machine%joints)
+      if (allocated(machine%joints(j)%offset%harmonic)) harmonics = max(harmonics, size(machine%joints(j)%offset%harmonic))
+    end do
+  end function harmonics_of
+
+  !> The flow of the mode `key` (a bit per joint); `with_matrix` asks for the series beside the modes.
+  pure subroutine build_flow(machine, key, with_matrix, flow)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: key
+    logical, intent(in) :: with_matrix
+    type(mode_flow_t), intent(out) :: flow
+    complex(wp), allocatable :: forcing(:, :), surface(:, :)
+    integer :: j, harmonics
+    flow%key = key
+    flow%stiffness = machine%stiffness
+    flow%damping = machine%damping
+    flow%held = [integer ::]
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        if (.not. btest(key, j - 1)) cycle
+        if (is_held(joint, merge(1, 0, joint%kind == joint_contact))) then
+          flow%held = [flow%held, j]
+        else if (joint%kind == joint_soft) then
+          call stiffen(flow, joint%row, joint%contact%stiffness, joint%contact%damping)
+        else
+          call stiffen(flow, joint%row, joint%stiffness, 0.0_wp)
+        end if
+      end associate
+    end do
+    harmonics = harmonics_of(machine)
+    call set_constraints(machine, flow)
+    call set_forcing(machine, flow, harmonics, forcing, surface)
+    if (machine%linear) then
+      call set_modes(machine, flow, forcing, surface)
+    end if
+    if (with_matrix .or. .not. flow%modal) call set_matrix(machine, flow, forcing, surface)
+  end subroutine build_flow
+
+  pure subroutine stiffen(flow, row, stiffness, damping)
+    type(mode_flow_t), intent(inout) :: flow
+    real(wp), intent(in) :: row(:), stiffness, damping
+    integer :: k
+    do k = 1, size(row)
+      flow%stiffness(:, k) = flow%stiffness(:, k) + stiffness*row*row(k)
+      flow%damping(:, k) = flow%damping(:, k) + damping*row*row(k)
+    end do
+  end subroutine stiffen
+
+  !> What the constraints do to forces and accelerations. Those that depend on others share their force evenly.
+  pure subroutine set_constraints(machine, flow)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    real(wp), allocatable :: w(:, :), g(:, :), column(:), unit(:), answer(:)
+    real(wp) :: left
+    integer :: i, k, m
+    logical :: ok
+    m = size(flow%held)
+    allocate (w(machine%n, m))
+    do i = 1, m
+      w(:, i) = machine%joints(flow%held(i))%row
+    end do
+    g = matmul(transpose(w), matmul(machine%mobility, w))
+    flow%independent = [integer ::]
+    do i = 1, m
+      ! What the rows before leave of this one.
+      column = w(:, i)
+      left = g(i, i)
+      k = size(flow%independent)
+      if (k > 0) then
+        associate (before => flow%independent)
+          allocate (unit(k))
+          call solve(g(before, before), g(before, i), unit, ok)
+          left = g(i, i) - sum(unit*g(before, i))
+          deallocate (unit)
+        end associate
+      end if
+      if (left > 1e-10_wp*g(i, i)) flow%independent = [flow%independent, i]
+    end do
+    k = size(flow%independent)
+    allocate (flow%carried(machine%n, k), flow%hold(m, m), unit(k), answer(k))
+    do i = 1, k
+      unit = 0
+      unit(i) = 1
+      call solve(g(flow%independent, flow%independent), unit, answer, ok)
+      flow%carried(:, i) = matmul(machine%mobility, matmul(w(:, flow%independent), answer))
+    end do
+    if (k < m) then
+      do i = 1, m
+        g(i, i) = g(i, i)*(1 + sqrt(epsilon(1.0_wp)))
+      end do
+    end if
+    do i = 1, m
+      column = [(0.0_wp, k=1, m)]
+      column(i) = 1
+      call solve(g, column, flow%hold(:, i), ok)
+    end do
+    flow%reaction = matmul(flow%hold, matmul(transpose(w), machine%mobility))
+  end subroutine set_constraints
+
+  !> Harmonics of the forces on the coordinates, those of springs on moving surfaces included, and of the surfaces of the
+  !> constraints.
+  pure subroutine set_forcing(machine, flow, harmonics, forcing, surface)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    integer, intent(in) :: harmonics
+    complex(wp), allocatable, intent(out) :: forcing(:, :), surface(:, :)
+    real(wp) :: w
+    integer :: i, j, m
+    allocate (forcing(machine%n, harmonics), surface(size(flow%held), harmonics), source=(0.0_wp, 0.0_wp))
+    forcing(:, :size(machine%force, 2)) = machine%force
+    do m = 1, harmonics
+      w = m*machine%frequency
+      do j = 1, size(machine%joints)
+        associate (joint => machine%joints(j))
+          if (.not. btest(flow%key, j - 1) .or. any(flow%held == j)) cycle
+          if (joint%kind == joint_soft) then
+            forcing(:, m) = forcing(:, m) &
+              - joint%row*(joint%contact%stiffness + cmplx(0.0_wp, w, wp)*joint%contact%damping)*offset_of(joint, m)
+          else
+            forcing(:, m) = forcing(:, m) - joint%row*joint%stiffness*offset_of(joint, m)
+          end if
+        end associate
+      end do
+      do i = 1, size(flow%held)
+        surface(i, m) = offset_of(machine%joints(flow%held(i)), m)
+      end do
+    end do
+  end subroutine set_forcing
+
+  !> Modes of the constrained structure, if they are well apart.
+  pure subroutine set_modes(machine, flow, forcing, surface)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
+    real(wp), allocatable :: squares(:), damping(:, :)
+    call set_basis(machine, flow, squares, damping)
+    flow%modal = .true.
+    call set_exponentials(flow, squares, damping)
+    if (flow%modal) call set_response(machine, flow, damping, squares, forcing, surface)
+    if (flow%modal) call set_rows(machine, flow, forcing, surface)
+  end subroutine set_modes
+
+  !> Undamped modes of the constrained structure: flexible ones first, then rigid ones with damping, then those without.
+  pure subroutine set_basis(machine, flow, squares, damping)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    real(wp), allocatable, intent(out) :: squares(:), damping(:, :)
+    real(wp), allocatable :: all_shapes(:, :), free(:, :), reduced(:, :), turned(:, :), levels(:), rigid_damping(:, :)
+    integer, allocatable :: order(:)
+    real(wp) :: largest, length
+    integer :: n, m, i, k, best
+    n = machine%n
+    m = n - size(flow%independent)
+    allocate (squares(n), all_shapes(n, n), free(n, m))
+    call undamped_modes(flow%stiffness, machine%mass, squares, all_shapes)
+    ! The part of the shapes that moves no constraint, made orthonormal, longest first.
+    do i = 1, n
+      all_shapes(:, i) = all_shapes(:, i) - matmul(flow%carried, [(sum(machine%joints(flow%held(flow%independent(k)))%row &
+                                                                       *all_shapes(:, i)), k=1, n - m)])
+    end do
+    do k = 1, m
+      best = 1
+      length = -1
+      do i = 1, n
+        if (sum(all_shapes(:, i)*matmul(machine%mass, all_shapes(:, i))) > length*(1 + 1e-9_wp)) then
+          best = i
+          length = sum(all_shapes(:, i)*matmul(machine%mass, all_shapes(:, i)))
+        end if
+      end do
+      free(:, k) = all_shapes(:, best)/sqrt(length)
+      do i = 1, 2
+        free(:, k) = free(:, k) - matmul(free(:, :k - 1), matmul(transpose(free(:, :k - 1)), matmul(machine%mass, free(:, k))))
+        free(:, k) = free(:, k)/sqrt(sum(free(:, k)*matmul(machine%mass, free(:, k))))
+      end do
+      do i = 1, n
+        all_shapes(:, i) = all_shapes(:, i) - free(:, k)*sum(free(:, k)*matmul(machine%mass, all_shapes(:, i)))
+      end do
+    end do
+    deallocate (squares)
+    allocate (squares(m), turned(m, m))
+    reduced = matmul(transpose(free), matmul(flow%stiffness, free))
+    reduced = (reduced + transpose(reduced))/2
+    call symmetric_eigen(reduced, squares, turned)
+    free = matmul(free, turned)
+    largest = 0
+    if (m > 0) largest = maxval(abs(squares))
+    order = [pack([(i, i=1, m)], abs(squares) > none_at_all*largest), &
+             pack([(i, i=1, m)], .not. abs(squares) > none_at_all*largest)]
+    flow%flexible = count(abs(squares) > none_at_all*largest)
+    squares = squares(order)
+    free = free(:, order)
+    associate (f => flow%flexible)
+      allocate (rigid_damping(m - f, m - f), levels(m - f))
+      rigid_damping = matmul(transpose(free(:, f + 1:)), matmul(flow%damping, free(:, f + 1:)))
+      deallocate (turned)
+      allocate (turned(m - f, m - f))
+      call symmetric_eigen(rigid_damping, levels, turned)
+      free(:, f + 1:) = matmul(free(:, f + 1:), turned(:, m - f:1:-1))
+      levels = levels(m - f:1:-1)
+      flow%damped = count(levels > none_at_all*maxval(abs(flow%damping))*maxval(abs(machine%mobility)))
+      flow%rigid = m - f - flow%damped
+    end associate
+    flow%basis = free
+    flow%frequency = sqrt(abs(squares(:flow%flexible)))
+    damping = matmul(transpose(free), matmul(flow%damping, free))
+  end subroutine set_basis
+
+  !> Exponentials of the flexible and the damped rigid coordinates.
+  pure subroutine set_exponentials(flow, squares, damping)
+    type(mode_flow_t), intent(inout) :: flow
+    real(wp), intent(in) :: squares(:), damping(:, :)
+    real(wp), allocatable :: a(:, :)
+    complex(wp), allocatable :: values(:), vectors(:, :), inverse(:, :), unit(:, :)
+    integer, allocatable :: kept(:)
+    real(wp) :: largest, twice
+    integer :: f, d, order, i, k
+    logical :: ok
+    f = flow%flexible
+    d = flow%damped
+    order = 2*f + d
+    if (flow%rigid > 0 .and. size(damping) > 0) then
+      ok = maxval(abs(damping(:f + d, f + d + 1:))) <= 1e3_wp*none_at_all*max(maxval(abs(damping)), tiny(1.0_wp))
+      if (f + d > 0 .and. .not. ok) then
+        flow%modal = .false.
+        return
+      end if
+    end if
+    allocate (a(order, order), source=0.0_wp)
+    do i = 1, f
+      a(i, f + i) = flow%frequency(i)
+      a(f + i, i) = -sign(flow%frequency(i), squares(i))
+    end do
+    a(f + 1:, f + 1:) = -damping(:f + d, :f + d)
+    allocate (values(order), vectors(order, order), inverse(order, order), unit(order, order))
+    call general_eigen(a, values, vectors, flow%modal)
+    if (.not. flow%modal) return
+    unit = 0
+    do i = 1, order
+      unit(i, i) = 1
+    end do
+    call solve_complex(vectors, unit, inverse, flow%modal)
+    if (.not. flow%modal) return
+    largest = maxval([0.0_wp, modulus(values)])
+    do k = 1, order
+      if (sqrt(sum(modulus(vectors(:, k))**2)*sum(modulus(inverse(k, :))**2)) > worst_condition) flow%modal = .false.
+      if (modulus(values(k)) < 1e-9_wp*largest) flow%modal = .false.
+    end do
+    if (count(aimag(values) > none_at_all*largest) /= count(aimag(values) < -none_at_all*largest)) flow%modal = .false.
+    if (.not. flow%modal) return
+    kept = pack([(k, k=1, order)], aimag(values) > -none_at_all*largest)
+    allocate (flow%shape(size(flow%basis, 1), size(kept)), flow%drift(d, size(kept)))
+    flow%exponent = values(kept)
+    flow%left = inverse(kept, :)
+    do i = 1, size(kept)
+      k = kept(i)
+      if (abs(aimag(values(k))) <= none_at_all*largest) flow%exponent(i) = real(values(k))
+      twice = merge(2.0_wp, 1.0_wp, aimag(values(k)) > none_at_all*largest)
+      flow%drift(:, i) = twice*vectors(2*f + 1:, k)/flow%exponent(i)
+      flow%shape(:, i) = matmul(flow%basis(:, :f), twice*vectors(f + 1:2*f, k)/flow%exponent(i)) &
+                         + matmul(flow%basis(:, f + 1:f + d), flow%drift(:, i))
+    end do
+  end subroutine set_exponentials
+
+  !> Periodic response to the harmonics of the drive.
+  pure subroutine set_response(machine, flow, damping, squares, forcing, surface)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    real(wp), intent(in) :: damping(:, :), squares(:)
+    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
+    complex(wp), allocatable :: dynamic(:, :), b(:, :), x(:, :), carried(:)
+    real(wp) :: w
+    integer :: m, i, order
+    logical :: ok
+    order = size(flow%basis, 2)
+    allocate (flow%response(machine%n, size(forcing, 2)), dynamic(order, order), b(order, 1), x(order, 1))
+    do m = 1, size(forcing, 2)
+      w = m*machine%frequency
+      if (.not. any(modulus(forcing(:, m)) > 0) .and. .not. any(modulus(surface(:, m)) > 0)) then
+        flow%response(:, m) = 0
+        cycle
+      end if
+      do i = 1, size(flow%exponent)
+        if (modulus(cmplx(0.0_wp, w, wp) - flow%exponent(i)) < nearest_resonance*w) flow%modal = .false.
+      end do
+      if (.not. flow%modal) return
+      carried = -matmul(flow%carried, surface(flow%independent, m))
+      b(:, 1) = matmul(transpose(flow%basis), forcing(:, m) &
+                       - matmul(flow%stiffness + cmplx(0.0_wp, w, wp)*flow%damping, carried))
+      dynamic = cmplx(0.0_wp, w, wp)*damping
+      do i = 1, order
+        dynamic(i, i) = dynamic(i, i) - w**2
+        if (i <= flow%flexible) dynamic(i, i) = dynamic(i, i) + squares(i)
+      end do
+      call solve_complex(dynamic, b, x, ok)
+      flow%modal = ok
+      if (.not. ok) return
+      flow%response(:, m) = carried + matmul(flow%basis, x(:, 1))
+    end do
+  end subroutine set_response
+
+  !> Shapes and responses along the rows of the joints and in the forces of the constraints.
+  pure subroutine set_rows(machine, flow, forcing, surface)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
+    complex(wp) :: iw
+    integer :: j, k, m, count_shapes, harmonics
+    count_shapes = size(flow%exponent)
+    harmonics = size(forcing, 2)
+    allocate (flow%joint_shape(count_shapes, size(machine%joints)), flow%joint_response(harmonics, size(machine%joints)))
+    allocate (flow%force_shape(count_shapes, size(flow%held)), flow%force_response(harmonics, size(flow%held)))
+    do j = 1, size(machine%joints)
+      do k = 1, count_shapes
+        flow%joint_shape(k, j) = sum(machine%joints(j)%row*flow%shape(:, k))
+      end do
+      do m = 1, harmonics
+        flow%joint_response(m, j) = sum(machine%joints(j)%row*flow%response(:, m)) + offset_of(machine%joints(j), m)
+      end do
+    end do
+    do k = 1, count_shapes
+      flow%force_shape(k, :) = matmul(flow%reaction, matmul(flow%stiffness, flow%shape(:, k)) &
+                                      + flow%exponent(k)*matmul(flow%damping, flow%shape(:, k)))
+    end do
+    do m = 1, harmonics
+      iw = cmplx(0.0_wp, m*machine%frequency, wp)
+      flow%force_response(m, :) = matmul(flow%reaction, matmul(flow%stiffness, flow%response(:, m)) &
+                                         + iw*matmul(flow%damping, flow%response(:, m)) - forcing(:, m)) &
+                                  - iw**2*matmul(flow%hold, surface(:, m))
+    end do
+  end subroutine set_rows
+
+  !> The matrix of the motion with everything that drives it. Constant and linear parts of the forces belong to the flight:
+  !> their columns are left to it.
+  pure subroutine set_matrix(machine, flow, forcing, surface)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
+    real(wp), allocatable :: push(:, :), power(:, :)
+    complex(wp), allocatable :: driven(:)
+    real(wp) :: size_of_matrix, size_of_power, w
+    integer :: n, m, i, harmonics, c
+    n = machine%n
+    harmonics = size(forcing, 2)
+    allocate (flow%matrix(2*n + 2 + 2*harmonics, 2*n + 2 + 2*harmonics), source=0.0_wp)
+    push = held_mobility(machine, flow)
+    do i = 1, n
+      flow%matrix(i, n + i) = 1
+    end do
+    flow%matrix(n + 1:2*n, :n) = -matmul(push, flow%stiffness)
+    flow%matrix(n + 1:2*n, n + 1:2*n) = -matmul(push, flow%damping)
+    flow%matrix(2*n + 2, 2*n + 1) = 1
+    do m = 1, harmonics
+      c = 2*n + 1 + 2*m
+      w = m*machine%frequency
+      driven = matmul(push, forcing(:, m)) + w**2*matmul(flow%carried, surface(flow%independent, m))
+      flow%matrix(n + 1:2*n, c) = real(driven)
+      flow%matrix(n + 1:2*n, c + 1) = -aimag(driven)
+      flow%matrix(c, c + 1) = -w
+      flow%matrix(c + 1, c) = w
+    end do
+    size_of_matrix = maxval(sum(abs(flow%matrix), dim=1))
+    power = flow%matrix/size_of_matrix
+    do i = 1, 4
+      power = matmul(power, power)
+    end do
+    size_of_power = maxval(sum(abs(power), dim=1))
+    do i = 1, 4
+      size_of_power = sqrt(size_of_power)
+    end do
+    flow%rate = max(size_of_matrix*size_of_power, machine%frequency)
+    call set_matrix_rows(machine, flow, forcing, surface)
+  end subroutine set_matrix
+
+  !> Joint coordinates, speeds and forces of constraints as rows over the unknowns of the matrix; their constant and linear
+  !> parts are left to the flight.
+  pure subroutine set_matrix_rows(machine, flow, forcing, surface)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(inout) :: flow
+    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
+    complex(wp), allocatable :: driven(:)
+    complex(wp) :: amplitude
+    real(wp) :: w
+    integer :: n, m, j, c, unknowns
+    n = machine%n
+    unknowns = size(flow%matrix, 1)
+    allocate (flow%place_row(unknowns, size(machine%joints)), flow%speed_row(unknowns, size(machine%joints)), &
+              flow%force_row(unknowns, size(flow%held)), source=0.0_wp)
+    do j = 1, size(machine%joints)
+      flow%place_row(:n, j) = machine%joints(j)%row
+      flow%speed_row(n + 1:2*n, j) = machine%joints(j)%row
+    end do
+    flow%force_row(:n, :) = transpose(matmul(flow%reaction, flow%stiffness))
+    flow%force_row(n + 1:2*n, :) = transpose(matmul(flow%reaction, flow%damping))
+    do m = 1, size(forcing, 2)
+      c = 2*n + 1 + 2*m
+      w = m*machine%frequency
+      do j = 1, size(machine%joints)
+        amplitude = offset_of(machine%joints(j), m)
+        flow%place_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
+        amplitude = amplitude*cmplx(0.0_wp, w, wp)
+        flow%speed_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
+      end do
+      driven = -matmul(flow%reaction, forcing(:, m)) + w**2*matmul(flow%hold, surface(:, m))
+      flow%force_row(c, :) = real(driven)
+      flow%force_row(c + 1, :) = -aimag(driven)
+    end do
+  end subroutine set_matrix_rows
+
+  !> Accelerations per force on the coordinates, with the constraints held.
+  pure function held_mobility(machine, flow) result(push)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    real(wp) :: push(machine%n, machine%n)
+    integer :: i, k
+    push = machine%mobility
+    do i = 1, size(flow%independent)
+      associate (row => machine%joints(flow%held(flow%independent(i)))%row)
+        do k = 1, machine%n
+          push(:, k) = push(:, k) - flow%carried(:, i)*sum(row*machine%mobility(:, k))
+        end do
+      end associate
+    end do
+  end function held_mobility
+
+end module mode_flow

@@ -1,0 +1,92 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A function given by its values at a few knots: cubic between two of them (Hermite), with one slope at each, so that it is
+!> continuous with its derivative; constant beyond the first and the last. The slope at a knot is that of the polynomial
+!> through it and its neighbours, up to five knots: the error falls with the fourth power of their distance, and the function
+!> is linear in the values.
+module curve_law
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: curve_of, value_at, knots_problem
+
+  integer, parameter, public :: most_knots = 16
+
+  type, public :: curve_t
+    integer :: count = 0
+    !> Knots, ascending; values and slopes there.
+    real(wp) :: at(most_knots) = 0, value(most_knots) = 0, slope(most_knots) = 0
+  end type curve_t
+
+contains
+
+  !> What is wrong with knots `at` and their number of values, '' if nothing.
+  pure function knots_problem(at, values) result(problem)
+    real(wp), intent(in) :: at(:)
+    integer, intent(in) :: values
+    character(len=:), allocatable :: problem
+    problem = ''
+    if (size(at) < 2 .or. size(at) > most_knots) then
+      problem = 'allowed 2 to 16 knots'
+    else if (values /= size(at)) then
+      problem = 'allowed as many values as knots'
+    else if (any(at(2:) <= at(:size(at) - 1))) then
+      problem = 'allowed ascending knots'
+    end if
+  end function knots_problem
+
+  !> The curve through `values` at the knots `at`, for which `knots_problem` has nothing to say.
+  pure type(curve_t) function curve_of(at, values) result(curve)
+    real(wp), intent(in) :: at(:), values(:)
+    integer :: i, first, last
+    curve%count = size(at)
+    curve%at(:size(at)) = at
+    curve%value(:size(at)) = values
+    do i = 1, size(at)
+      first = max(1, min(i - 2, size(at) - 4))
+      last = min(size(at), first + 4)
+      curve%slope(i) = slope_at(at(first:last), values(first:last), i - first + 1)
+    end do
+  end function curve_of
+
+  !> Derivative at knot `i` of the polynomial through all of them (Lagrange).
+  pure real(wp) function slope_at(at, values, i) result(slope)
+    real(wp), intent(in) :: at(:), values(:)
+    integer, intent(in) :: i
+    real(wp) :: weight
+    integer :: j, k
+    slope = 0
+    do j = 1, size(at)
+      if (j == i) cycle
+      ! The two terms of a difference, so that a constant has slope 0 to the bit.
+      weight = 1/(at(j) - at(i))
+      do k = 1, size(at)
+        if (k /= i .and. k /= j) weight = weight*(at(i) - at(k))/(at(j) - at(k))
+      end do
+      slope = slope + weight*(values(j) - values(i))
+    end do
+  end function slope_at
+
+  !> Value at `x`; constant beyond the knots.
+  pure real(wp) function value_at(curve, x) result(value)
+    type(curve_t), intent(in) :: curve
+    real(wp), intent(in) :: x
+    real(wp) :: width, s, r
+    integer :: i
+    value = 0
+    if (curve%count == 0) return
+    value = curve%value(1)
+    if (x <= curve%at(1)) return
+    value = curve%value(curve%count)
+    if (x >= curve%at(curve%count)) return
+    i = count(curve%at(:curve%count) <= x)
+    width = curve%at(i + 1) - curve%at(i)
+    s = (x - curve%at(i))/width
+    r = 1 - s
+    value = curve%value(i)*r*r*(1 + 2*s) + curve%value(i + 1)*s*s*(3 - 2*s) + &
+            width*s*r*(curve%slope(i)*r - curve%slope(i + 1)*s)
+  end function value_at
+
+end module curve_law

@@ -1,0 +1,93 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The parts of a machine of several bodies: rows of the catalogue. A law is named 'table:law' after the table
+!> [table.NAME] of a case file that it stands in.
+module part_rows
+  use kinds, only: wp
+  use law_row, only: law_length, law_row_t, none_above, none_below, parameter_row_t
+  implicit none
+  private
+
+  integer :: i
+
+  character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
+  character(len=law_length), parameter :: joints(5) = [character(len=law_length) :: 'spring:linear', 'friction:coulomb', &
+    'friction:elastic_coulomb', 'contact:newton', 'contact:kelvin_voigt']
+  character(len=law_length), parameter :: frictions(2) = joints(2:3)
+  character(len=law_length), parameter :: contacts(2) = joints(4:5)
+  character(len=law_length), parameter :: drives(2) = [character(len=law_length) :: 'drive:force', 'drive:motion']
+  character(len=1), parameter :: drive_unit(2) = ['N', 'm']
+
+  type(law_row_t), parameter, public :: part_laws(10) = [ &
+    law_row_t('body', 'structure', 'several bodies, [body.NAME] each, with springs, joints and drives between them', &
+              'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
+    law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
+    law_row_t('part', bodies(2), 'any other body', ''), &
+    law_row_t('part', joints(1), 'spring k and damper c between two bodies, or one and the ground', ''), &
+    law_row_t('part', joints(2), 'dry friction between two bodies, or of one on the ground or a belt', ''), &
+    law_row_t('part', joints(3), 'spring and slider in series (Jenkins)', 'Gastaldi, Berruti, Appl. Sci. (2018)'), &
+    law_row_t('part', joints(4), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
+              'Glocker, Set-Valued Force Laws (2001)'), &
+    law_row_t('part', joints(5), 'stops with spring K and damper D', ''), &
+    law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
+    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', '')]
+
+  !> The ends of a part are numbers of bodies, in the order of the file, 0 the ground; of a drive, one body.
+  type(parameter_row_t), parameter, public :: part_parameters(49) = [ &
+    parameter_row_t('body', 'structure', 'in_sequence', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
+                    'impacts of several contacts at once: 0 all together by one law, 1 one after the other'), &
+    (parameter_row_t('part', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                     'mass'), i=1, 2), &
+    (parameter_row_t('part', bodies(i), 'load', 'N', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                     'constant force, a weight for instance'), i=1, 2), &
+    parameter_row_t('part', bodies(2), 'x0', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'position at the start'), &
+    parameter_row_t('part', bodies(2), 'v0', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'velocity at the start'), &
+    (parameter_row_t('part', joints(i), 'first', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the first body between'), i=1, 5), &
+    (parameter_row_t('part', joints(i), 'second', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the second body between'), i=1, 5), &
+    parameter_row_t('part', joints(1), 'stiffness', 'N/m', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'k; may be negative'), &
+    parameter_row_t('part', joints(1), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'c'), &
+    parameter_row_t('part', joints(1), 'free_length', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'second minus first where the spring is without force'), &
+    (parameter_row_t('part', frictions(i), 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                     'friction while sliding'), i=1, 2), &
+    (parameter_row_t('part', frictions(i), 'static_force', 'N', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
+                     'friction at break-away; that of sliding if absent, never below it'), i=1, 2), &
+    (parameter_row_t('part', frictions(i), 'velocity', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                     'velocity of the surface of the first body or the ground: a belt'), i=1, 2), &
+    parameter_row_t('part', frictions(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'of the spring'), &
+    parameter_row_t('part', contacts(1), 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
+                    'e'), &
+    parameter_row_t('part', contacts(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'K'), &
+    parameter_row_t('part', contacts(2), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'D'), &
+    parameter_row_t('part', contacts(2), 'tension', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
+                    '1: the force may pull, 0: it ends where it would'), &
+    (parameter_row_t('part', contacts(i), 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &
+                     'largest value of second minus first'), i=1, 2), &
+    (parameter_row_t('part', contacts(i), 'lower', 'm', none_below, none_above, .false., .true., none_below, .false., &
+                     'smallest value of second minus first'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'body', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the body'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'frequency', 'rad/s', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'angular frequency; that of the first drive if absent'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'mean', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .false., &
+                     'mean'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'amplitude', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .false., &
+                     'amplitude'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'angle', 'rad', -1e4_wp, 1e4_wp, .false., .true., 0.0_wp, .false., &
+                     'added to the angle phi of the drive'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'cosine', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'a_1, a_2, ... of cos(n phi), besides the amplitude'), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'sine', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'b_1, b_2, ... of sin(n phi)'), i=1, 2)]
+
+end module part_rows

@@ -1,0 +1,370 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Builds a jointed structure from bodies, springs, joints and drives, by name. `finish` eliminates the bodies whose
+!> motion is given, merges parallel friction, and checks the whole. Messages of errors begin with the key.
+module assembly
+  use constants, only: two_pi
+  use contact_law, only: contact_kelvin_voigt
+  use eigen, only: symmetric_eigen, undamped_modes
+  use errors, only: error_t, fail
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, most_degrees, &
+    most_joints, name_length, wave_t
+  use kinds, only: wp
+  use status, only: exit_bad_case
+  implicit none
+  private
+
+  public :: add_body, add_link, add_joint, add_force, give_motion, move_surface, finish, row_between, index_of
+
+  character(len=*), parameter, public :: ground = 'ground'
+
+  !> A stop or a rebound that the forces end within this share of a period is none.
+  real(wp), parameter :: briefest = 1e-11_wp
+
+contains
+
+  !> A body of `mass` [kg] under a constant force `load` [N].
+  pure subroutine add_body(machine, name, mass, load)
+    type(jointed_t), intent(inout) :: machine
+    character(len=*), intent(in) :: name
+    real(wp), intent(in) :: mass, load
+    character(len=name_length), allocatable :: names(:)
+    integer :: n
+    if (.not. allocated(machine%names)) then
+      allocate (machine%names(0), machine%mass(0, 0), machine%damping(0, 0), machine%stiffness(0, 0), machine%load(0), &
+                machine%joints(0), machine%given_names(0), machine%given(0), machine%force(0, 0), machine%start(2, 0))
+    end if
+    n = machine%n + 1
+    names = [character(len=name_length) :: machine%names, name]
+    call move_alloc(names, machine%names)
+    call enlarge(machine%mass)
+    call enlarge(machine%damping)
+    call enlarge(machine%stiffness)
+    machine%load = [machine%load, load]
+    machine%mass(n, n) = mass
+    machine%n = n
+    machine%start = reshape([machine%start, 0.0_wp, 0.0_wp], [2, n])
+    call widen_force(machine, size(machine%force, 2))
+  contains
+    pure subroutine enlarge(matrix)
+      real(wp), allocatable, intent(inout) :: matrix(:, :)
+      real(wp), allocatable :: larger(:, :)
+      allocate (larger(n, n), source=0.0_wp)
+      larger(:n - 1, :n - 1) = matrix
+      call move_alloc(larger, matrix)
+    end subroutine enlarge
+  end subroutine add_body
+
+  !> Room for `harmonics` harmonics of the forces.
+  pure subroutine widen_force(machine, harmonics)
+    type(jointed_t), intent(inout) :: machine
+    integer, intent(in) :: harmonics
+    complex(wp), allocatable :: larger(:, :)
+    integer :: rows, columns
+    rows = size(machine%force, 1)
+    columns = size(machine%force, 2)
+    allocate (larger(machine%n, max(harmonics, columns)), source=(0.0_wp, 0.0_wp))
+    larger(:rows, :columns) = machine%force
+    call move_alloc(larger, machine%force)
+  end subroutine widen_force
+
+  !> Number of a body, 0 if there is none of that name.
+  pure integer function index_of(machine, name) result(at)
+    type(jointed_t), intent(in) :: machine
+    character(len=*), intent(in) :: name
+    do at = machine%n, 1, -1
+      if (machine%names(at) == name) return
+    end do
+    at = 0
+  end function index_of
+
+  !> The row of q_second - q_first, the ground being 0; `found` is false if there is no such body.
+  pure subroutine row_between(machine, first, second, row, found)
+    type(jointed_t), intent(in) :: machine
+    character(len=*), intent(in) :: first, second
+    real(wp), allocatable, intent(out) :: row(:)
+    logical, intent(out) :: found
+    integer :: a, b
+    allocate (row(machine%n), source=0.0_wp)
+    a = index_of(machine, first)
+    b = index_of(machine, second)
+    found = (a > 0 .or. first == ground) .and. (b > 0 .or. second == ground)
+    if (a > 0) row(a) = row(a) - 1
+    if (b > 0) row(b) = row(b) + 1
+  end subroutine row_between
+
+  !> A linear spring [N/m] and damper [N s/m] along a row; no force where the row is `length` [m].
+  pure subroutine add_link(machine, row, stiffness, damping, length)
+    type(jointed_t), intent(inout) :: machine
+    real(wp), intent(in) :: row(:), stiffness, damping, length
+    integer :: k
+    do k = 1, machine%n
+      machine%stiffness(:, k) = machine%stiffness(:, k) + stiffness*row*row(k)
+      machine%damping(:, k) = machine%damping(:, k) + damping*row*row(k)
+    end do
+    machine%load = machine%load + stiffness*length*row
+  end subroutine add_link
+
+  pure subroutine add_joint(machine, joint)
+    type(jointed_t), intent(inout) :: machine
+    type(joint_t), intent(in) :: joint
+    type(joint_t), allocatable :: joints(:)
+    integer :: i
+    allocate (joints(size(machine%joints) + 1))
+    do i = 1, size(machine%joints)
+      joints(i) = machine%joints(i)
+    end do
+    joints(size(joints)) = joint
+    call move_alloc(joints, machine%joints)
+  end subroutine add_joint
+
+  !> A force along a row: its mean, and Re harmonic(m) exp(i m Omega t) [N].
+  pure subroutine add_force(machine, row, mean, harmonic)
+    type(jointed_t), intent(inout) :: machine
+    real(wp), intent(in) :: row(:), mean
+    complex(wp), intent(in) :: harmonic(:)
+    integer :: m
+    machine%load = machine%load + mean*row
+    call widen_force(machine, size(harmonic))
+    do m = 1, size(harmonic)
+      machine%force(:, m) = machine%force(:, m) + harmonic(m)*row
+    end do
+  end subroutine add_force
+
+  !> Gives the motion of a body [m]; `finish` takes it out of the coordinates.
+  pure subroutine give_motion(machine, name, wave)
+    type(jointed_t), intent(inout) :: machine
+    character(len=*), intent(in) :: name
+    type(wave_t), intent(in) :: wave
+    type(wave_t), allocatable :: given(:)
+    character(len=name_length), allocatable :: names(:)
+    integer :: i
+    allocate (given(size(machine%given) + 1))
+    do i = 1, size(machine%given)
+      given(i) = machine%given(i)
+    end do
+    given(size(given)) = wave
+    call move_alloc(given, machine%given)
+    names = [character(len=name_length) :: machine%given_names, name]
+    call move_alloc(names, machine%given_names)
+  end subroutine give_motion
+
+  !> The surface that a joint rubs or meets moves: `wave` is its velocity [m/s].
+  pure subroutine move_surface(joint, frequency, wave)
+    type(joint_t), intent(inout) :: joint
+    real(wp), intent(in) :: frequency
+    type(wave_t), intent(in) :: wave
+    integer :: m
+    joint%offset%rate = joint%offset%rate - wave%mean
+    if (.not. allocated(wave%harmonic)) return
+    call widen_wave(joint%offset, size(wave%harmonic))
+    do m = 1, size(wave%harmonic)
+      joint%offset%harmonic(m) = joint%offset%harmonic(m) - wave%harmonic(m)/cmplx(0.0_wp, m*frequency, wp)
+    end do
+  end subroutine move_surface
+
+  pure subroutine widen_wave(wave, harmonics)
+    type(wave_t), intent(inout) :: wave
+    integer, intent(in) :: harmonics
+    complex(wp), allocatable :: larger(:)
+    if (.not. allocated(wave%harmonic)) allocate (wave%harmonic(0))
+    if (size(wave%harmonic) >= harmonics) return
+    allocate (larger(harmonics), source=(0.0_wp, 0.0_wp))
+    larger(:size(wave%harmonic)) = wave%harmonic
+    call move_alloc(larger, wave%harmonic)
+  end subroutine widen_wave
+
+  !> Completes a machine: what is given leaves the coordinates, friction on the same row becomes one joint, sizes of
+  !> rounding are set. Without a `frequency` the period is that of the slowest mode, one second without any.
+  pure subroutine finish(machine, error)
+    type(jointed_t), intent(inout) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: squares(:), shapes(:, :)
+    integer :: k
+    do k = 1, size(machine%given)
+      call take_out(machine, trim(machine%given_names(k)), machine%given(k), error)
+      if (allocated(error)) return
+    end do
+    call merge_friction(machine)
+    call check(machine, error)
+    if (allocated(error)) return
+    allocate (squares(machine%n), shapes(machine%n, machine%n))
+    call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
+    machine%mobility = matmul(shapes, transpose(shapes))
+    machine%driven = machine%frequency > 0
+    machine%period = 1
+    if (machine%driven) then
+      machine%period = two_pi/machine%frequency
+    else if (squares(machine%n) > 0) then
+      k = count(squares <= 1e-12_wp*squares(machine%n)) + 1
+      machine%period = two_pi/sqrt(squares(k))
+      machine%frequency = sqrt(squares(k))
+    else
+      machine%frequency = two_pi
+    end if
+    call set_sizes(machine)
+  end subroutine finish
+
+  !> Takes a body whose motion is given out of the coordinates: its springs and dampers become forces, its joints get an
+  !> offset.
+  pure subroutine take_out(machine, name, wave, error)
+    type(jointed_t), intent(inout) :: machine
+    character(len=*), intent(in) :: name
+    type(wave_t), intent(in) :: wave
+    type(error_t), allocatable, intent(out) :: error
+    complex(wp) :: iw
+    real(wp) :: w
+    integer, allocatable :: rest(:)
+    integer :: at, i, m, harmonics
+    at = index_of(machine, name)
+    if (at == 0) return
+    rest = pack([(i, i=1, machine%n)], [(i, i=1, machine%n)] /= at)
+    if (size(rest) == 0) then
+      call fail(error, exit_bad_case, 'body: found no body that is free to move, allowed at least one')
+      return
+    end if
+    harmonics = 0
+    if (allocated(wave%harmonic)) harmonics = size(wave%harmonic)
+    if (abs(wave%rate) > 0 .and. any(abs(machine%stiffness(rest, at)) > 0)) then
+      call fail(error, exit_bad_case, 'drive: found a body that moves away at a constant velocity with a spring on it, '// &
+                'allowed without springs')
+      return
+    end if
+    call widen_force(machine, harmonics)
+    machine%load(rest) = machine%load(rest) - machine%stiffness(rest, at)*wave%mean - machine%damping(rest, at)*wave%rate
+    do m = 1, harmonics
+      w = m*machine%frequency
+      iw = cmplx(0.0_wp, w, wp)
+      machine%force(rest, m) = machine%force(rest, m) &
+        - (machine%stiffness(rest, at) + iw*machine%damping(rest, at) - w**2*machine%mass(rest, at))*wave%harmonic(m)
+    end do
+    do i = 1, size(machine%joints)
+      associate (joint => machine%joints(i))
+        joint%offset%mean = joint%offset%mean + joint%row(at)*wave%mean
+        joint%offset%rate = joint%offset%rate + joint%row(at)*wave%rate
+        if (harmonics > 0 .and. abs(joint%row(at)) > 0) then
+          call widen_wave(joint%offset, harmonics)
+          joint%offset%harmonic(:harmonics) = joint%offset%harmonic(:harmonics) + joint%row(at)*wave%harmonic
+        end if
+        joint%row = joint%row(rest)
+      end associate
+    end do
+    if (machine%watched == at) machine%watched = 1
+    if (machine%watched > at) machine%watched = machine%watched - 1
+    machine%mass = machine%mass(rest, rest)
+    machine%damping = machine%damping(rest, rest)
+    machine%stiffness = machine%stiffness(rest, rest)
+    machine%load = machine%load(rest)
+    machine%force = machine%force(rest, :)
+    machine%names = machine%names(rest)
+    machine%start = machine%start(:, rest)
+    machine%n = size(rest)
+  end subroutine take_out
+
+  !> Rigid friction on the same row against the same surface becomes one joint: what each holds is not to be told apart.
+  pure subroutine merge_friction(machine)
+    type(jointed_t), intent(inout) :: machine
+    type(joint_t), allocatable :: joints(:)
+    logical :: kept(size(machine%joints))
+    integer :: i, k, count_kept
+    kept = .true.
+    do i = 1, size(machine%joints)
+      do k = 1, i - 1
+        if (.not. kept(i) .or. .not. kept(k) .or. .not. alike(machine%joints(i), machine%joints(k))) cycle
+        machine%joints(k)%friction%kinetic = machine%joints(k)%friction%kinetic + machine%joints(i)%friction%kinetic
+        machine%joints(k)%friction%break_away = machine%joints(k)%friction%break_away &
+          + machine%joints(i)%friction%break_away
+        kept(i) = .false.
+      end do
+    end do
+    if (all(kept)) return
+    allocate (joints(count(kept)))
+    count_kept = 0
+    do i = 1, size(machine%joints)
+      if (.not. kept(i)) cycle
+      count_kept = count_kept + 1
+      joints(count_kept) = machine%joints(i)
+    end do
+    call move_alloc(joints, machine%joints)
+  end subroutine merge_friction
+
+  pure logical function alike(a, b)
+    type(joint_t), intent(in) :: a, b
+    alike = a%kind == joint_friction .and. b%kind == joint_friction
+    if (alike) alike = same(sum(abs(a%row - b%row))) .or. same(sum(abs(a%row + b%row)))
+    if (alike) alike = same(a%offset%rate) .and. same(b%offset%rate) .and. .not. allocated(a%offset%harmonic) .and. &
+                       .not. allocated(b%offset%harmonic)
+    if (alike) alike = same(a%friction%excess) .and. same(b%friction%excess) .and. same(a%fading_speed) .and. &
+                       same(b%fading_speed)
+  end function alike
+
+  pure logical function same(difference)
+    real(wp), intent(in) :: difference
+    same = .not. abs(difference) > 0
+  end function same
+
+  !> What a machine must be. The mass matrix is positive definite, every joint has a row of its own kind.
+  pure subroutine check(machine, error)
+    type(jointed_t), intent(inout) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: values(machine%n), vectors(machine%n, machine%n)
+    integer :: i
+    if (machine%n > most_degrees) then
+      call fail(error, exit_bad_case, 'body: found too many bodies, allowed at most 16 coordinates')
+    else if (size(machine%joints) > most_joints) then
+      call fail(error, exit_bad_case, 'joints: found too many, allowed at most 12')
+    end if
+    if (allocated(error)) return
+    call symmetric_eigen(machine%mass, values, vectors)
+    if (.not. values(1) > 1e-14_wp*values(machine%n)) then
+      call fail(error, exit_bad_case, 'body: found a singular mass matrix, allowed a positive mass for every coordinate')
+      return
+    end if
+    do i = 1, size(machine%joints)
+      associate (joint => machine%joints(i))
+        if (.not. any(abs(joint%row) > 0)) then
+          call fail(error, exit_bad_case, trim(joint%name)//'.between: found two ends that are the same, or whose motion is '// &
+                    'given, allowed at least one that is free to move')
+          return
+        end if
+        ! What is viscous belongs to the structure.
+        if (joint%kind == joint_friction .and. joint%friction%damping > 0 .and. .not. abs(joint%offset%rate) > 0 .and. &
+            .not. allocated(joint%offset%harmonic)) then
+          call add_link(machine, joint%row, 0.0_wp, joint%friction%damping, 0.0_wp)
+          joint%friction%damping = 0
+        end if
+        if (joint%kind == joint_spring) machine%linear = .false.
+        if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
+          if (joint%friction%excess > 0 .or. joint%fading_speed > 0 .or. joint%friction%damping > 0) machine%linear = .false.
+        end if
+        if (joint%kind == joint_soft .and. joint%contact%stiffness > 0) then
+          if (joint%contact%kind /= contact_kelvin_voigt) machine%linear = .false.
+        end if
+      end associate
+    end do
+  end subroutine check
+
+  !> Sizes of forces, speeds and lengths for rounding.
+  pure subroutine set_sizes(machine)
+    type(jointed_t), intent(inout) :: machine
+    real(wp) :: accelerations, largest
+    integer :: i
+    largest = sum(abs(machine%load)) + sum(abs(machine%force))
+    do i = 1, size(machine%joints)
+      associate (joint => machine%joints(i))
+        if (joint%kind == joint_friction .or. joint%kind == joint_elastic) largest = largest + joint%friction%break_away
+        if (joint%kind == joint_contact .or. joint%kind == joint_soft) then
+          if (joint%upper < huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%upper))
+          if (joint%lower > -huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%lower))
+        end if
+      end associate
+    end do
+    machine%force_scale = largest
+    largest = largest + maxval(abs(machine%stiffness))*machine%length_scale
+    accelerations = largest*maxval(abs(machine%mobility))
+    machine%length_scale = max(machine%length_scale, accelerations/machine%frequency**2)
+    machine%negligible_speed = briefest*machine%period*accelerations
+  end subroutine set_sizes
+
+end module assembly

@@ -1,0 +1,117 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A jointed structure: a linear structure of n coordinates,
+!>   M q'' + C q' + K q = load + Re sum_m force_m exp(i m Omega t) + sum over joints of w r,
+!> whose joints act along rows w: the joint coordinate is s = w'q + offset(t), the force of the joint is r.
+!> Friction slides at u = s'; a contact bounds s from above, below or both.
+module jointed
+  use contact_law, only: contact_t
+  use friction_law, only: friction_t
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: wave_value, offset_of
+
+  integer, parameter, public :: most_degrees = 16, most_joints = 12
+
+  !> Kinds of joints: dry friction, spring and slider in series, rigid contact, contact with a force over penetration, and
+  !> a spring whose force is not linear.
+  integer, parameter, public :: joint_friction = 1, joint_elastic = 2, joint_contact = 3, joint_soft = 4, joint_spring = 5
+  character(len=*), parameter, public :: joint_names(5) = [character(len=16) :: 'friction', 'elastic friction', &
+    'contact', 'soft contact', 'spring']
+
+  !> How the speeds after an impact of several contacts at once are found.
+  integer, parameter, public :: together_newton = 0, together_sequence = 1
+
+  integer, parameter, public :: name_length = 32
+
+  !> mean + rate t + Re sum over m of harmonic(m) exp(i m Omega t), t being time since the section.
+  type, public :: wave_t
+    real(wp) :: mean = 0, rate = 0
+    complex(wp), allocatable :: harmonic(:)
+  end type wave_t
+
+  type, public :: joint_t
+    character(len=name_length) :: name = ''
+    integer :: kind = joint_friction
+    real(wp), allocatable :: row(:)
+    !> The part of the joint coordinate that is given: a belt, a moving stop, a body whose motion is given.
+    type(wave_t) :: offset
+    !> Friction, of the slider too.
+    type(friction_t) :: friction
+    !> Friction falls with the sliding speed: kinetic + excess/(1 + |u|/speed); 0 = it does not.
+    real(wp) :: fading_speed = 0
+    !> Contact, stops excepted.
+    type(contact_t) :: contact
+    !> Stops of a contact [m], huge means none.
+    real(wp) :: upper = huge(1.0_wp), lower = -huge(1.0_wp)
+    !> Spring of elastic friction [N/m]; spring that is not linear: -c1 s - c2 s^2 - c3 s^3 - moment sin s.
+    real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0
+  end type joint_t
+
+  type, public :: jointed_t
+    !> Number of coordinates.
+    integer :: n = 0
+    real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :), load(:)
+    !> Amplitudes of the forces [N], one column per harmonic.
+    complex(wp), allocatable :: force(:, :)
+    type(joint_t), allocatable :: joints(:)
+    !> Names of the coordinates.
+    character(len=name_length), allocatable :: names(:)
+    !> Bodies whose motion is given, and how they move.
+    character(len=name_length), allocatable :: given_names(:)
+    type(wave_t), allocatable :: given(:)
+    !> Angular frequency of the drive and period of the section [rad/s, s].
+    real(wp) :: frequency = 0, period = 0
+    !> Something depends on the time.
+    logical :: driven = .false.
+    integer :: together = together_newton
+    !> The coordinate that extremes refer to.
+    integer :: watched = 1
+    !> Position and velocity at the start.
+    real(wp), allocatable :: start(:, :)
+    !> Inverse of the mass matrix.
+    real(wp), allocatable :: mobility(:, :)
+    !> Sizes for rounding: of forces [N], of speeds that are none [m/s], of lengths [m].
+    real(wp) :: force_scale = 0, negligible_speed = 0, length_scale = 0
+    !> The motion between events is linear.
+    logical :: linear = .true.
+  end type jointed_t
+
+contains
+
+  !> Value and first two derivatives of a wave at `time` [s], turning(m) = exp(i m Omega t).
+  pure subroutine wave_value(wave, frequency, time, turning, value, rate, curvature)
+    type(wave_t), intent(in) :: wave
+    real(wp), intent(in) :: frequency, time
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(out) :: value, rate
+    real(wp), intent(out), optional :: curvature
+    complex(wp) :: now
+    real(wp) :: w
+    integer :: m
+    value = wave%mean + wave%rate*time
+    rate = wave%rate
+    if (present(curvature)) curvature = 0
+    if (.not. allocated(wave%harmonic)) return
+    do m = 1, size(wave%harmonic)
+      now = wave%harmonic(m)*turning(m)
+      w = m*frequency
+      value = value + real(now)
+      rate = rate - w*aimag(now)
+      if (present(curvature)) curvature = curvature - w**2*real(now)
+    end do
+  end subroutine wave_value
+
+  !> Harmonic m of the offset of a joint, 0 if it has none.
+  pure complex(wp) function offset_of(joint, m) result(amplitude)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: m
+    amplitude = 0
+    if (.not. allocated(joint%offset%harmonic)) return
+    if (m <= size(joint%offset%harmonic)) amplitude = joint%offset%harmonic(m)
+  end function offset_of
+
+end module jointed

@@ -1,0 +1,181 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> State of a jointed structure and of each of its joints, and the forces of the joints that the state tells.
+module jointed_state
+  use contact_law, only: contact_at_speed, contact_force, contact_t
+  use elementary, only: sine_cosine
+  use friction_law, only: sliding_friction
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+    most_degrees, most_joints, wave_value
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: turning_at, joint_motion, joint_force, free_force, key_of, is_held, acts_as_spring
+
+  !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
+  !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2).
+  type, public :: jointed_state_t
+    real(wp) :: q(most_degrees) = 0, v(most_degrees) = 0
+    !> Since the section [s].
+    real(wp) :: time = 0
+    integer :: phase(most_joints) = 0
+    !> Place of the slider of elastic friction [m]; speed at which a soft contact began [m/s].
+    real(wp) :: slider(most_joints) = 0, touch_speed(most_joints) = 0
+    !> The joint has just changed its phase: the guard of its new phase starts at zero. +1, -1: the stop it has left.
+    integer :: left(most_joints) = 0
+  end type jointed_state_t
+
+contains
+
+  !> exp(i m Omega t) for m = 1, 2, ... at `time` [s].
+  pure function turning_at(frequency, time, harmonics) result(turning)
+    real(wp), intent(in) :: frequency, time
+    integer, intent(in) :: harmonics
+    complex(wp) :: turning(harmonics)
+    real(wp) :: sine, cosine
+    integer :: m
+    do m = 1, harmonics
+      call sine_cosine(m*frequency*time, sine, cosine)
+      turning(m) = cmplx(cosine, sine, wp)
+    end do
+  end function turning_at
+
+  !> Coordinate, speed and the given part of the acceleration of a joint.
+  pure subroutine joint_motion(machine, j, q, v, time, turning, s, u, given)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j
+    real(wp), intent(in) :: q(:), v(:), time
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(out) :: s, u
+    real(wp), intent(out), optional :: given
+    real(wp) :: value, rate
+    associate (joint => machine%joints(j))
+      call wave_value(joint%offset, machine%frequency, time, turning, value, rate, given)
+      s = sum(joint%row*q(:machine%n)) + value
+      u = sum(joint%row*v(:machine%n)) + rate
+    end associate
+  end subroutine joint_motion
+
+  !> Whether a joint is a constraint: friction that sticks, a contact that is closed.
+  pure logical function is_held(joint, phase)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    is_held = (joint%kind == joint_friction .and. phase == 0) .or. (joint%kind == joint_contact .and. phase /= 0)
+  end function is_held
+
+  !> Whether a joint is a linear spring: elastic friction that sticks, a pressed contact with a linear law.
+  pure logical function acts_as_spring(joint, phase)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    acts_as_spring = (joint%kind == joint_elastic .and. phase == 0) .or. (joint%kind == joint_soft .and. abs(phase) == 1)
+  end function acts_as_spring
+
+  !> One bit for each joint that is a constraint or a spring.
+  pure integer function key_of(machine, phase)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: phase(:)
+    integer :: j
+    key_of = 0
+    do j = 1, size(machine%joints)
+      if (is_held(machine%joints(j), phase(j)) .or. acts_as_spring(machine%joints(j), phase(j))) key_of = ibset(key_of, j - 1)
+    end do
+  end function key_of
+
+  !> Force of a joint along its row [N], that of a constraint excepted, and its derivatives with respect to s and u.
+  pure subroutine joint_force(joint, phase, slider, touch_speed, s, u, force, by_place, by_speed)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    real(wp), intent(in) :: slider, touch_speed, s, u
+    real(wp), intent(out) :: force
+    real(wp), intent(out), optional :: by_place, by_speed
+    type(contact_t) :: law
+    real(wp) :: direction, p, rate, step, sine, cosine
+    force = 0
+    if (present(by_place)) by_place = 0
+    if (present(by_speed)) by_speed = 0
+    select case (joint%kind)
+    case (joint_friction)
+      if (phase == 0) return
+      direction = phase
+      force = sliding(joint, u, direction)
+      if (present(by_speed)) by_speed = slope_of_sliding(joint, u, direction)
+    case (joint_elastic)
+      if (phase == 0) then
+        force = -joint%stiffness*(s - slider)
+        if (present(by_place)) by_place = -joint%stiffness
+      else
+        direction = phase
+        force = sliding(joint, u, direction)
+        if (present(by_speed)) by_speed = slope_of_sliding(joint, u, direction)
+      end if
+    case (joint_soft)
+      if (abs(phase) /= 1) return
+      direction = phase
+      p = merge(s - joint%upper, joint%lower - s, phase > 0)
+      rate = direction*u
+      law = contact_at_speed(joint%contact, touch_speed)
+      force = -direction*contact_force(law, p, rate)
+      step = 1e-6_wp*max(abs(p), tiny(p))
+      if (present(by_place)) by_place = -(contact_force(law, p + step, rate) - contact_force(law, p - step, rate))/(2*step)
+      if (present(by_speed)) by_speed = -(contact_force(law, p, rate + 1) - contact_force(law, p, rate))
+    case (joint_spring)
+      call sine_cosine(s, sine, cosine)
+      force = -s*(joint%stiffness + s*(joint%quadratic + s*joint%cubic)) - joint%moment*sine
+      if (present(by_place)) by_place = -joint%stiffness - s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
+    end select
+  end subroutine joint_force
+
+  !> Force of sliding in a direction, continued smoothly to the other one.
+  pure real(wp) function sliding(joint, u, direction)
+    type(joint_t), intent(in) :: joint
+    real(wp), intent(in) :: u, direction
+    sliding = sliding_friction(joint%friction, u, direction)
+    if (joint%fading_speed > 0) then
+      ! Of the fading law, `excess` is outside of the friction law's own.
+      sliding = sliding - direction*(joint%friction%break_away - joint%friction%kinetic)/ &
+                (1 + max(direction*u, -joint%fading_speed/2)/joint%fading_speed)
+    end if
+  end function sliding
+
+  pure real(wp) function slope_of_sliding(joint, u, direction) result(slope)
+    type(joint_t), intent(in) :: joint
+    real(wp), intent(in) :: u, direction
+    real(wp) :: step
+    slope = -joint%friction%damping
+    if (.not. (joint%friction%excess > 0 .or. joint%fading_speed > 0)) return
+    step = 1e-6_wp*(abs(u) + merge(joint%fading_speed, joint%friction%stribeck_velocity, joint%fading_speed > 0))
+    slope = (sliding(joint, u + step, direction) - sliding(joint, u - step, direction))/(2*step)
+  end function slope_of_sliding
+
+  !> All forces on the coordinates but those of constraints [N]; with `rate` their rates of change for the accelerations
+  !> `a` [N/s].
+  pure subroutine free_force(machine, state, turning, force, a, rate)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(out) :: force(:)
+    real(wp), intent(in), optional :: a(:)
+    real(wp), intent(out), optional :: rate(:)
+    real(wp) :: s, u, given, r, by_place, by_speed
+    integer :: j, m, n
+    n = machine%n
+    force = machine%load - matmul(machine%damping, state%v(:n)) - matmul(machine%stiffness, state%q(:n))
+    if (present(rate)) rate = -matmul(machine%damping, a) - matmul(machine%stiffness, state%v(:n))
+    do m = 1, size(machine%force, 2)
+      force = force + real(machine%force(:, m)*turning(m))
+      if (present(rate)) rate = rate - m*machine%frequency*aimag(machine%force(:, m)*turning(m))
+    end do
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
+        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r, by_place, by_speed)
+        force = force + r*joint%row
+        if (present(rate)) rate = rate + (by_place*u + by_speed*(sum(joint%row*a) + given))*joint%row
+      end associate
+    end do
+  end subroutine free_force
+
+end module jointed_state

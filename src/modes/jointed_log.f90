@@ -1,0 +1,212 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What is written down of the motion of a jointed structure when asked: samples, events, and where the energy went.
+module jointed_log
+  use eigen, only: modulus
+  use flight_path, only: path_at, path_t
+  use jointed, only: joint_elastic, joint_soft, jointed_t, most_joints, wave_value
+  use jointed_state, only: acts_as_spring, free_force, is_held, joint_force, joint_motion, jointed_state_t, turning_at
+  use kinds, only: wp
+  use mode_flow, only: harmonics_of, mode_flow_t
+  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, record_event, record_sample, &
+    sample_due, sample_time, state_t
+  implicit none
+  private
+
+  public :: energy_of_jointed, watched_state, log_flight, log_event, log_sample, book_change
+
+  !> Gauss-Legendre nodes on (0, 1) and weights.
+  real(wp), parameter :: node(4) = [0.069431844202973712388026755553595_wp, 0.33000947820757186759866712044838_wp, &
+    0.66999052179242813240133287955162_wp, 0.93056815579702628761197324444640_wp]
+  real(wp), parameter :: weight(4) = [0.17392742256872692868653197461100_wp, 0.32607257743127307131346802538900_wp, &
+    0.32607257743127307131346802538900_wp, 0.17392742256872692868653197461100_wp]
+
+contains
+
+  !> Energy of the bodies, the springs and the springs of the joints [J]; a constant force has that of its weight.
+  pure real(wp) function energy_of_jointed(machine, state) result(energy)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    complex(wp) :: turning(harmonics_of(machine))
+    real(wp) :: s, u, zero
+    integer :: j
+    turning = turning_at(machine%frequency, state%time, size(turning))
+    associate (q => state%q(:machine%n), v => state%v(:machine%n))
+      energy = 0.5_wp*sum(v*matmul(machine%mass, v)) + 0.5_wp*sum(q*matmul(machine%stiffness, q)) - sum(machine%load*q)
+    end associate
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+        if (joint%kind == joint_elastic) then
+          ! While it slides the spring is stretched by the friction.
+          zero = state%slider(j)
+          if (state%phase(j) /= 0) zero = s - state%phase(j)*joint%friction%kinetic/joint%stiffness
+          energy = energy + 0.5_wp*joint%stiffness*(s - zero)**2
+        else if (joint%kind == joint_soft .and. acts_as_spring(joint, state%phase(j))) then
+          energy = energy + 0.5_wp*joint%contact%stiffness*(s - merge(joint%upper, joint%lower, state%phase(j) > 0))**2
+        end if
+      end associate
+    end do
+  end function energy_of_jointed
+
+  !> The watched coordinate as that of one body.
+  pure type(state_t) function watched_state(machine, state) result(body)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    integer :: j
+    body%x = state%q(machine%watched)
+    body%v = state%v(machine%watched)
+    body%time = state%time
+    body%mode = merge(mode_slip_plus, mode_slip_minus, body%v >= 0)
+    do j = 1, size(machine%joints)
+      if (is_held(machine%joints(j), state%phase(j))) body%mode = mode_stick
+    end do
+  end function watched_state
+
+  !> Samples and energy of a flight from the state `start`, `duration` [s] long.
+  pure subroutine log_flight(machine, flow, path, start, duration, log)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(jointed_state_t), intent(in) :: start
+    real(wp), intent(in) :: duration
+    type(log_t), intent(inout) :: log
+    type(jointed_state_t) :: state
+    real(wp) :: before, next
+    state = start
+    before = 0
+    do while (sample_due(log, path%start + duration))
+      next = max(before, sample_time(log) - path%start)
+      call book_flight(machine, flow, path, start, before, next, log)
+      call path_at(machine, flow, path, next, state%q, state%v)
+      state%time = path%start + next
+      call log_sample(machine, state, log)
+      before = next
+    end do
+    call book_flight(machine, flow, path, start, before, duration, log)
+  end subroutine log_flight
+
+  !> Writes a state down as a sample.
+  pure subroutine log_sample(machine, state, log)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    type(log_t), intent(inout) :: log
+    log%book%at_end = energy_of_jointed(machine, state)
+    call record_sample(log, watched_state(machine, state), book=log%book)
+    call put_column(log%sample_coordinates, log%samples, [state%q(:machine%n), state%v(:machine%n)])
+  end subroutine log_sample
+
+  !> Adds up the powers from `first` to `last` [s after the start of the path].
+  pure subroutine book_flight(machine, flow, path, start, first, last, log)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(jointed_state_t), intent(in) :: start
+    real(wp), intent(in) :: first, last
+    type(log_t), intent(inout) :: log
+    real(wp) :: length, fastest, friction, damping, contact, work
+    type(jointed_state_t) :: state
+    integer :: panels, i, k
+    if (.not. last > first) return
+    fastest = machine%frequency*max(1, size(path%turning))
+    if (flow%modal) then
+      fastest = max(fastest, maxval([0.0_wp, modulus(flow%exponent)]))
+    else
+      fastest = max(fastest, flow%rate)
+    end if
+    panels = max(1, ceiling(3*fastest*(last - first)))
+    length = (last - first)/panels
+    state = start
+    do i = 1, panels
+      do k = 1, size(node)
+        associate (t => first + (i - 1 + node(k))*length)
+          call path_at(machine, flow, path, t, state%q, state%v)
+          state%time = path%start + t
+        end associate
+        call powers(machine, flow, state, friction, damping, contact, work)
+        log%book%friction = log%book%friction + weight(k)*length*friction
+        log%book%damping = log%book%damping + weight(k)*length*damping
+        log%book%contact = log%book%contact + weight(k)*length*contact
+        log%book%work = log%book%work + weight(k)*length*work
+      end do
+    end do
+  end subroutine book_flight
+
+  !> Powers lost to friction, dampers and contacts, and put in by forces and moving surfaces [W].
+  pure subroutine powers(machine, flow, state, friction, damping, contact, work)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(out) :: friction, damping, contact, work
+    complex(wp) :: turning(harmonics_of(machine))
+    real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate
+    integer :: i, j, m
+    turning = turning_at(machine%frequency, state%time, size(turning))
+    associate (v => state%v(:machine%n))
+      damping = sum(v*matmul(machine%damping, v))
+      work = 0
+      do m = 1, size(machine%force, 2)
+        work = work + sum(v*real(machine%force(:, m)*turning(m)))
+      end do
+    end associate
+    friction = 0
+    contact = 0
+    call free_force(machine, state, turning, force)
+    do i = 1, size(flow%held)
+      call wave_value(machine%joints(flow%held(i))%offset, machine%frequency, state%time, turning, value, rate, curvature(i))
+    end do
+    associate (h => size(flow%held))
+      held(:h) = -matmul(flow%reaction, force) - matmul(flow%hold, curvature(:h))
+    end associate
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        call wave_value(joint%offset, machine%frequency, state%time, turning, value, rate)
+        if (is_held(joint, state%phase(j))) then
+          i = findloc(flow%held, j, 1)
+          if (i > 0) work = work - held(i)*rate
+          cycle
+        end if
+        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r)
+        work = work - r*rate
+        if (joint%kind == joint_soft) then
+          if (abs(state%phase(j)) == 1) contact = contact + joint%contact%damping*u**2
+        else if (state%phase(j) /= 0) then
+          friction = friction - r*u
+        end if
+      end associate
+    end do
+  end subroutine powers
+
+  !> What a transition took from the energy: of contacts, but for sliders that let go.
+  pure subroutine book_change(machine, before, after, log)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before, after
+    type(log_t), intent(inout) :: log
+    real(wp) :: lost
+    lost = energy_of_jointed(machine, before) - energy_of_jointed(machine, after)
+    if (any(machine%joints%kind == joint_elastic .and. before%phase(:size(machine%joints)) /= after%phase(:size(machine%joints)))) &
+      then
+      log%book%friction = log%book%friction + lost
+    else
+      log%book%contact = log%book%contact + lost
+    end if
+  end subroutine book_change
+
+  !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own.
+  pure subroutine log_event(machine, kind, j, before, after, log)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: kind, j
+    type(jointed_state_t), intent(in) :: before, after
+    type(log_t), intent(inout) :: log
+    complex(wp) :: turning(harmonics_of(machine))
+    real(wp) :: s, u, u_after
+    turning = turning_at(machine%frequency, before%time, size(turning))
+    call joint_motion(machine, j, after%q, after%v, before%time, turning, s, u_after)
+    call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u)
+    call record_event(log, kind, watched_state(machine, before), after%v(machine%watched))
+    call put_column(log%event_joint, log%events, [real(j, wp), s, u, u_after])
+  end subroutine log_event
+
+end module jointed_log

@@ -1,0 +1,126 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The complementarity problem of constraints with limited forces: y = G r + c with lower <= r <= upper, y >= 0 where r is
+!> at its lower limit, y <= 0 at the upper, y = 0 between. G is symmetric and positive semidefinite: y is unique.
+!> Principal pivoting by the least index, which ends (Murty 1974; with limits: Judice, Pires 1994).
+module boxed_forces
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: solve_boxed
+
+  !> Constraints that depend on each other to this relative amount share their force evenly.
+  real(wp), parameter :: dependent = 1e-10_wp
+
+contains
+
+  !> `side` is -1, +1 at a limit, 0 between; what it holds at the start is tried first. `tolerance` is how much of y, and of
+  !> r as y by its own mobility, counts as nothing; what is `fixed` has no force and keeps its
+  !> side. `ok` is false if the pivoting does not end.
+  pure subroutine solve_boxed(g, c, lower, upper, fixed, tolerance, side, r, y, ok)
+    real(wp), intent(in) :: g(:, :), c(:), lower(:), upper(:), tolerance
+    logical, intent(in) :: fixed(:)
+    integer, intent(inout) :: side(:)
+    real(wp), intent(out) :: r(:), y(:)
+    logical, intent(out) :: ok
+    real(wp) :: h(size(c), size(c))
+    integer :: i, k, n, tries
+    logical :: shared
+    n = size(c)
+    h = g
+    shared = is_singular(g)
+    if (shared) then
+      do i = 1, n
+        h(i, i) = h(i, i)*(1 + sqrt(epsilon(1.0_wp)))
+      end do
+    end if
+    ok = .false.
+    do i = 1, n
+      if (side(i) < 0 .and. lower(i) <= -huge(1.0_wp)) side(i) = 0
+      if (side(i) > 0 .and. upper(i) >= huge(1.0_wp)) side(i) = 0
+    end do
+    do tries = 1, 50*(n + 1)**2
+      call forces_for(h, c, lower, upper, fixed, side, r)
+      y = matmul(h, r) + c
+      k = 0
+      do i = 1, n
+        if (fixed(i)) cycle
+        if (side(i) == 0) then
+          if (r(i)*g(i, i) < lower(i)*g(i, i) - tolerance) k = -i
+          if (r(i)*g(i, i) > upper(i)*g(i, i) + tolerance) k = i
+          if (k /= 0) then
+            side(i) = sign(1, k)
+            exit
+          end if
+        else if (side(i)*y(i) > merge(max(tolerance, sqrt(epsilon(1.0_wp))*abs(r(i))*g(i, i)*2), tolerance, shared)) then
+          k = i
+          side(i) = 0
+          exit
+        end if
+      end do
+      if (k == 0) then
+        ok = .true.
+        where (side == 0 .and. .not. fixed) y = 0
+        return
+      end if
+    end do
+  end subroutine solve_boxed
+
+  !> Whether a positive semidefinite matrix has dependent rows.
+  pure logical function is_singular(g)
+    real(wp), intent(in) :: g(:, :)
+    real(wp) :: m(size(g, 1), size(g, 1))
+    integer :: i, k
+    m = g
+    is_singular = .false.
+    do k = 1, size(g, 1)
+      if (m(k, k) <= dependent*g(k, k)) then
+        is_singular = .true.
+        return
+      end if
+      do i = k + 1, size(g, 1)
+        m(k + 1:, i) = m(k + 1:, i) - m(k + 1:, k)*(m(k, i)/m(k, k))
+      end do
+    end do
+  end function is_singular
+
+  !> Forces with those at a limit as given.
+  pure subroutine forces_for(h, c, lower, upper, fixed, side, r)
+    real(wp), intent(in) :: h(:, :), c(:), lower(:), upper(:)
+    logical, intent(in) :: fixed(:)
+    integer, intent(in) :: side(:)
+    real(wp), intent(out) :: r(:)
+    real(wp) :: m(size(c), size(c)), b(size(c)), factor
+    integer :: list(size(c)), i, k, count_free
+    r = 0
+    count_free = 0
+    do i = 1, size(c)
+      if (fixed(i)) cycle
+      if (side(i) < 0) r(i) = lower(i)
+      if (side(i) > 0) r(i) = upper(i)
+      if (side(i) == 0) then
+        count_free = count_free + 1
+        list(count_free) = i
+      end if
+    end do
+    if (count_free == 0) return
+    associate (free => list(:count_free))
+      m(:count_free, :count_free) = h(free, free)
+      b(:count_free) = -c(free) - matmul(h(free, :), r)
+      do k = 1, count_free
+        do i = k + 1, count_free
+          factor = m(i, k)/m(k, k)
+          m(i, k:count_free) = m(i, k:count_free) - factor*m(k, k:count_free)
+          b(i) = b(i) - factor*b(k)
+        end do
+      end do
+      do k = count_free, 1, -1
+        b(k) = (b(k) - sum(m(k, k + 1:count_free)*b(k + 1:count_free)))/m(k, k)
+      end do
+      r(free) = b(:count_free)
+    end associate
+  end subroutine forces_for
+
+end module boxed_forces

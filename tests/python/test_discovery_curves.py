@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Effects that are functions: a restitution of another shape than the built-in one is found as a table."""
+
+import numpy as np
+import pytest
+from separatrix.discovery import Options, discover
+from separatrix.discovery.fitting.curves import closed_forms, speeds_at
+from separatrix.discovery.measured.records import make_record
+from separatrix.errors import SeparatrixError
+from separatrix.library import Model
+
+CASE = """[body]
+mass = 1.0
+
+[restoring]
+law = "linear"
+stiffness = 88.8
+free_length = 0.4
+
+[friction]
+law = "coulomb"
+kinetic_coefficient = 0.05
+
+[contact]
+{contact}
+upper = 0.71
+
+[drive]
+law = "fourier"
+ratio = 0.85
+mean = 0.31055
+cosine = [0.09495, 0.01, -0.02003]
+sine = [0.0, 0.02849, -0.02686]
+angle = 3.335
+"""
+NEWTON = 'law = "newton"\nrestitution = 0.62'
+# 0.5 v^(-1/4), from another law of the simulator
+POWER = 'law = "newton_power"\nrestitution = 0.8891397\nyield_speed = 0.1\nfalloff = 0.25'
+SIGMA = 2e-4
+
+pytestmark = pytest.mark.usefixtures("library")
+
+
+def curve(model: Model, speeds, changes) -> Model:
+    values = {f"speed[{i}]": one for i, one in enumerate(speeds, start=1)}
+    values |= {f"change[{i}]": one for i, one in enumerate(changes, start=1)}
+    return model.with_effect("restitution_curve", values)
+
+
+def bounces(model: Model, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds before and after first impacts of many speeds."""
+    start = np.column_stack([np.full(count, 0.70), np.linspace(0.1, 4, count), np.zeros(count)])
+    times = np.tile(np.linspace(0, 0.2, 5), count)
+    flown = model.segments([], np.zeros(0), start, 5 * np.arange(count + 1), times, derivatives=False)
+    first = np.unique(flown.impact.segment, return_index=True)[1]
+    return flown.impact.speed_before[first], flown.impact.speed_after[first]
+
+
+def test_a_curve_restores_what_its_table_says_and_smoothly():
+    base = Model.from_text(CASE.format(contact=NEWTON))
+    speeds = np.array([0.3, 0.7, 1.5, 2.5, 3.5])
+    wanted = 0.2 * np.exp(-speeds) - 0.1
+    before, after = bounces(curve(base, speeds, wanted))
+    inside = (before > 0.3) & (before < 3.5)
+    # an exponential is followed to the fourth power of the distance of the knots
+    assert np.allclose((after / before)[inside], 0.62 + 0.2 * np.exp(-before[inside]) - 0.1, atol=4e-3)
+    slow = before < 0.3
+    assert np.allclose((after / before)[slow], 0.62 + wanted[0], atol=1e-12)
+
+
+def test_a_line_and_a_parabola_are_exact_and_nothing_changes_nothing():
+    base = Model.from_text(CASE.format(contact=NEWTON))
+    speeds = np.linspace(0.01, 5, 6)
+    before, after = bounces(curve(base, speeds, -0.03 * speeds + 0.002 * speeds**2))
+    assert np.allclose(after / before, 0.62 - 0.03 * before + 0.002 * before**2, atol=1e-12)
+    slope = base.with_effect("restitution_slope", {"slope": 0.03})
+    assert np.allclose(bounces(curve(base, speeds, -0.03 * speeds))[1], bounces(slope)[1], atol=1e-9)
+    assert np.array_equal(bounces(curve(base, speeds, 0 * speeds))[1], bounces(base)[1])
+
+
+@pytest.mark.parametrize(
+    ("speeds", "changes"),
+    [((1.0,), (0.1,)), ((1.0, 0.5), (0.0, 0.1)), ((0.5, 1.0), (0.1,)), ((1.0, 2.0), (0.0, 2.0))],
+)
+def test_a_table_that_is_none_is_refused(speeds, changes):
+    with pytest.raises(SeparatrixError, match=r"effect\.restitution_curve"):
+        curve(Model.from_text(CASE.format(contact=NEWTON)), speeds, changes)
+
+
+def test_knots_follow_the_impacts_and_need_enough_of_them():
+    speeds = np.sort(np.random.default_rng(1).uniform(0.2, 3, 60))
+    knots = speeds_at(speeds, 5)
+    assert knots[0] == speeds[0]
+    assert np.all(np.diff(knots) > 0.02)
+    assert speeds_at(speeds[:14], 5) is None
+    assert speeds_at(np.full(60, 1.0), 5) is None
+
+
+def test_closed_forms_are_told_apart_by_the_values():
+    at = np.linspace(0.3, 4, 8)
+    covariance = np.diag(np.full(8, 1e-8))
+    power = closed_forms(at, 0.5 * at**-0.25, covariance)
+    assert [name for name, one in power.items() if one["fits"]] == ["power"]
+    assert power["power"]["parameters"] == pytest.approx([0.5, 0.25], rel=1e-3)
+    line = closed_forms(at, 0.6 - 0.03 * at, covariance)
+    assert line["linear"]["fits"]
+    assert not line["power"]["fits"]
+    assert not any(one["fits"] for one in closed_forms(at, 0.5 + 0.1 * (at > 2), covariance).values())
+
+
+def test_a_restitution_that_is_a_power_of_the_speed_is_named_as_a_function():
+    true = Model.from_text(CASE.format(contact=POWER))
+    records = []
+    for seed, ratio in enumerate((0.82, 0.88, 0.85)):
+        t = np.arange(2400) / 160
+        start = np.array([(0.4, 0.5, 0.4)])
+        motion = true.segments(["drive.ratio"], np.array([ratio]), start, [0, t.size], t, derivatives=False)
+        x = motion.x + SIGMA * np.random.default_rng(seed).standard_normal(t.size)
+        header = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "sensor_noise_sigma_m": SIGMA}
+        records.append(make_record(f"r{seed}", {"t": t, "x": x}, header))
+    options = Options(quick=True, most_effects=1, candidates=("restitution_slope", "quadratic_drag"))
+    verdict = discover(Model.from_text(CASE.format(contact=NEWTON)), records[:2], records[2:], options)
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["restitution_curve"])
+    assert verdict["families"] == ["restitution over impact speed"]
+    found = verdict["function"]
+    at, value = np.array(found["at"]), np.array(found["value"])
+    inside = at > 0.3
+    assert np.allclose(value[inside], 0.5 * at[inside] ** -0.25, rtol=0.03)
+    assert min(one["closed"] for one in verdict["remains"]) > 0.98

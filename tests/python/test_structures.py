@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Machines of several bodies through the whole program: files, ranks, quadruple precision."""
+
+import h5py
+import numpy as np
+import pytest
+from program import differences, succeed
+
+SMALL = ["--set", "axis[1].count=9", "--set", "axis[2].count=9"]
+
+
+def test_map_of_four_dimensions(mpi_separatrix, source_dir, tmp_path):
+    """Two attractors, the same bits on two ranks, and the labels of quadruple precision."""
+    case = source_dir / "examples" / "structure_two_masses.toml"
+    for ranks in (1, 2):
+        path = tmp_path / f"{ranks}.h5"
+        succeed(mpi_separatrix, "basin", case, "-o", path, *SMALL, folder=tmp_path, ranks=ranks)
+    assert differences(tmp_path / "1.h5", tmp_path / "2.h5") == []
+    with h5py.File(tmp_path / "1.h5") as file:
+        assert set(np.unique(file["attractor"])) == {1, 2}
+    text = succeed(mpi_separatrix, "verify", tmp_path / "1.h5", "--sample", "8", folder=tmp_path).out
+    assert "0 differ from the file" in text
+    assert " 0 label flips" in text
+
+
+def test_bodies_have_columns_and_the_book_closes(separatrix, source_dir, tmp_path):
+    for example, bodies, joints in (
+        ("structure_blocks_on_a_belt", ("first", "second"), ["friction.first", "friction.second"]),
+        ("structure_impact_damper", ("structure", "particle"), ["contact.cavity"]),
+        ("structure_capsule", ("shell", "inner"), ["friction.ground", "contact.stop"]),
+    ):
+        path = tmp_path / f"{example}.h5"
+        succeed(
+            separatrix, "trajectory", source_dir / "examples" / f"{example}.toml", "-o", path, folder=tmp_path
+        )
+        with h5py.File(path) as file:
+            watched = "particle" if "particle" in bodies else bodies[0]
+            assert np.array_equal(file["x"], file[f"{watched}_x"])
+            assert {f"{name}_v" for name in bodies} <= set(file)
+            assert file["event_joint"].attrs["flag_meanings"].split() == joints
+            assert abs(file.attrs["energy_closing_error"]) < 1e-9 * max(1, file.attrs["energy_put_in"])
+            assert file.attrs["energy_put_in"] == pytest.approx(
+                file.attrs["energy_end"]
+                - file.attrs["energy_start"]
+                + file.attrs["energy_lost_to_friction"]
+                + file.attrs["energy_lost_to_damping"]
+                + file.attrs["energy_lost_to_contacts"],
+                rel=1e-9,
+            )
+
+
+def test_progress_of_the_capsule(separatrix, source_dir, tmp_path):
+    """Forward with a heavy shell, backward with a light one."""
+    for mass, progress in ((5, 1.158146350), (2, -0.292790117)):
+        path = tmp_path / f"capsule{mass}.h5"
+        case = source_dir / "examples" / "structure_capsule.toml"
+        words = ["--set", f"body.shell.mass={mass}", "--set", "run.duration=2500", "--force"]
+        succeed(separatrix, "trajectory", case, "-o", path, *words, folder=tmp_path)
+        with h5py.File(path) as file:
+            samples = 200
+            period = file.attrs["drive_period"]
+            x = file["shell_x"][:]
+            time = file["time"][:]
+            per_period = round(period / (time[1] - time[0]))
+            assert per_period == samples
+            last = (len(x) - 2) // per_period * per_period
+            assert x[last] - x[last - per_period] == pytest.approx(progress, abs=2e-8)
