@@ -31,8 +31,8 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 import referee  # noqa: E402
-from referee import Effort, Machine, Outcome  # noqa: E402
 from comparison_report import disagreements, summary_table, wrong_in  # noqa: E402
+from referee import Effort, Machine, Outcome  # noqa: E402
 
 __all__ = ["Court", "compare", "disagreements", "kept_report", "summary_table", "wrong_in"]
 
