@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A run that is killed while it looks at points a second time ends, resumed, with the bits of one that was not."""
+"""A run that is killed while it looks at points a second time ends, resumed, with the bits of a whole one."""
 
 import os
 import random
 import subprocess
 
 import life
-import pytest
 
 SEED = 20261122
 # An impacting cycle beside the graze, with a basin so small that no start of the sample is in it.
