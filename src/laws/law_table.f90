@@ -233,9 +233,8 @@ contains
   !> Whether a row is set by names of bodies, not by a number.
   pure logical function is_hidden(row)
     type(parameter_row_t), intent(in) :: row
-    is_hidden = row%law == 'structure' .or. &
-      (row%family == part_family .and. (row%name == 'first' .or. row%name == 'second' .or. row%name == 'body' .or. &
-                                       index(row%law, 'point:') == 1))
+    is_hidden = row%family == part_family .and. (index(row%law, 'point:') == 1 .or. &
+                                                 any(row%name == [character(len=6) :: 'first', 'second', 'body']))
   end function is_hidden
 
   !> A law with every parameter at its default (zero where it has none, empty lists): set the
