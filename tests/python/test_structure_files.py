@@ -21,16 +21,16 @@ file = "{file}"
 between = ["beam.tip"]
 law = "newton"
 restitution = 0.8
-upper = {stop!r}
+upper = {float(stop)!r}
 [drive.force]
 law = "force"
 body = "beam.tip"
-amplitude = {force!r}
-frequency = {omega!r}
+amplitude = {float(force)!r}
+frequency = {float(omega)!r}
 [start]
-x0 = {x0!r}
-v0 = {v0!r}
-crank_angle = {angle!r}
+x0 = {float(x0)!r}
+v0 = {float(v0)!r}
+crank_angle = {float(angle)!r}
 [run]
 duration = 14
 window = 7
