@@ -4,13 +4,14 @@
 !> From the parts of a case to a jointed structure.
 module build_jointed
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, index_of, move_surface, row_between
-  use contact_law, only: contact_kelvin_voigt
+  use contact_law, only: contact_of
   use elementary, only: sine_cosine
   use errors, only: error_t, fail
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, together_newton, &
-    together_sequence, wave_t
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+    together_newton, together_sequence, wave_t
   use kinds, only: real64, wp
-  use law_table, only: effect_family, law_choice_t, list_of, part_family, path_of, value_of
+  use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
+    path_of, set_value, value_of
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -62,13 +63,14 @@ contains
       case ('spring:linear')
         call add_link(machine, row_of(machine, choices(i)), value_of(choices(i), 'stiffness'), value_of(choices(i), 'damping'), &
                       value_of(choices(i), 'free_length'))
-      case ('friction:coulomb', 'friction:elastic_coulomb')
-        call add_friction(machine, choices(i), error)
-      case ('contact:newton', 'contact:kelvin_voigt')
-        call add_contact(machine, choices(i), error)
+      case ('spring:polynomial', 'spring:pendulum')
+        call add_spring(machine, choices(i))
       case ('drive:force')
         wave = wave_of(choices(i))
         call add_force(machine, unit_row(machine, choices(i)), wave%mean, wave%harmonic)
+      case default
+        if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), error)
+        if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices, i, error)
       end select
       if (allocated(error)) return
     end do
@@ -228,6 +230,28 @@ contains
     row(nint(value_of(choice, 'body'))) = 1
   end function unit_row
 
+  !> A spring whose force is not linear: its linear part belongs to the structure.
+  pure subroutine add_spring(machine, choice)
+    type(jointed_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choice
+    type(joint_t) :: joint
+    real(wp) :: stiffness
+    stiffness = 0
+    joint%name = path_of(choice)
+    joint%kind = joint_spring
+    joint%row = row_of(machine, choice)
+    joint%offset%mean = -value_of(choice, 'free_length')
+    if (choice%name == 'spring:pendulum') then
+      joint%moment = value_of(choice, 'moment')
+    else
+      stiffness = value_of(choice, 'stiffness')
+      joint%quadratic = value_of(choice, 'quadratic')
+      joint%cubic = value_of(choice, 'cubic')
+    end if
+    call add_link(machine, joint%row, stiffness, value_of(choice, 'damping'), value_of(choice, 'free_length'))
+    if (abs(joint%moment) + abs(joint%quadratic) + abs(joint%cubic) > 0) call add_joint(machine, joint)
+  end subroutine add_spring
+
   pure subroutine add_friction(machine, choice, error)
     type(jointed_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
@@ -247,20 +271,32 @@ contains
       return
     end if
     joint%friction%break_away = static
-    if (choice%name == 'friction:elastic_coulomb') then
+    select case (choice%name)
+    case ('friction:elastic_coulomb')
       joint%kind = joint_elastic
       joint%stiffness = value_of(choice, 'stiffness')
-    end if
+    case ('friction:coulomb_viscous')
+      joint%friction%damping = value_of(choice, 'damping')
+    case ('friction:coulomb_stribeck')
+      joint%friction%excess = static - joint%friction%kinetic
+      joint%friction%stribeck_velocity = value_of(choice, 'stribeck_velocity')
+      joint%friction%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+    case ('friction:coulomb_hyperbolic')
+      if (static > joint%friction%kinetic) joint%fading_speed = value_of(choice, 'fading_velocity')
+    end select
     belt%mean = value_of(choice, 'velocity')
     call move_surface(joint, machine%frequency, belt)
     call add_joint(machine, joint)
   end subroutine add_friction
 
-  pure subroutine add_contact(machine, choice, error)
+  pure subroutine add_contact(machine, choices, i, error)
     type(jointed_t), intent(inout) :: machine
-    type(law_choice_t), intent(in) :: choice
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
     type(error_t), allocatable, intent(out) :: error
+    type(law_choice_t) :: choice
     type(joint_t) :: joint
+    choice = choices(i)
     joint%name = path_of(choice)
     joint%row = row_of(machine, choice)
     ! None is the largest double, which other kinds exceed.
@@ -274,18 +310,45 @@ contains
                 number(joint%upper)//' m')
       return
     end if
-    if (choice%name == 'contact:newton') then
-      joint%kind = joint_contact
-      joint%contact%restitution = value_of(choice, 'restitution')
-    else
-      joint%kind = joint_soft
-      joint%contact%soft = .true.
-      joint%contact%kind = contact_kelvin_voigt
-      joint%contact%stiffness = value_of(choice, 'stiffness')
-      joint%contact%damping = value_of(choice, 'damping')
-      joint%contact%tension = value_of(choice, 'tension') > 0.5_wp
-    end if
+    joint%contact = contact_of(law_of_one(choice), felt_mass(machine, choices, joint%row))
+    joint%kind = merge(joint_soft, joint_contact, joint%contact%soft)
     call add_joint(machine, joint)
   end subroutine add_contact
+
+  !> The law of a contact without its ends.
+  pure function law_of_one(choice) result(plain)
+    type(law_choice_t), intent(in) :: choice
+    type(law_choice_t) :: plain
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    plain = law_choice('contact', part_law(choice%name))
+    rows = parameters_of(plain%family, plain%name)
+    do i = 1, size(rows)
+      call set_value(plain, trim(rows(i)%name), [value_of(choice, trim(rows(i)%name))])
+    end do
+  end function law_of_one
+
+  !> Mass that a joint feels [kg]; a body whose motion is given has no end of it.
+  pure real(wp) function felt_mass(machine, choices, row)
+    type(jointed_t), intent(in) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    real(wp), intent(in) :: row(:)
+    real(wp) :: mobility
+    integer :: i, k
+    mobility = 0
+    do k = 1, machine%n
+      if (any([(choices(i)%name == 'drive:motion' .and. is_of_body(choices(i), k), i=1, size(choices))])) cycle
+      mobility = mobility + row(k)**2/machine%mass(k, k)
+    end do
+    felt_mass = 1/max(mobility, tiny(mobility))
+  end function felt_mass
+
+  !> Whether a drive is that of body number `k`.
+  pure logical function is_of_body(choice, k)
+    type(law_choice_t), intent(in) :: choice
+    integer, intent(in) :: k
+    is_of_body = .false.
+    if (index(choice%name, 'drive:') == 1) is_of_body = nint(value_of(choice, 'body')) == k
+  end function is_of_body
 
 end module build_jointed
