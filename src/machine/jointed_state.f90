@@ -3,7 +3,7 @@
 
 !> State of a jointed structure and of each of its joints, and the forces of the joints that the state tells.
 module jointed_state
-  use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_kelvin_voigt, contact_slopes, contact_t
+  use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
   use friction_law, only: sliding_friction, sliding_slope
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
@@ -160,12 +160,12 @@ contains
     real(wp), intent(in) :: direction, p, rate
     real(wp), intent(out) :: force
     real(wp), intent(out), optional :: by_place, by_speed
-    real(wp) :: along, across
+    real(wp) :: slopes(2)
     force = -direction*contact_force(law, p, rate)
     if (.not. (present(by_place) .and. present(by_speed))) return
-    call contact_slopes(law, p, rate, along, across)
-    by_place = -along
-    by_speed = -across
+    slopes = contact_force_slopes(law, p, rate)
+    by_place = -slopes(1)
+    by_speed = -slopes(2)
   end subroutine press
 
   !> Force of sliding in a direction, continued smoothly to the other one.
