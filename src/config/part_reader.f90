@@ -290,8 +290,8 @@ contains
       call report(source, key, 'found the same end twice, allowed two bodies, or one for it and the ground')
       return
     end if
-    call set_value(choice, 'first', [real(ends(1), wp)])
-    call set_value(choice, 'second', [real(ends(2), wp)])
+    call set_value(choice, 'first_end', [real(ends(1), wp)])
+    call set_value(choice, 'second_end', [real(ends(2), wp)])
   end subroutine read_ends
 
   !> Number of a body, 0 the ground, -1 if there is none of that name.
