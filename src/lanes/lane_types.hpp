@@ -53,6 +53,20 @@ struct lane_law {
   double log_scale;
 };
 
+// A soft barrier whose contacts are expanded in series: stiffness p^n (1 + damping p'), or stiffness p +
+// damping p' if `linear`, per unit of mass. No such barrier: stiffness 0.
+struct lane_contact {
+  double stiffness, damping;
+  // 2 n.
+  double twice_exponent, linear;
+  // Each impact has the damping divided by its speed.
+  double by_impact;
+  // Degree of the polynomial of the foot of the spring, and the time over which it holds [s].
+  double foot_terms, foot_time;
+  // Logarithms of the stiffness and of half of that time.
+  double log_stiffness, log_foot_time;
+};
+
 // The machine, per unit of mass where forces are meant, SI.
 struct lane_machine {
   enum { modal = 0 };
@@ -81,8 +95,10 @@ struct lane_machine {
   // rate of the drive's force [m/s^3].
   double several_modes, friction_slope, force_rate;
   lane_mode mode[lane_modes_count];
-  // Without a closed form; then `cosine` and `sine` are those of the foot of the spring.
+  // Without a closed form, or with contacts in series; then `cosine` and `sine` are those of the foot of the
+  // spring.
   lane_law law;
+  lane_contact contact;
 };
 
 // Laws of restitution, by the numbers of `contact_law.f90`.
@@ -117,6 +133,8 @@ template <class T> struct lane_fields {
   // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
   // lower barrier (2).
   T place;
+  // Speed of the impact that the contact began with [m/s], 0 if none did.
+  T touch;
   // Dahl's friction [N].
   T z;
   // The time since the start of the flight at which the body leaves
