@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The problem that every contestant gets: the published machine, its start points, what is returned."""
+"""The problem that every contestant gets: a machine, its start points, what is returned."""
 
 import ctypes
 import hashlib
@@ -19,10 +19,12 @@ SEED = 20240611
 HARMONICS = 3
 X0 = (0.0, 1.1)
 V0 = (-6.0, 6.0)
+RESTITUTION_LAWS = ("newton", "newton_linear", "newton_power", "newton_viscoelastic")
+RIGID, KELVIN_VOIGT, KELVIN_VOIGT_CUT, HUNT_CROSSLEY = range(4)
 
 
 class Machine(ctypes.Structure):
-    """machine_t of published_case.h."""
+    """machine_t of machine.h."""
 
     _fields_ = [
         ("stiffness", ctypes.c_double),
@@ -36,6 +38,23 @@ class Machine(ctypes.Structure):
         ("sine", ctypes.c_double * HARMONICS),
         ("duration", ctypes.c_double),
         ("window", ctypes.c_double),
+        ("further", ctypes.c_double),
+        ("ripple", ctypes.c_double),
+        ("pendulum", ctypes.c_double),
+        ("cubic", ctypes.c_double),
+        ("quadratic", ctypes.c_double),
+        ("viscous", ctypes.c_double),
+        ("asymmetric", ctypes.c_double),
+        ("asymmetric_viscous", ctypes.c_double),
+        ("slope", ctypes.c_double),
+        ("excess", ctypes.c_double),
+        ("velocity", ctypes.c_double),
+        ("dahl", ctypes.c_double),
+        ("restitution_law", ctypes.c_double),
+        ("coefficients", ctypes.c_double * 2),
+        ("barrier_law", ctypes.c_double),
+        ("barrier_stiffness", ctypes.c_double),
+        ("barrier_damping", ctypes.c_double),
     ]
 
 
@@ -64,12 +83,12 @@ def si(value: float | str) -> float:
     return math.radians(float(number)) if unit == "deg" else float(number)
 
 
-def read_case() -> dict:
+def read_case(path: Path = CASE) -> dict:
     """The case file with plain numbers."""
-    case = tomllib.loads(CASE.read_text())
+    case = tomllib.loads(path.read_text())
     return {
         name: {
-            key: si(value) if key not in ("law", "cosine", "sine", "average") else value
+            key: value if isinstance(value, (list, dict)) or key in ("law", "average", "stop") else si(value)
             for key, value in table.items()
         }
         for name, table in case.items()
@@ -78,27 +97,85 @@ def read_case() -> dict:
 
 
 def published_machine() -> Machine:
-    """The machine of the case file, per unit of mass."""
-    case = read_case()
-    drive, spring, contact = case["drive"], case["restoring"], case["contact"]
-    stiffness = spring["stiffness"] / case["body"]["mass"]
+    """The machine of the published case."""
+    return machine_of(read_case())
+
+
+def machine_of(case: dict) -> Machine:
+    """The machine of a case, per unit of mass; see machine.h."""
+    drive, spring, contact, friction = (case[name] for name in ("drive", "restoring", "contact", "friction"))
+    effects, run, mass = case.get("effect", {}), case["run"], case["body"]["mass"]
+
+    def effect(name: str, parameter: str) -> float:
+        return effects.get(name, {}).get(parameter, 0.0)
+
+    pendulum = spring["law"] == "pendulum"
+    stiffness = spring["moment" if pendulum else "stiffness"] / mass
+    normal = case["body"]["gravity"]
     machine = Machine(
         stiffness=stiffness,
-        rest=spring["free_length"] + drive["mean"],
-        friction=case["friction"]["kinetic_coefficient"] * case["body"]["gravity"],
-        restitution=contact["restitution"],
+        rest=spring.get("free_length", 0.0) + drive["mean"],
+        friction=friction.get("kinetic_coefficient", 0.0) * normal,
         barrier=contact["upper"],
         frequency=drive["ratio"] * math.sqrt(stiffness),
         angle=drive["angle"],
         cosine=tuple(drive["cosine"]),
         sine=tuple(drive["sine"]),
-        duration=case["run"]["duration"],
-        window=case["run"]["window"],
+        duration=run["duration"],
+        window=run["window"],
+        ripple=effect("drive_ripple", "sine"),
+        pendulum=float(pendulum),
+        cubic=effect("cubic_spring", "stiffness") / mass,
+        quadratic=effect("quadratic_drag", "coefficient") / mass,
+        viscous=friction.get("damping", 0.0) / mass,
+        asymmetric=effect("asymmetric_friction", "coulomb") / mass,
+        asymmetric_viscous=effect("asymmetric_friction", "viscous") / mass,
+        slope=effect("position_dependent_friction", "slope"),
+        excess=effect("stribeck", "excess") / mass,
+        velocity=effect("stribeck", "velocity"),
+        dahl=effect("dahl", "stiffness") / mass,
     )
-    reach = sum(abs(a) + abs(b) for a, b in zip(drive["cosine"], drive["sine"], strict=True))
-    if stiffness * (machine.barrier - machine.rest - reach) <= machine.friction:
-        raise ValueError("a body could rest at the barrier: the drivers of the peers do not know that state")
+    set_barrier(machine, contact, effects, mass)
+    fields = [getattr(machine, name) for name, _ in Machine._fields_[12:]]
+    machine.further = float(any(np.any(np.asarray(value)) for value in fields))
+    check(machine)
     return machine
+
+
+def set_barrier(machine: Machine, contact: dict, effects: dict, mass: float) -> None:
+    """The law of the barrier."""
+    law, slope = contact["law"], effects.get("restitution_slope")
+    machine.restitution = contact.get("restitution", 1.0)
+    if law in RESTITUTION_LAWS:
+        machine.restitution_law = RESTITUTION_LAWS.index(law)
+    if law == "newton_power":
+        machine.coefficients = (contact["yield_speed"], contact.get("falloff", 0.25))
+    elif law == "newton_viscoelastic":
+        machine.coefficients = (contact["first"], contact["second"])
+    elif law == "newton_linear":
+        machine.coefficients = (contact["slope"], 0)
+    elif law == "kelvin_voigt":
+        machine.barrier_law = KELVIN_VOIGT if contact["tension"] > 0 else KELVIN_VOIGT_CUT
+    if slope:
+        machine.restitution_law, machine.coefficients = 1, (slope["slope"], 0)
+    if "compliant_contact" in effects:
+        contact, machine.barrier_law = effects["compliant_contact"], HUNT_CROSSLEY
+    if machine.barrier_law != RIGID:
+        share = 1 if machine.barrier_law == HUNT_CROSSLEY else mass
+        machine.barrier_stiffness = contact["stiffness"] / mass
+        machine.barrier_damping = contact["damping"] / share
+
+
+def check(machine: Machine) -> None:
+    """The drivers of the peers do not know a body that rests at a rigid barrier."""
+    reach = sum(abs(a) + abs(b) for a, b in zip(machine.cosine, machine.sine, strict=True))
+    stretch = machine.barrier - machine.rest - reach
+    push = machine.stiffness * (math.sin(stretch) if machine.pendulum else stretch)
+    hold = (machine.friction + machine.excess + abs(machine.asymmetric)) * (
+        1 + machine.slope * machine.barrier
+    )
+    if machine.barrier_law == RIGID and push <= hold:
+        raise ValueError("a body could rest at the barrier: the drivers of the peers do not know that state")
 
 
 def start_points(count: int) -> np.ndarray:

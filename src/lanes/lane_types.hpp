@@ -5,7 +5,14 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64, lane_modes_count = 6 };
+enum {
+  lanes = 16,
+  most_harmonics = 64,
+  layer_nodes = 10,
+  most_regions = 64,
+  lane_modes_count = 6,
+  most_knots = 16
+};
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
 struct lane_layer {
@@ -67,6 +74,11 @@ struct lane_contact {
   double log_stiffness, log_foot_time;
 };
 
+// Change of the restitution over the speed, by knots; see `curve_law.f90`.
+struct lane_curve {
+  double count, at[most_knots], value[most_knots], slope[most_knots];
+};
+
 // The machine, per unit of mass where forces are meant, SI.
 struct lane_machine {
   enum { modal = 0 };
@@ -99,11 +111,12 @@ struct lane_machine {
   // spring.
   lane_law law;
   lane_contact contact;
+  lane_curve curve;
 };
 
 // Laws of restitution, by the numbers of `contact_law.f90`.
 const double constant_restitution = 0, linear_restitution = 1, power_restitution = 2,
-             viscoelastic_restitution = 3;
+             viscoelastic_restitution = 3, curve_restitution = 6;
 
 // What a lane is doing.
 const double lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4;

@@ -6,7 +6,8 @@
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
   use elementary, only: exponential, logarithm
-  use contact_law, only: contact_curve, contact_hunt_crossley, contact_kelvin_voigt
+  use contact_law, only: contact_hunt_crossley, contact_kelvin_voigt
+  use curve_law, only: most_knots
   use effect_law, only: constant_force
   use exact_flow, only: flow_t, largest_damping_ratio
   use kinds, only: wp
@@ -71,6 +72,11 @@ module lanes
       log_stiffness = 0, log_foot_time = 0
   end type contact_series_t
 
+  !> Mirrors `lane_curve` of lane_types.hpp.
+  type, bind(c) :: restitution_curve_t
+    real(c_double) :: count = 0, at(most_knots) = 0, value(most_knots) = 0, slope(most_knots) = 0
+  end type restitution_curve_t
+
   !> Mirrors `lane_machine` of lane_types.hpp.
   type, bind(c) :: machine_t
     real(c_double) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, period = 0
@@ -84,6 +90,7 @@ module lanes
     type(mode_t) :: mode(0:5)
     type(law_t) :: law
     type(contact_series_t) :: contact
+    type(restitution_curve_t) :: curve
   end type machine_t
 
   !> Mirrors `lane_region` of lane_types.hpp.
@@ -160,8 +167,6 @@ contains
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
     if (flow%width <= 0 .or. allocated(moving%pair) .or. allocated(moving%jointed)) return
-    ! A table of the restitution is left to single flights.
-    if (moving%machine%contact%kind == contact_curve) return
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
     else
@@ -185,6 +190,9 @@ contains
       m%restitution = law%contact%restitution
       m%restitution_law = law%contact%kind
       m%coefficients = law%contact%coefficients
+      associate (curve => law%contact%change)
+        m%curve = restitution_curve_t(real(curve%count, wp), curve%at, curve%value, curve%slope)
+      end associate
       m%slow = chatter_speed(law)
       m%domain = moving%options%domain
       m%harmonics = size(law%drive%cosine)

@@ -33,7 +33,8 @@ def test_the_driver_of_a_peer_agrees_with_ours(
         pytest.skip(f"{library} has not been built; scripts/bench does")
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
     from compiled import Compiled
-    from published_case import CASE, TOLERANCE, published_machine
+
+    from machine import CASE, TOLERANCE, published_machine
 
     peers = Compiled(library, published_machine(), TOLERANCE).run(np.array(STARTS))
     (tmp_path / "list.csv").write_text("x0,v0\n" + "".join(f"{x},{v}\n" for x, v in STARTS))
@@ -47,7 +48,8 @@ def test_the_driver_of_a_peer_agrees_with_ours(
 def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separatrix, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
     import reference_run
-    from published_case import CASE
+
+    from machine import CASE
 
     monkeypatch.setattr(reference_run, "SHARE", 2)
     library = build_dir / "lib" / "libseparatrix_reference.so"
