@@ -25,8 +25,6 @@ static double smooth_acceleration(const machine_t *machine, double time, double 
   double a = machine->stiffness * stretch;
   if (machine->further == 0)
     return a;
-  if (machine->pendulum != 0)
-    a = machine->stiffness * sin(stretch);
   return a + machine->cubic * stretch * stretch * stretch -
          (machine->viscous + direction * (machine->asymmetric_viscous + machine->quadratic * v)) * v;
 }
@@ -68,7 +66,7 @@ int events_of(const phase_t *phase, int kinds[MOST_EVENTS]) {
   kinds[0] = TURNING;
   kinds[1] = phase->pressed ? RELEASE : BARRIER;
   /* upwards to the barrier, downwards from it */
-  return phase->pressed != phase->direction > 0 ? 2 : 1;
+  return phase->pressed != (phase->direction > 0) ? 2 : 1;
 }
 
 event_t event(const phase_t *phase, int kind, double time, const double y[]) {

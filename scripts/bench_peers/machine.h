@@ -27,7 +27,6 @@ typedef struct {
   /* From here on 0 on the published machine; `further` says whether any is not. */
   double further;
   double ripple;                         /* crank angle phi + ripple sin(phi) [rad] */
-  double pendulum;                       /* 1: c/m sin(s) in place of c/m s */
   double cubic, quadratic, viscous;      /* of the stretch and of the speed */
   double asymmetric, asymmetric_viscous; /* friction upwards above the mean of both directions */
   double slope;                          /* dry friction times 1 + slope x [1/m] */

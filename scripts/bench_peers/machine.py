@@ -40,7 +40,6 @@ class Machine(ctypes.Structure):
         ("window", ctypes.c_double),
         ("further", ctypes.c_double),
         ("ripple", ctypes.c_double),
-        ("pendulum", ctypes.c_double),
         ("cubic", ctypes.c_double),
         ("quadratic", ctypes.c_double),
         ("viscous", ctypes.c_double),
@@ -109,8 +108,7 @@ def machine_of(case: dict) -> Machine:
     def effect(name: str, parameter: str) -> float:
         return effects.get(name, {}).get(parameter, 0.0)
 
-    pendulum = spring["law"] == "pendulum"
-    stiffness = spring["moment" if pendulum else "stiffness"] / mass
+    stiffness = spring["stiffness"] / mass
     normal = case["body"]["gravity"]
     machine = Machine(
         stiffness=stiffness,
@@ -124,7 +122,6 @@ def machine_of(case: dict) -> Machine:
         duration=run["duration"],
         window=run["window"],
         ripple=effect("drive_ripple", "sine"),
-        pendulum=float(pendulum),
         cubic=effect("cubic_spring", "stiffness") / mass,
         quadratic=effect("quadratic_drag", "coefficient") / mass,
         viscous=friction.get("damping", 0.0) / mass,
@@ -170,7 +167,7 @@ def check(machine: Machine) -> None:
     """The drivers of the peers do not know a body that rests at a rigid barrier."""
     reach = sum(abs(a) + abs(b) for a, b in zip(machine.cosine, machine.sine, strict=True))
     stretch = machine.barrier - machine.rest - reach
-    push = machine.stiffness * (math.sin(stretch) if machine.pendulum else stretch)
+    push = machine.stiffness * stretch
     hold = (machine.friction + machine.excess + abs(machine.asymmetric)) * (
         1 + machine.slope * machine.barrier
     )

@@ -40,7 +40,7 @@ class AtRest:
         """Sign of the sliding that begins, 0 if friction holds the body; z: Dahl's friction."""
         machine = self.machine
         stretch = machine.rest + foot - x
-        a = machine.stiffness * (math.sin(stretch) if machine.pendulum else stretch)
+        a = machine.stiffness * stretch
         a += machine.cubic * stretch**3
         if machine.barrier_law and x > machine.barrier:
             a -= machine.barrier_stiffness * (x - machine.barrier)
@@ -135,7 +135,7 @@ class Heyoka:
         x, v, z = heyoka.make_vars("x", "v", "z")
         foot, oscillators = self.oscillating_foot() if self.oscillators else (self.rippled_foot(), [])
         stretch, p = machine.rest + foot - x, x - machine.barrier
-        a = machine.stiffness * (heyoka.sin(stretch) if machine.pendulum else stretch)
+        a = machine.stiffness * stretch
         if machine.cubic:
             a += machine.cubic * stretch**3
         if machine.viscous:

@@ -176,12 +176,6 @@ ROWS = (
     ),
     Row("stribeck", "Stribeck effect, 0.2 m/s", 10_000, effect("stribeck", excess=0.5, velocity=0.2)),
     Row(
-        "pendulum",
-        "pendulum with a wall",
-        10_000,
-        {"restoring": {"law": "pendulum", "moment": 88.82643960980423}},
-    ),
-    Row(
         "pair",
         "two bodies with backlash, 60 s",
         30_000,
