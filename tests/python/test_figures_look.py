@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a figure is asked to look like: ranges, slices, units, colours, marks, shading, films."""
 
+import importlib.machinery
 import itertools
+import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +19,7 @@ from sample_files import write_basin, write_sweep
 from separatrix import cli, style
 from separatrix.errors import SeparatrixError
 from separatrix.figures import basin, section, sweep
-from separatrix.figures.animation import animate
+from separatrix.figures.animation import animate, ffmpeg
 from separatrix.figures.look import Look
 from separatrix.open import open_result
 
@@ -245,3 +248,30 @@ def test_a_style_file_and_svg_are_taken(tmp_path: Path) -> None:
     options = ["--style", str(sheet), "--formats", "svg", "--field", "regime"]
     assert cli.main([str(path), "-o", str(tmp_path), *options]) == 0
     assert "#12ab34" in (tmp_path / "b_regime.svg").read_text()
+
+
+def test_impacts_are_seen_at_their_phase(library: Path, source_dir: Path) -> None:
+    """A cycle of three impacts in three periods: three points, of the speeds of the events."""
+    case = sx.load(source_dir / "docs" / "gallery" / "petals.toml").with_({"start.crank_angle": 0.5})
+    motion = sx.trajectory(case, -0.28, 0.087, 0.5, duration=400.0, samples=4)
+    assert int(motion.attrs["period"]) in (1, 3)
+    figure = motion.separatrix.plot("impacts")
+    phase, speed = (np.asarray(values) for values in figure.axes[0].lines[0].get_data())
+    late = motion.event_time.values >= 200.0
+    struck = late & (motion.event_kind.values == 1)
+    assert speed == pytest.approx(motion.event_v_before.values[struck])
+    period = float(motion.attrs["drive_period"])
+    assert phase == pytest.approx(
+        np.degrees(0.5 + 2 * np.pi * motion.event_time.values[struck] / period) % 360
+    )
+    # settled: as many points as the cycle has impacts
+    assert len(np.unique(phase.round(3))) == int(motion.attrs["period"])
+
+
+def test_a_film_is_written_by_the_package_where_there_is_no_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    package = types.ModuleType("imageio_ffmpeg")
+    package.get_ffmpeg_exe = lambda: "/there/ffmpeg"
+    package.__spec__ = importlib.machinery.ModuleSpec("imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
+    assert ffmpeg() == "/there/ffmpeg"
