@@ -18,12 +18,18 @@ module part_rows
   character(len=law_length), parameter :: contacts(2) = joints(4:5)
   character(len=law_length), parameter :: drives(2) = [character(len=law_length) :: 'drive:force', 'drive:motion']
   character(len=1), parameter :: drive_unit(2) = ['N', 'm']
+  character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
+  character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
 
-  type(law_row_t), parameter, public :: part_laws(10) = [ &
-    law_row_t('body', 'structure', 'several bodies, [body.NAME] each, with springs, joints and drives between them', &
+  type(law_row_t), parameter, public :: part_laws(14) = [ &
+    law_row_t('body', 'structure', 'several bodies and structures, with springs, joints and drives between them', &
               'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
     law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
     law_row_t('part', bodies(2), 'any other body', ''), &
+    law_row_t('part', structures(1), 'linear structure M q'''' + C q'' + K q, of a file or written down row by row', ''), &
+    law_row_t('part', structures(2), 'linear structure by its modes, mass-normalised', ''), &
+    law_row_t('part', points(1), 'the point of a structure that x0, v0 and the results refer to', ''), &
+    law_row_t('part', points(2), 'any other named point of a structure', ''), &
     law_row_t('part', joints(1), 'spring k and damper c between two bodies, or one and the ground', ''), &
     law_row_t('part', joints(2), 'dry friction between two bodies, or of one on the ground or a belt', ''), &
     law_row_t('part', joints(3), 'spring and slider in series (Jenkins)', 'Gastaldi, Berruti, Appl. Sci. (2018)'), &
@@ -33,8 +39,9 @@ module part_rows
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
     law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', '')]
 
-  !> The ends of a part are numbers of bodies, in the order of the file, 0 the ground; of a drive, one body.
-  type(parameter_row_t), parameter, public :: part_parameters(49) = [ &
+  !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
+  !> drive, one place.
+  type(parameter_row_t), parameter, public :: part_parameters(65) = [ &
     parameter_row_t('body', 'structure', 'in_sequence', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other'), &
     (parameter_row_t('part', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
@@ -45,6 +52,26 @@ module part_rows
                     'position at the start'), &
     parameter_row_t('part', bodies(2), 'v0', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
                     'velocity at the start'), &
+    parameter_row_t('part', structures(1), 'mass', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'M row by row, or the name of a Matrix Market file'), &
+    parameter_row_t('part', structures(1), 'stiffness', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'K, likewise'), &
+    parameter_row_t('part', structures(2), 'frequency', 'rad/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
+                    'angular frequencies of the undamped modes; 0: rigid'), &
+    parameter_row_t('part', structures(2), 'damping_ratios', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .true., &
+                    'of each mode; 1 and more: overdamped'), &
+    (parameter_row_t('part', structures(i), 'damping', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'C row by row, of any form, in the coordinates of the law'), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'damping_ratio', '1', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
+                     'of every mode, in the place of any other damping; -1: none is given'), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'x0', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'coordinates at the start, before the watched point is moved'), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'v0', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'their rates at the start'), i=1, 2), &
+    (parameter_row_t('part', points(i), 'structure', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the structure'), i=1, 2), &
+    (parameter_row_t('part', points(i), 'row', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'its displacement for one of each coordinate'), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
                      'number of the first body between'), i=1, 5), &
     (parameter_row_t('part', joints(i), 'second', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &

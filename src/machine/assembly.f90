@@ -182,6 +182,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: squares(:), shapes(:, :)
     integer :: k
+    if (.not. allocated(machine%start_shape)) then
+      allocate (machine%start_shape(machine%n, 2), source=0.0_wp)
+      machine%start_shape(machine%watched, :) = 1
+    end if
     do k = 1, size(machine%given)
       call take_out(machine, trim(machine%given_names(k)), machine%given(k), error)
       if (allocated(error)) return
@@ -250,7 +254,11 @@ contains
         joint%row = joint%row(rest)
       end associate
     end do
-    if (machine%watched == at) machine%watched = 1
+    if (machine%watched == at) then
+      machine%watched = 1
+      machine%start_shape(:, :) = 0
+      machine%start_shape(rest(1), :) = 1
+    end if
     if (machine%watched > at) machine%watched = machine%watched - 1
     machine%mass = machine%mass(rest, rest)
     machine%damping = machine%damping(rest, rest)
@@ -259,6 +267,7 @@ contains
     machine%force = machine%force(rest, :)
     machine%names = machine%names(rest)
     machine%start = machine%start(:, rest)
+    machine%start_shape = machine%start_shape(rest, :)
     machine%n = size(rest)
   end subroutine take_out
 

@@ -25,7 +25,7 @@ module jointed
   !> How the speeds after an impact of several contacts at once are found.
   integer, parameter, public :: together_newton = 0, together_sequence = 1
 
-  integer, parameter, public :: name_length = 32
+  integer, parameter, public :: name_length = 48
 
   !> mean + rate t + Re sum over m of harmonic(m) exp(i m Omega t), t being time since the section.
   type, public :: wave_t
@@ -72,6 +72,8 @@ module jointed
     integer :: watched = 1
     !> Position and velocity at the start.
     real(wp), allocatable :: start(:, :)
+    !> Displacements and velocities (columns) of all coordinates at the start for one of the watched coordinate.
+    real(wp), allocatable :: start_shape(:, :)
     !> Inverse of the mass matrix.
     real(wp), allocatable :: mobility(:, :)
     !> Sizes for rounding: of forces [N], of speeds that are none [m/s], of lengths [m].
