@@ -3,8 +3,8 @@
 """Duffing's two motions.
 
 A spring that stiffens as it is stretched bends the resonance over: at one drive there is a small motion
-and a large one. Their basins are two arms of a spiral. Which is entered depends on the phase at which
-the start lies, and the large one is hard to find by turning up the drive slowly.
+and a large one. Nearly all starts find the large one here. The basin of the small one is a drop with a
+tail that winds round the plane, thinner with each turn.
 """
 
 import math

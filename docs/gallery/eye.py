@@ -23,7 +23,6 @@ result.separatrix.save(
     "eye",
     "grazing_margin",
     formats=["png"],
-    title="The eye",
     size=(130, 95),
     caption="short",
     dpi=200,

@@ -18,7 +18,6 @@ print(result.separatrix.attractors[["share", "regime", "period", "event_word", "
 result.separatrix.save(
     "flow",
     formats=["png"],
-    title="Flow between two walls",
     shade=True,
     size=(130, 95),
     caption="short",

@@ -15,6 +15,4 @@ points = int(sys.argv[1]) if sys.argv[1:] else 700
 case = sx.load("petals.toml").with_({"contact.restitution": 0.9, "run.duration": 1000.0})
 result = sx.basin(case, x0=points, v0=points)
 print(result.separatrix.attractors[["share", "regime", "period", "multiplier"]].to_string())
-result.separatrix.save(
-    "shells", formats=["png"], title="Shells", shade=True, size=(130, 95), caption="short", dpi=200
-)
+result.separatrix.save("shells", formats=["png"], shade=True, size=(130, 95), caption="short", dpi=200)

@@ -15,7 +15,5 @@ import separatrix as sx
 points = int(sys.argv[1]) if sys.argv[1:] else 1000
 case = sx.load("flow.toml").with_({"drive.ratio": 2.8, "contact.restitution": 0.95})
 result = sx.basin(case, x0=points, v0=points)
-print(result.separatrix.attractors[["share", "regime", "period", "event_word", "multiplier"]].to_string())
-result.separatrix.save(
-    "twins", formats=["png"], title="Twins", shade=True, size=(130, 95), caption="short", dpi=200
-)
+print(result.separatrix.attractors[["share", "regime", "period", "event_word"]].to_string())
+result.separatrix.save("twins", formats=["png"], shade=True, size=(130, 95), caption="short", dpi=200)

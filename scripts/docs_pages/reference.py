@@ -17,7 +17,7 @@ FAMILIES = {
     "drive": "Drives", "part": "Parts of a machine of several bodies",
 }  # fmt: skip
 COMMANDS = ("basin", "sweep", "trajectory", "points", "merge", "laws", "info", "verify")
-TOOLS = ("separatrix-figures", "separatrix-view", "separatrix-discover")
+TOOLS = ("separatrix-figures", "separatrix-view", "separatrix-discover", "separatrix-structure")
 # one of each kind of file, small
 RUNS = {
     "basin": ("basin_coulomb.toml", ["axis[1].count=3", "axis[2].count=3"]),
@@ -58,6 +58,9 @@ def _laws(laws: list[dict]) -> str:
         "keys, as `separatrix laws` prints them. [Case files](../case-file.md) say how they are written "
         "down, [effects](effects.md) what can be added to them.\n"
     )
+    unknown = {law["family"] for law in laws} - {*FAMILIES, "effect"}
+    if unknown:
+        raise SystemExit(f"docs: the reference has no heading for the laws of {', '.join(sorted(unknown))}")
     for family, heading in FAMILIES.items():
         text += f"\n## {heading}\n"
         for law in laws:
@@ -82,8 +85,9 @@ def _heading(law: dict) -> str:
     if law["family"] != "part":
         return f'`{law["family"]}.law = "{law["law"]}"`'
     part, _, variant = law["law"].partition(":")
-    if part == "body":
-        return "`[body.NAME]`, watched" if variant == "watched" else "`[body.NAME]`"
+    if part in ("body", "point", "structure"):
+        # these have no key `law`
+        return f"`[{part}.NAME]`, {variant}"
     return f'`[{part}.NAME]` `law = "{variant}"`'
 
 

@@ -20,6 +20,7 @@ from separatrix import cli, style
 from separatrix.errors import SeparatrixError
 from separatrix.figures import basin, section, sweep
 from separatrix.figures.animation import animate, ffmpeg
+from separatrix.figures.difference import differing
 from separatrix.figures.look import Look
 from separatrix.open import open_result
 
@@ -275,3 +276,26 @@ def test_a_film_is_written_by_the_package_where_there_is_no_program(monkeypatch:
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
     assert ffmpeg() == "/there/ffmpeg"
+
+
+def test_two_maps_are_compared_point_by_point(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Black is where the motion differs, whatever the numbers of the attractors; other points are refused."""
+    attractor = np.where(np.arange(X0.size)[:, None] < X0.size // 2, 1, 2) * np.ones((1, V0.size), int)
+    changed = attractor.copy()
+    changed[0, :] = 2
+    one = write_basin(tmp_path / "one.h5", {"x0": X0, "v0": V0}, attractor)
+    renumbered = write_basin(tmp_path / "two.h5", {"x0": X0, "v0": V0}, 3 - changed, regime_of=(0, 2, 1))
+    with open_result(one) as first, open_result(renumbered) as second:
+        mask = differing(first, second)
+        assert mask.values[0].all()
+        assert not mask.values[1:].any()
+        figure = first.separatrix.difference(second)
+        assert colour_at(figure, X0[0], V0[1]) == (0.0, 0.0, 0.0)
+        assert colour_at(figure, X0[1], V0[1]) == pytest.approx(to_rgb(style.ATTRACTORS[0]), abs=0.02)
+        assert legend_texts(figure)[-1] == f"another motion ({100 / X0.size:.3g} %)"
+        with pytest.raises(SeparatrixError, match="the same points along x0"):
+            first.separatrix.difference(second.isel(x0=slice(1, None)))
+    assert cli.main([str(one), str(renumbered), "--difference", "--formats", "png", "--dpi", "60"]) == 0
+    assert (tmp_path / "one_difference.png").is_file()
+    assert cli.main([str(one), "--difference", "--formats", "png", "--dpi", "60"]) == 64
+    assert "found 1 files, allowed 2" in capsys.readouterr().err
