@@ -57,10 +57,8 @@ def _console(text: str, page: Path, folder: Path, environment: dict[str, str]) -
     assert parts[0] == "", f"{page.name}: a console block begins with a command"
     for part in parts[1:]:
         command, _, wanted = part.partition("\n")
-        done = subprocess.run(
-            ["bash", "-c", command], cwd=folder, env=environment, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
+        words = ["bash", "-c", command]
+        done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
         expected = [line for line in wanted.splitlines() if line.strip()]
         refused = any(line.startswith("separatrix: ") for line in expected)
         said = f"{done.returncode}\n{done.stdout}{done.stderr}"
