@@ -21,16 +21,16 @@ file = "{file}"
 between = ["beam.tip"]
 law = "newton"
 restitution = 0.8
-upper = {stop!r}
+upper = {stop}
 [drive.force]
 law = "force"
 body = "beam.tip"
-amplitude = {force!r}
-frequency = {omega!r}
+amplitude = {force}
+frequency = {omega}
 [start]
-x0 = {x0!r}
-v0 = {v0!r}
-crank_angle = {angle!r}
+x0 = {x0}
+v0 = {v0}
+crank_angle = {angle}
 [run]
 duration = 14
 window = 7
