@@ -22,7 +22,7 @@ module grid
 
   !> The axis that counts starts drawn at random.
   character(len=*), parameter, public :: sample_axis = 'sample'
-    character(len=name_length), parameter :: own_starts(3) = [character(len=name_length) :: 'x0', 'v0', 'crank_angle']
+  character(len=name_length), parameter :: own_starts(3) = [character(len=name_length) :: 'x0', 'v0', 'crank_angle']
 
   type, public :: grid_t
     type(axis_t), allocatable :: axes(:)
