@@ -60,7 +60,8 @@ contains
     fits_section = coordinates_of_jointed(moving) <= most_coordinates
   end function fits_section
 
-  !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, the drive at `angle` [rad].
+  !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
+  !> drive at `angle` [rad].
   !> `others`, if it is not empty, has place and velocity of every coordinate in the place of what the machine says.
   !> One that no mode fits, or that lies beyond a stop, is not a number.
   pure function start_of_jointed(moving, x, v, angle, others) result(state)

@@ -76,7 +76,7 @@ contains
 
   subroutine read_header(cursor, layout, symmetry, problem)
     type(cursor_t), intent(inout) :: cursor
-    character(len=*), intent(out) :: layout, symmetry
+    character(len=16), intent(out) :: layout, symmetry
     character(len=:), allocatable, intent(out) :: problem
     character(len=*), parameter :: allowed = ''', allowed ''%%MatrixMarket matrix coordinate|array real|integer '// &
       'general|symmetric|skew-symmetric'''

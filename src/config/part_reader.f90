@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME], [contact.NAME], [drive.NAME] and
-!> [watch].
+!> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME], [contact.NAME],
+!> [drive.NAME] and [watch].
 module part_reader
   use case_parameters, only: row_bounds
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
