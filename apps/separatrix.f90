@@ -4,6 +4,7 @@
 !> One executable with subcommands: reads the arguments, calls the command, returns the exit code.
 program separatrix
   use basin_driver, only: run_basin
+  use branches_driver, only: run_branches
   use command_line, only: command_t, help_text, read_command_line
   use errors, only: error_t
   use info_driver, only: run_info
@@ -38,6 +39,8 @@ program separatrix
         call run_basin(command)
       case ('sweep')
         call run_sweep(command)
+      case ('branches')
+        call run_branches(command)
       case ('trajectory')
         call run_trajectory_command(command)
       case ('points')

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import basin, contact, points, sweep, trajectory
+from separatrix.figures import basin, branches, contact, points, sweep, trajectory
 from separatrix.figures.animation import animate
 from separatrix.figures.look import CAPTIONS, UNITS, Look
 from separatrix.labels import plain
@@ -22,6 +22,7 @@ from separatrix.save import FORMATS, save
 from separatrix.version import __version__
 
 _FILM_DPI = 150
+_BY_KIND = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -89,7 +90,7 @@ def _figures(path: Path, result: object, field: str | None, title: str, look: Lo
         return basin.figures(path, result, field, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
-    return {"sweep": sweep, "trajectory": trajectory, "points": points}[kind].figures(result, title, look)
+    return _BY_KIND[kind].figures(result, title, look)
 
 
 def _animated(

@@ -133,6 +133,12 @@ contains
     reached = point_near(reached, now, moving%machine%turn)
     direction(:n) = (reached(:n) - now(:n))/scale(:n)
     distance = norm2(direction(:n))
+    ! A neighbour that had to be given up tells nothing.
+    if (reason /= 0 .or. .not. distance <= huge(distance)) then
+      direction = 0
+      drift = 0
+      return
+    end if
     drift = logarithm(max(distance, rounding)/neighbour)
     if (distance > rounding) then
       direction = direction/distance

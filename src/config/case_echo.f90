@@ -151,7 +151,7 @@ contains
     case ('drive')
       text = line('body', quoted(trim(names(nint(value_of(law, 'body'))))))
     case default
-      text = line('between', '['//end_text('first')//', '//end_text('second')//']')
+      text = line('between', '['//end_text('first_end')//', '//end_text('second_end')//']')
     end select
 
   contains

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME], [contact.NAME],
-!> [drive.NAME] and [watch].
+!> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME],
+!> [contact.NAME], [drive.NAME] and [watch].
 module part_reader
   use case_parameters, only: row_bounds
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
@@ -290,8 +290,8 @@ contains
       call report(source, key, 'found the same end twice, allowed two bodies, or one for it and the ground')
       return
     end if
-    call set_value(choice, 'first', [real(ends(1), wp)])
-    call set_value(choice, 'second', [real(ends(2), wp)])
+    call set_value(choice, 'first_end', [real(ends(1), wp)])
+    call set_value(choice, 'second_end', [real(ends(2), wp)])
   end subroutine read_ends
 
   !> Number of a body, 0 the ground, -1 if there is none of that name.

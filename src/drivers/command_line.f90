@@ -14,8 +14,8 @@ module command_line
 
   integer, parameter :: longest_argument = 4096
 
-  character(len=*), parameter, public :: commands(8) = [character(len=10) :: 'basin', 'sweep', &
-    'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
+  character(len=*), parameter, public :: commands(9) = [character(len=10) :: 'basin', 'sweep', &
+    'branches', 'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
 
   !> The commands that keep what is done when they are stopped.
   character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
@@ -44,6 +44,11 @@ module command_line
     !> Seconds between lines of progress; 0 = as the journal thinks fit.
     real(wp) :: progress = 0
     integer :: ranks_per_node = 0
+    !> `branches`: the parameter, its range, and at how many values orbits are searched.
+    character(len=:), allocatable :: parameter
+    real(wp) :: from = 0, to = 0
+    logical :: has_from = .false., has_to = .false.
+    integer :: searches = 12
     !> `verify`: points rerun, and the seed that chooses them.
     integer :: sample = 200, seed = 1
     !> `verify`: share of the labels that may change, in per cent.
@@ -63,6 +68,7 @@ contains
     command%path = ''
     command%output = ''
     command%list = ''
+    command%parameter = ''
     command%csv = ''
     command%record = ''
     command%tile_times = ''
@@ -119,6 +125,10 @@ contains
       call fail(error, exit_usage, '--search-only searches, --catalogue takes what was found: choose one')
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
+    else if (command%name == 'branches' .and. len(command%parameter) == 0) then
+      call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
+    else if (command%name /= 'branches' .and. (len(command%parameter) > 0 .or. command%has_from .or. command%has_to)) then
+      call fail(error, exit_usage, '--parameter, --from and --to belong to the command branches')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. .not. any(command%name == tabulated)) then
@@ -199,7 +209,8 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--draw', '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
+          '--draw', '--parameter', '--from', '--to', '--searches', &
+          '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
       else if (position < command_argument_count()) then
@@ -241,6 +252,16 @@ contains
       call read_integer(name, value, 1, command%sample, error)
     case ('--seed')
       call read_integer(name, value, 0, command%seed, error)
+    case ('--parameter')
+      command%parameter = value
+    case ('--from')
+      command%has_from = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%from, error)
+    case ('--to')
+      command%has_to = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
+    case ('--searches')
+      call read_integer(name, value, 1, command%searches, error)
     case ('--max-changes')
       call read_number_in(name, value, 0.0_wp, 100.0_wp, 'per cent', command%max_changes, error)
     end select
@@ -340,6 +361,11 @@ contains
       lines = 'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
         '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
         '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl
+    case ('branches')
+      lines = 'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
+        '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
+        '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
+        '  --searches N       values at which orbits are searched (default 12)'//nl
     case ('trajectory')
       lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
         '  --csv FILE      also write the events as a table'//nl// &
@@ -374,6 +400,7 @@ contains
       lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl// &
         '  basin CASE       where every point of a grid of starts or parameters ends up'//nl// &
         '  sweep CASE       amplitude-frequency and bifurcation diagram, run up, run down and from many starts'//nl// &
+        '  branches CASE    periodic orbits over a parameter, stable and unstable, with their bifurcations'//nl// &
         '  trajectory CASE  one motion with all its events'//nl// &
         '  points CASE      a list of starts'//nl// &
         '  merge OUT SHARD  one file from the shares of a map'//nl// &

@@ -47,7 +47,7 @@ module jointed
     type(contact_t) :: contact
     !> Stops of a contact [m], huge means none.
     real(wp) :: upper = huge(1.0_wp), lower = -huge(1.0_wp)
-    !> Spring of elastic friction [N/m]; spring that is not linear: -c1 s - c2 s^2 - c3 s^3 - moment sin s.
+    !> Spring of elastic friction [N/m]; what is not linear of a spring: -c2 s^2 - c3 s^3 - moment sin s.
     real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0
   end type joint_t
 
@@ -78,7 +78,7 @@ module jointed
     real(wp), allocatable :: mobility(:, :)
     !> Sizes for rounding: of forces [N], of speeds that are none [m/s], of lengths [m].
     real(wp) :: force_scale = 0, negligible_speed = 0, length_scale = 0
-    !> The motion between events is linear.
+    !> The motion is linear in every mode.
     logical :: linear = .true.
   end type jointed_t
 

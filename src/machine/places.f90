@@ -255,8 +255,8 @@ contains
     real(wp) :: row(size(rows, 1))
     integer :: first, second
     row = 0
-    first = nint(value_of(choice, 'first'))
-    second = nint(value_of(choice, 'second'))
+    first = nint(value_of(choice, 'first_end'))
+    second = nint(value_of(choice, 'second_end'))
     if (first > 0) row = row - rows(:, first)
     if (second > 0) row = row + rows(:, second)
   end function row_of

@@ -4,13 +4,15 @@
 !> From the parts of a case to a jointed structure.
 module build_jointed
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
-  use contact_law, only: contact_kelvin_voigt
+  use contact_law, only: contact_of
   use elementary, only: sine_cosine
   use errors, only: error_t, fail
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, together_newton, &
-    together_sequence, wave_t
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+    together_newton, together_sequence, wave_t
   use kinds, only: real64, wp
-  use law_table, only: effect_family, law_choice_t, list_of, part_family, path_of, value_of
+  use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
+    path_of, set_value, value_of
+  use matrices, only: solve
   use places, only: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of
   use status, only: exit_bad_case
   implicit none
@@ -55,13 +57,15 @@ contains
       case ('spring:linear')
         call add_link(machine, row_of(rows, choices(i)), value_of(choices(i), 'stiffness'), value_of(choices(i), 'damping'), &
                       value_of(choices(i), 'free_length'))
-      case ('friction:coulomb', 'friction:elastic_coulomb')
-        call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
-      case ('contact:newton', 'contact:kelvin_voigt')
-        call add_contact(machine, choices(i), row_of(rows, choices(i)), error)
+      case ('spring:polynomial', 'spring:pendulum')
+        call add_spring(machine, choices(i), row_of(rows, choices(i)))
       case ('drive:force')
         wave = wave_of(choices(i))
         call add_force(machine, rows(:, place_of(choices(i))), wave%mean, wave%harmonic)
+      case default
+        if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
+        if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices(i), row_of(rows, choices(i)), &
+                                                                      given_of(choices, coordinate), error)
       end select
       if (allocated(error)) return
     end do
@@ -160,6 +164,29 @@ contains
     wave%harmonic(1) = wave%harmonic(1) + value_of(choice, 'amplitude')*cmplx(cosine, sine, wp)
   end function wave_of
 
+  !> A spring whose force is not linear: its linear part belongs to the structure.
+  pure subroutine add_spring(machine, choice, row)
+    type(jointed_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: row(:)
+    type(joint_t) :: joint
+    real(wp) :: stiffness
+    stiffness = 0
+    joint%name = path_of(choice)
+    joint%kind = joint_spring
+    joint%row = row
+    joint%offset%mean = -value_of(choice, 'free_length')
+    if (choice%name == 'spring:pendulum') then
+      joint%moment = value_of(choice, 'moment')
+    else
+      stiffness = value_of(choice, 'stiffness')
+      joint%quadratic = value_of(choice, 'quadratic')
+      joint%cubic = value_of(choice, 'cubic')
+    end if
+    call add_link(machine, joint%row, stiffness, value_of(choice, 'damping'), value_of(choice, 'free_length'))
+    if (abs(joint%moment) + abs(joint%quadratic) + abs(joint%cubic) > 0) call add_joint(machine, joint)
+  end subroutine add_spring
+
   pure subroutine add_friction(machine, choice, row, error)
     type(jointed_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
@@ -180,19 +207,29 @@ contains
       return
     end if
     joint%friction%break_away = static
-    if (choice%name == 'friction:elastic_coulomb') then
+    select case (choice%name)
+    case ('friction:elastic_coulomb')
       joint%kind = joint_elastic
       joint%stiffness = value_of(choice, 'stiffness')
-    end if
+    case ('friction:coulomb_viscous')
+      joint%friction%damping = value_of(choice, 'damping')
+    case ('friction:coulomb_stribeck')
+      joint%friction%excess = static - joint%friction%kinetic
+      joint%friction%stribeck_velocity = value_of(choice, 'stribeck_velocity')
+      joint%friction%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+    case ('friction:coulomb_hyperbolic')
+      if (static > joint%friction%kinetic) joint%fading_speed = value_of(choice, 'fading_velocity')
+    end select
     belt%mean = value_of(choice, 'velocity')
     call move_surface(joint, machine%frequency, belt)
     call add_joint(machine, joint)
   end subroutine add_friction
 
-  pure subroutine add_contact(machine, choice, row, error)
+  pure subroutine add_contact(machine, choice, row, given, error)
     type(jointed_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
     real(wp), intent(in) :: row(:)
+    integer, intent(in) :: given(:)
     type(error_t), allocatable, intent(out) :: error
     type(joint_t) :: joint
     joint%name = path_of(choice)
@@ -208,18 +245,48 @@ contains
                 number(joint%upper)//' m')
       return
     end if
-    if (choice%name == 'contact:newton') then
-      joint%kind = joint_contact
-      joint%contact%restitution = value_of(choice, 'restitution')
-    else
-      joint%kind = joint_soft
-      joint%contact%soft = .true.
-      joint%contact%kind = contact_kelvin_voigt
-      joint%contact%stiffness = value_of(choice, 'stiffness')
-      joint%contact%damping = value_of(choice, 'damping')
-      joint%contact%tension = value_of(choice, 'tension') > 0.5_wp
-    end if
+    joint%contact = contact_of(law_of_one(choice), felt_mass(machine%mass, given, row))
+    joint%kind = merge(joint_soft, joint_contact, joint%contact%soft)
     call add_joint(machine, joint)
   end subroutine add_contact
+
+  !> The law of a contact without its ends.
+  pure function law_of_one(choice) result(plain)
+    type(law_choice_t), intent(in) :: choice
+    type(law_choice_t) :: plain
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    plain = law_choice('contact', part_law(choice%name))
+    rows = parameters_of(plain%family, plain%name)
+    do i = 1, size(rows)
+      call set_value(plain, trim(rows(i)%name), [value_of(choice, trim(rows(i)%name))])
+    end do
+  end function law_of_one
+
+  !> Coordinates whose motion is given.
+  pure function given_of(choices, coordinate) result(given)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: coordinate(:)
+    integer, allocatable :: given(:)
+    integer :: i
+    given = [integer ::]
+    do i = 1, size(choices)
+      if (choices(i)%name == 'drive:motion') given = [given, coordinate(place_of(choices(i)))]
+    end do
+  end function given_of
+
+  !> Mass that a joint feels [kg]; coordinates whose motion is given have no end of it.
+  pure real(wp) function felt_mass(mass, given, row)
+    real(wp), intent(in) :: mass(:, :), row(:)
+    integer, intent(in) :: given(:)
+    integer, allocatable :: free(:)
+    real(wp), allocatable :: push(:)
+    integer :: i
+    logical :: ok
+    free = pack([(i, i=1, size(row))], [(all(given /= i), i=1, size(row))])
+    allocate (push(size(free)))
+    call solve(mass(free, free), row(free), push, ok)
+    felt_mass = 1/max(sum(row(free)*push), tiny(felt_mass))
+  end function felt_mass
 
 end module build_jointed

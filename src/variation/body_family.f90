@@ -33,6 +33,8 @@ module body_family
     real(wp) :: lowest = -huge(1.0_wp), highest = huge(1.0_wp)
     !> Size of the parameter below which steps do not shrink.
     real(wp) :: parameter_size = 1
+    !> Sizes of x and v, the same for all machines; 0: each has its own.
+    real(wp) :: sizes(2) = 0
   end type family_t
 
 contains
@@ -67,7 +69,8 @@ contains
                 'Dahl friction, a measured force, or a damping that each impact sets')
       return
     end if
-    body = one_body_of(moving, size_of_motion(moving))
+    body = one_body_of(moving, merge(family%sizes(1), size_of_motion(moving), family%sizes(1) > 0))
+    if (family%sizes(2) > 0) body%size_of(2) = family%sizes(2)
   end subroutine body_of_family
 
   !> The machine and its neighbours in the parameter.

@@ -135,7 +135,7 @@ class Court:
         if all(same_motion(machine, found, other) for other in others):
             return "wrong"
         met = any(judged(machine, other, claim, points) == "agrees" for other in others)
-        return "rounding" if met or claim.period == 0 else "unfounded"
+        return "rounding" if met else "unfounded"
 
 
 def judged(machine: Machine, found: Outcome, claim: Claim, points: np.ndarray | None = None) -> str:
