@@ -88,7 +88,7 @@ contains
       case ('drive')
         call add('drive', spread(nint(value_of(laws(i), 'body')), 1, 2))
       case default
-        call add(part_kind(laws(i)%name), [nint(value_of(laws(i), 'first')), nint(value_of(laws(i), 'second'))])
+        call add(part_kind(laws(i)%name), [nint(value_of(laws(i), 'first_end')), nint(value_of(laws(i), 'second_end'))])
       end select
     end do
 

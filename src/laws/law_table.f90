@@ -234,7 +234,7 @@ contains
   pure logical function is_hidden(row)
     type(parameter_row_t), intent(in) :: row
     is_hidden = row%family == part_family .and. (index(row%law, 'point:') == 1 .or. &
-                                                 any(row%name == [character(len=6) :: 'first_end', 'second_end', 'body']))
+                                                 any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body']))
   end function is_hidden
 
   !> Whether a path names where a body of several, or a coordinate of a structure, starts: 'body.NAME.x0',
