@@ -5,6 +5,8 @@
 A test compares them with the files of the program.
 """
 
+import re
+
 import numpy as np
 
 _REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
@@ -14,6 +16,15 @@ _EVENTS = (
     "touch_upper touch_lower separation blow"
 )
 _MODES = "slip_plus slip_minus stick upper_barrier lower_barrier held"
+
+
+# Axes over starts: of one body, of bodies and structures by name, the count of starts drawn at random.
+_START = re.compile(r"x0|v0|crank_angle|sample|body_.+_[xv]0|structure_.+_[xv]0_\d+")
+
+
+def is_start(axis: str) -> bool:
+    """Whether an axis of a file is one of starts, not of a parameter of the machine."""
+    return _START.fullmatch(axis) is not None
 
 
 def _flags(meanings: str, first: int = 0) -> dict[str, object]:

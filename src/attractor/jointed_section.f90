@@ -60,17 +60,22 @@ contains
     fits_section = coordinates_of_jointed(moving) <= most_coordinates
   end function fits_section
 
-  !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, the drive at
-  !> `angle` [rad].
+  !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
+  !> drive at `angle` [rad].
+  !> `others`, if it is not empty, has place and velocity of every coordinate in the place of what the machine says.
   !> One that no mode fits, or that lies beyond a stop, is not a number.
-  pure function start_of_jointed(moving, x, v, angle) result(state)
+  pure function start_of_jointed(moving, x, v, angle, others) result(state)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, angle
+    real(wp), intent(in), optional :: others(:)
     type(jointed_state_t) :: state
     real(wp) :: start(2, moving%machine%n)
     logical :: ok
     associate (machine => moving%machine)
       start = machine%start
+      if (present(others)) then
+        if (size(others) > 0) start = reshape(others, [2, machine%n])
+      end if
       start(1, :) = start(1, :) + machine%start_shape(:, 1)*(x - start(1, machine%watched))
       start(2, :) = start(2, :) + machine%start_shape(:, 2)*(v - start(2, machine%watched))
     end associate

@@ -150,13 +150,14 @@ contains
     end associate
   end function has_section
 
-  !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says.
+  !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
+  !> are places and velocities of the coordinates of several bodies, in the place of those that the machine says.
   pure function start_strobe(moving, start) result(strobe)
     type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: start(3)
+    real(wp), intent(in) :: start(:)
     type(strobe_t) :: strobe
     if (allocated(moving%jointed)) then
-      strobe%jointed = start_of_jointed(moving%jointed, start(1), start(2), start(3))
+      strobe%jointed = start_of_jointed(moving%jointed, start(1), start(2), start(3), start(4:))
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
     else if (allocated(moving%pair)) then
       associate (machine => moving%pair%machine)

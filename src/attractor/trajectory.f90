@@ -65,18 +65,23 @@ module trajectory
 
 contains
 
-  !> Runs from `x` [m], `v` [m/s], crank at `crank_angle` [rad]. With `log` every event and sample of the
-  !> duration is written down.
-  pure subroutine run_trajectory(moving, catalogue, span, x, v, crank_angle, outcome, log)
+  !> Runs from `x` [m], `v` [m/s], crank at `crank_angle` [rad]; `others`: see `start_strobe`. With `log` every event and
+  !> sample of the duration is written down.
+  pure subroutine run_trajectory(moving, catalogue, span, x, v, crank_angle, outcome, log, others)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: x, v, crank_angle
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
+    real(wp), intent(in), optional :: others(:)
     type(course_t) :: course
     logical :: slipped
-    call begin_course(moving, span, x, v, crank_angle, course)
+    if (present(others)) then
+      call begin_course(moving, span, [x, v, crank_angle, others], course)
+    else
+      call begin_course(moving, span, [x, v, crank_angle], course)
+    end if
     if (present(log)) then
       log%book%at_start = energy_now(moving, course)
       log%origin = -course%state%time
@@ -96,13 +101,13 @@ contains
     call conclude(moving, catalogue, course, outcome)
   end subroutine run_trajectory
 
-  !> A body set off from `x` [m], `v` [m/s], with the crank at `crank_angle` [rad].
-  pure subroutine begin_course(moving, span, x, v, crank_angle, course)
+  !> A body set off from a `start` as `start_strobe` has it.
+  pure subroutine begin_course(moving, span, start, course)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
-    real(wp), intent(in) :: x, v, crank_angle
+    real(wp), intent(in) :: start(:)
     type(course_t), intent(out) :: course
-    course%strobe_t = start_strobe(moving, [x, v, crank_angle])
+    course%strobe_t = start_strobe(moving, start)
     call reset_tally(course%tally, course%state, allocated(moving%pair))
     if (.not. span%duration - span%window > 0) call open_window(moving, course)
     call set_stop(moving, span, course)

@@ -12,7 +12,7 @@ module axis_reader
   use case_values, only: any_number, bounds_t, more_than, take_choice, take_integer, take_integers, &
     take_range, take_real, take_reals, take_text
   use kinds, only: wp
-  use law_table, only: law_choice_t
+  use law_table, only: is_start_parameter, law_choice_t
   use restoring_law, only: position_is_angle
   use text, only: to_text
   use toml_bindings, only: toml_array
@@ -100,7 +100,7 @@ contains
     name = trim(new%name)
     call take_text(source, key, name, required=len(name) == 0)
     call parameter_bounds(laws, canonical_name(name), bounds, found)
-    if (is_start(name)) found = starts_too
+    if (is_start(name) .or. is_start_parameter(name)) found = found .and. starts_too
     if (found) then
       new%name = canonical_name(name)
       new%unit = trim(bounds%unit)

@@ -10,6 +10,7 @@ module case_check
   use case_source, only: case_source_t, report
   use case_type, only: case_t
   use errors, only: error_t, fail
+  use grid, only: sample_axis
   use jointed_section, only: start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
@@ -106,7 +107,7 @@ contains
     integer :: i
     combinations = 1
     do i = 1, size(axes)
-      of_law(i) = .not. is_start(trim(axes(i)%name))
+      of_law(i) = .not. is_start(trim(axes(i)%name)) .and. axes(i)%name /= sample_axis
       if (of_law(i)) combinations = combinations*size(axes(i)%values)
     end do
     varied = pack(axes, of_law)
@@ -170,7 +171,8 @@ contains
       if (is_good(source, ['spring  ', 'friction', 'drive   ', 'watch   '])) call check_bodies_at_start(source, the_case)
       return
     end if
-    is_axis = .false.
+    call check_drawn(source, the_case)
+    is_axis = any(the_case%sample%names == 'x0')
     do i = 1, size(the_case%axes)
       if (the_case%axes(i)%name /= 'x0') cycle
       is_axis = .true.
@@ -193,22 +195,24 @@ contains
     type(case_source_t), intent(inout) :: source
     type(case_t), intent(in) :: the_case
     type(law_choice_t) :: laws(size(the_case%laws))
+    type(axis_t), allocatable :: axes(:)
     type(motion_t) :: moving
     type(jointed_state_t) :: state
     type(error_t), allocatable :: error
     character(len=:), allocatable :: at
     real(wp) :: start(3), value
     integer :: corner, i
-    do corner = 0, 2**min(size(the_case%axes), most_corner_axes) - 1
+    axes = with_ranges(the_case)
+    do corner = 0, 2**min(size(axes), most_corner_axes) - 1
       laws = the_case%laws
       start = [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle]
       at = ''
-      do i = 1, size(the_case%axes)
-        associate (values => the_case%axes(i)%values)
+      do i = 1, size(axes)
+        associate (values => axes(i)%values)
           value = values(merge(size(values), 1, btest(corner, i - 1)))
         end associate
-        at = at//' '//trim(the_case%axes(i)%name)//' = '//to_text(value)
-        select case (the_case%axes(i)%name)
+        at = at//' '//trim(axes(i)%name)//' = '//to_text(value)
+        select case (axes(i)%name)
         case ('x0')
           start(1) = value
         case ('v0')
@@ -216,7 +220,7 @@ contains
         case ('crank_angle')
           start(3) = value
         case default
-          call set_parameter(laws, trim(the_case%axes(i)%name), value, error)
+          call set_parameter(laws, trim(axes(i)%name), value, error)
         end select
       end do
       call machine_of(laws, options_t(), moving, error)
@@ -229,6 +233,39 @@ contains
       return
     end do
   end subroutine check_bodies_at_start
+
+  !> The axes, with the ranges of the starts that are drawn in the place of the axis that counts them.
+  pure function with_ranges(the_case) result(axes)
+    type(case_t), intent(in) :: the_case
+    type(axis_t), allocatable :: axes(:)
+    type(axis_t) :: range
+    integer :: i
+    axes = pack(the_case%axes, the_case%axes%name /= sample_axis)
+    if (size(axes) == size(the_case%axes)) return
+    do i = 1, size(the_case%sample%names)
+      range%name = the_case%sample%names(i)
+      range%unit = trim(the_case%sample%units(i))
+      range%values = [minval(the_case%sample%drawn(i, :)), maxval(the_case%sample%drawn(i, :))]
+      axes = [axes, range]
+    end do
+  end function with_ranges
+
+  !> No start that is drawn lies beyond a barrier.
+  subroutine check_drawn(source, the_case)
+    type(case_source_t), intent(inout) :: source
+    type(case_t), intent(in) :: the_case
+    character(len=:), allocatable :: problem
+    integer :: i, k
+    do i = 1, size(the_case%sample%names)
+      if (the_case%sample%names(i) /= 'x0' .or. .not. allocated(the_case%sample%drawn)) cycle
+      do k = 1, 2
+        associate (values => the_case%sample%drawn(i, :))
+          problem = beyond(the_case, the_case%axes, merge(minval(values), maxval(values), k == 1))
+        end associate
+        if (len(problem) > 0) call report(source, 'sample['//to_text(i)//']', problem)
+      end do
+    end do
+  end subroutine check_drawn
 
   !> The same for the starts of the sweep; `skip_start`: do not look at start.x0.
   subroutine check_sweep_starts(source, the_case, skip_start)
@@ -285,8 +322,8 @@ contains
   subroutine require_axes(the_case, error)
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    if (size(the_case%axes) < 2) then
-      call fail(error, exit_bad_case, the_case%path//': a basin needs two or more tables [[axis]], found '// &
+    if (size(the_case%axes) < 2 .and. .not. any(the_case%axes%name == sample_axis)) then
+      call fail(error, exit_bad_case, the_case%path//': a basin needs two or more tables [[axis]], or [[sample]], found '// &
                 to_text(size(the_case%axes)))
     end if
   end subroutine require_axes

@@ -5,7 +5,8 @@
 !> case to the bit.
 module case_echo
   use axis, only: axis_t, linear_values
-  use case_type, only: case_t, sweep_t
+  use case_type, only: case_t, sample_t, sweep_t
+  use grid, only: sample_axis
   use kinds, only: wp
   use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, &
     part_kind, part_law, path_of, value_of
@@ -40,7 +41,10 @@ contains
              line('seed', to_text(record%seed))
     end associate
     if (size(the_case%axes) > 0) then
-      text = text//newline//'[grid]'//newline//'tile = '//integers(the_case%tile)//newline
+      text = text//newline//'[grid]'//newline//'tile = '// &
+             integers(pack(the_case%tile, the_case%axes%name /= sample_axis))//newline
+      if (size(the_case%sample%names) > 0) text = text//line('samples', to_text(the_case%sample%count))// &
+                                                  line('seed', to_text(the_case%sample%seed))
     end if
   end function echo_case
 
@@ -68,12 +72,32 @@ contains
       line('samples_per_period', to_text(the_case%trajectory%samples_per_period))
     do i = 1, size(the_case%axes)
       if (kind /= '' .and. kind /= 'basin') exit
+      if (the_case%axes(i)%name == sample_axis) then
+        text = text//samples_text(the_case%sample)
+        cycle
+      end if
       text = text//newline//'[[axis]]'//newline//line('name', quoted(trim(the_case%axes(i)%name)))// &
              values_text(the_case%axes(i)%values)
     end do
     if (the_case%refine%active) text = text//refine_text(the_case%refine)
     if (the_case%sweep%present .and. (kind == '' .or. kind == 'sweep')) text = text//sweep_text(the_case%sweep)
   end function deciding_text
+
+  !> The tables [[sample]]. Their number and seed stand in [grid], and here for the identity of the case.
+  pure function samples_text(sample) result(text)
+    type(sample_t), intent(in) :: sample
+    character(len=:), allocatable :: text
+    integer :: i
+    text = newline//'# '//to_text(sample%count)//' starts, seed '//to_text(sample%seed)//newline
+    do i = 1, size(sample%names)
+      text = text//newline//'[[sample]]'//newline//line('name', quoted(trim(sample%names(i))))
+      if (sample%kinds(i) == 'uniform') then
+        text = text//line('from', to_text(sample%first(i)))//line('to', to_text(sample%second(i)))
+      else
+        text = text//line('mean', to_text(sample%first(i)))//line('deviation', to_text(sample%second(i)))
+      end if
+    end do
+  end function samples_text
 
   !> Whether a law is an effect that shows in records only.
   pure logical function is_sensor(law)

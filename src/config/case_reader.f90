@@ -17,6 +17,7 @@ module case_reader
   use law_reader, only: read_laws
   use law_table, only: largest_angle
   use restoring_law, only: position_is_angle
+  use sample_reader, only: read_samples
   use structure_data, only: structure_file_reader
   use refinement, only: largest_block, largest_step, most_probes
   use toml_bindings, only: read_text_file
@@ -67,6 +68,7 @@ contains
     call read_integrator(source, the_case)
     call read_attractors(source, the_case)
     call read_axes(source, the_case)
+    call read_samples(source, the_case)
     call read_refine(source, the_case)
     call read_sweep(source, the_case)
     call read_trajectory(source, the_case)

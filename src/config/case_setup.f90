@@ -5,7 +5,7 @@
 module case_setup
   use axis, only: axis_t
   use case_type, only: case_t
-  use grid, only: grid_t, make_grid, two_axes
+  use grid, only: grid_t, make_grid, sample_axis, two_axes
   use kinds, only: int64, wp
   use lanes, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
@@ -70,8 +70,13 @@ contains
     type(case_t), intent(in) :: the_case
     type(axis_t), intent(in) :: axes(:)
     type(grid_t) :: grid
-    grid = make_grid(axes, the_case%laws, &
-                     [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], options_of(the_case))
+    associate (start => [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], sample => the_case%sample)
+      if (any(axes%name == sample_axis)) then
+        grid = make_grid(axes, the_case%laws, start, options_of(the_case), sample%names, sample%drawn)
+      else
+        grid = make_grid(axes, the_case%laws, start, options_of(the_case))
+      end if
+    end associate
   end function grid_of
 
   !> Where the output of a command goes: as asked, or the name of the case without its folder, with .COMMAND.h5.
@@ -97,7 +102,7 @@ contains
     integer :: tile(size(grid%shape))
     logical :: free(size(grid%shape))
     integer :: i, starts
-    starts = count(grid%start_axis > 0)
+    starts = count([(any(grid%start_axis == i), i=1, size(tile))])
     do i = 1, size(tile)
       free(i) = any(grid%start_axis == i) .or. starts == 0
       if (any(grid%start_axis == i)) then

@@ -3,7 +3,7 @@
 
 !> The case: everything that a run needs, in SI units.
 module case_type
-  use axis, only: axis_t
+  use axis, only: axis_t, name_length
   use kinds, only: wp
   use law_table, only: law_choice_t
   use refinement, only: refine_t
@@ -55,6 +55,18 @@ module case_type
     integer :: second_look = 128
   end type attractors_t
 
+  !> Starts drawn at random.
+  type, public :: sample_t
+    !> How many, and from which sequence.
+    integer :: count = 1000, seed = 1
+    !> The starts that are drawn: names, units, 'uniform' between `first` and `second` or 'normal' with mean and deviation.
+    character(len=name_length), allocatable :: names(:)
+    character(len=8), allocatable :: units(:), kinds(:)
+    real(wp), allocatable :: first(:), second(:)
+    !> A row for each of them, a column for each point.
+    real(wp), allocatable :: drawn(:, :)
+  end type sample_t
+
   type, public :: sweep_t
     !> Whether the case has a [sweep] table, and if it is not wanted one that lacks nothing; the rest is meaningless without it.
     logical :: present = .false.
@@ -96,7 +108,9 @@ module case_type
     type(run_t) :: run
     type(integrator_t) :: integrator
     type(attractors_t) :: attractors
+    !> With starts drawn at random the last axis counts them.
     type(axis_t), allocatable :: axes(:)
+    type(sample_t) :: sample
     !> Points of a tile along each axis, 0 = automatic.
     integer, allocatable :: tile(:)
     type(refine_t) :: refine

@@ -15,7 +15,8 @@ module basin_driver
   use endings, only: report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
-  use grid, only: two_axes
+  use sample_shares, only: add_sample_shares, add_samples, share_with_interval
+  use grid, only: grid_t, two_axes
   use journal, only: json_text
   use kinds, only: int64, wp
   use map_file, only: map_file_t
@@ -136,6 +137,7 @@ contains
     character(len=name_length), allocatable, intent(out) :: dimensions(:)
     call describe_file(session, 'basin', schema)
     call add_axes(schema, work%grid%axes, dimensions)
+    call add_samples(schema, session%the_case%sample)
     if (work%refine%active) then
       call add_refined_variables(schema, dimensions)
     else
@@ -153,6 +155,7 @@ contains
     type(schema_t) :: extra
     call sum_counts(session, work)
     call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
+    if (allocated(work%grid%drawn)) call add_sample_shares(extra, work%captured, points_of_slice(work%grid))
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
     call finish_tiles(session, file, complete, extra)
     call report_shares(session, work)
@@ -164,10 +167,11 @@ contains
     type(case_t), intent(in) :: the_case
     type(basin_work_t), intent(inout) :: work
     work%refine = the_case%refine
+    work%marks = marks_of_attractor
+    if (.not. work%refine%active) return
     work%refined_axes = two_axes(work%grid)
     work%refine%block = automatic_block(work%refine, work%grid%shape(work%refined_axes), layers_of(work%grid%shape, &
                                                                                                    work%refined_axes))
-    work%marks = marks_of_attractor
   end subroutine prepare_refinement
 
   !> Says what a dry run would do, with a rate from a few points, and ends the program.
@@ -240,6 +244,29 @@ contains
         to_text(share)//', "points": '//to_text(work%regimes(i)))
     end do
     call report_reasons(session%journal, work%reasons)
+    if (allocated(work%grid%drawn) .and. size(work%catalogues) == 1) call report_sample_shares(session, work)
   end subroutine report_shares
+
+  !> Points of one slice.
+  pure integer(int64) function points_of_slice(grid)
+    type(grid_t), intent(in) :: grid
+    points_of_slice = product(int(grid%shape, int64))/grid%slices
+  end function points_of_slice
+
+  !> Shares of the attractors of starts drawn at random.
+  subroutine report_sample_shares(session, work)
+    type(session_t), intent(inout) :: session
+    type(basin_work_t), intent(in) :: work
+    real(wp) :: share(3)
+    integer :: k
+    do k = 1, size(work%catalogues(1)%attractors)
+      share = share_with_interval(work%captured(k), points_of_slice(work%grid))
+      call session%journal%line('basin_share', '  attractor '//to_text(work%catalogues(1)%attractors(k)%id)//': '// &
+        to_text(100*share(1), 4)//' % of the starts, between '//to_text(100*share(2), 4)//' % and '// &
+        to_text(100*share(3), 4)//' % with 95 % confidence', '"attractor": '// &
+        to_text(work%catalogues(1)%attractors(k)%id)//', "share": '//to_text(share(1))//', "lower": '// &
+        to_text(share(2))//', "upper": '//to_text(share(3)))
+    end do
+  end subroutine report_sample_shares
 
 end module basin_driver

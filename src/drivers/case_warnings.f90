@@ -7,9 +7,11 @@ module case_warnings
   use case_type, only: case_t
   use contact_law, only: contact_at_speed, contact_hunt_crossley, contact_t
   use drive_law, only: same_force
+  use eigen, only: undamped_modes
   use errors, only: error_t
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
+  use jointed, only: joint_contact, jointed_t
   use journal, only: journal_t
   use kinds, only: int64, wp
   use motion, only: motion_t
@@ -21,6 +23,9 @@ module case_warnings
   private
 
   public :: warn_about
+
+  !> Share of the upper half of the modes in what an impact feels, above which restitution is in doubt.
+  real(wp), parameter :: doubtful_share = 0.2_wp
 
 contains
 
@@ -49,8 +54,29 @@ contains
         end if
       end associate
     end if
+    if (allocated(moving%jointed)) call warn_about_restitution(the_case, moving%jointed%machine, journal)
     if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
+
+  !> Says if a rigid contact acts on a flexible structure, where restitution does not converge with the number of modes
+  !> (Melcher, Champneys, Wagg, Phil. Trans. R. Soc. A, 2013).
+  subroutine warn_about_restitution(the_case, machine, journal)
+    type(case_t), intent(in) :: the_case
+    type(jointed_t), intent(in) :: machine
+    type(journal_t), intent(inout) :: journal
+    real(wp) :: squares(machine%n), shapes(machine%n, machine%n), felt(machine%n), share
+    integer :: i, j
+    if (machine%n < 2 .or. .not. any([(index(the_case%laws(i)%name, 'structure:') == 1, i=1, size(the_case%laws))])) return
+    call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind /= joint_contact) cycle
+      felt = matmul(machine%joints(j)%row, shapes)**2
+      share = sum(felt((machine%n + 3)/2:))/sum(felt)
+      if (share > doubtful_share) call journal%line('warning', 'warning: the upper half of the modes has '// &
+        to_text(100*share, 3)//' % of what an impact at '//trim(machine%joints(j)%name)//' feels: its restitution says more '// &
+        'about the number of modes than about the material. A soft contact (law = "kelvin_voigt") does not depend on it')
+    end do
+  end subroutine warn_about_restitution
 
   !> Says if a record of a force jumps where it begins again.
   subroutine warn_about_force(command, the_case, moving, journal)

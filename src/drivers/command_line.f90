@@ -32,6 +32,8 @@ module command_line
     !> Which share of the tiles to compute, and of how many; 0 = all.
     integer :: shard = 0, shard_count = 0
     character(len=:), allocatable :: output, list, csv, record, log, tile_times
+    !> Where the sketch of the machine goes.
+    character(len=:), allocatable :: draw
     !> The share of a map from which to take the attractors.
     character(len=:), allocatable :: catalogue
     !> `--set` arguments.
@@ -74,6 +76,7 @@ contains
     command%tile_times = ''
     command%log = ''
     command%catalogue = ''
+    command%draw = ''
     allocate (command%overrides(0), command%shards(0))
     position = 0
     do while (position < command_argument_count())
@@ -140,6 +143,8 @@ contains
       call fail(error, exit_usage, '--record belongs to the command trajectory')
     else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--tile-times belongs to the commands '//join(resumable, ', '))
+    else if (len(command%draw) > 0 .and. any(command%name == [character(len=10) :: 'merge', 'laws', 'info', 'verify'])) then
+      call fail(error, exit_usage, '--draw belongs to the commands that read a case')
     else if (command%resume .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
     else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
@@ -163,6 +168,9 @@ contains
                                              command%output == command%log, command%csv == command%log, &
                                              command%record == command%log, command%tile_times == command%log])) then
       call fail(error, exit_usage, "--log '"//command%log//"' is the name of another file of the run")
+    else if (len(command%draw) > 0 .and. any([command%path == command%draw, command%list == command%draw, &
+                                              command%log == command%draw])) then
+      call fail(error, exit_usage, "--draw '"//command%draw//"' is the name of another file of the run")
     else if (len(command%csv) > 0 .and. (command%csv == command%path .or. command%csv == command%list)) then
       call fail(error, exit_usage, "--csv '"//command%csv//"' would replace what is read")
     else if (len(command%csv) > 0 .and. command%csv == command%output) then
@@ -207,7 +215,7 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--parameter', '--from', '--to', '--searches', '--periods', &
+          '--draw', '--parameter', '--from', '--to', '--searches', '--periods', &
           '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
@@ -233,7 +241,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv', '--record', '--log', '--tile-times', '--catalogue')
+    case ('-o', '--output', '--list', '--csv', '--record', '--log', '--tile-times', '--catalogue', '--draw')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -293,6 +301,8 @@ contains
       command%tile_times = value
     case ('--catalogue')
       command%catalogue = value
+    case ('--draw')
+      command%draw = value
     case ('--csv')
       command%csv = value
     case ('--log')
@@ -417,6 +427,7 @@ contains
       '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case)'//nl// &
       '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'//nl// &
       '  --validate         checks the case and stops'//nl// &
+      '  --draw FILE.svg    draws the machine as it was understood and stops'//nl// &
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &
       '  --force            replaces an existing output'//nl// &
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &

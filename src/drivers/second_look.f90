@@ -259,7 +259,7 @@ contains
     real(wp), allocatable :: before(:), everything(:)
     integer(int64) :: slice(size(row))
     logical :: touched(size(catalogues)), mine(size(catalogues))
-    real(wp) :: start(3, 1)
+    real(wp) :: start(3 + size(grid%others), 1)
     integer :: i, k, highest
     slice = -1
     do i = 1, size(row)

@@ -11,7 +11,7 @@ module session
   use case_type, only: case_t
   use case_warnings, only: warn_about
   use command_line, only: command_t
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use files, only: give_lock, take_lock
   use journal, only: journal_t
   use launcher, only: launched_ranks
@@ -23,6 +23,7 @@ module session
   use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
+  use sketch, only: sketch_of
   use structure_file, only: read_structure_file
   use system, only: exit_program, sleep_microseconds
   use team, only: team_t
@@ -81,7 +82,28 @@ contains
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
                                                    wants_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
+    if (len(command%draw) > 0) call draw_machine(session)
   end subroutine open_session
+
+  !> Writes the sketch of the machine and ends the program. Code 73 if it cannot be created.
+  subroutine draw_machine(session)
+    type(session_t), intent(inout) :: session
+    type(error_t), allocatable :: error
+    integer :: unit, status
+    character(len=256) :: reason
+    if (session%team%is_root()) then
+      call check_result(session%command%draw, session%command%force, error)
+      if (.not. allocated(error)) then
+        open (newunit=unit, file=session%command%draw, status='replace', action='write', iostat=status, iomsg=reason)
+        if (status == 0) write (unit, '(a)', iostat=status, iomsg=reason) sketch_of(session%the_case)
+        if (status == 0) close (unit, iostat=status, iomsg=reason)
+        if (status /= 0) call fail(error, exit_cannot_create, session%command%draw//': cannot be written: '//trim(reason))
+      end if
+    end if
+    call session%stop_if(error)
+    call session%journal%line('written', 'wrote '//session%command%draw)
+    call session%end_with(exit_done)
+  end subroutine draw_machine
 
   !> Starts the team for the work that ends in the file `path`, and the record of it. Ends the program if an output
   !> cannot be created. `tiled`: the file is written over a working file.

@@ -15,7 +15,7 @@ module verify_driver
   use command_line, only: command_t
   use errors, only: error_t, fail
   use file_layout, only: map_variables
-  use grid, only: grid_t, point_slice, point_start, slice_laws
+  use grid, only: grid_t, point_laws, point_slice, point_start, slice_laws
   use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64, real32, wp
@@ -300,15 +300,14 @@ contains
     type(catalogue_t) :: own
     type(outcome_t) :: outcome(1)
     type(journey_t) :: whole
-    real(wp) :: start(3, 1), results(6, 1)
+    real(wp) :: start(3 + size(grid%others), 1), results(6, 1)
     start(:, 1) = point_start(grid, index)
     whole = journey
     whole%span%stop_when_captured = .false.
     allocate (own%attractors(0))
     if (size(catalogues) > 0) own = catalogues(point_slice(grid, index) + 1)
     call run_trajectories(whole, own%attractors, start, outcome)
-    call run_reference(slice_laws(grid, point_slice(grid, index)), grid%options, whole%span, own%attractors, start, &
-                       results, error)
+    call run_reference(point_laws(grid, index), grid%options, whole%span, own%attractors, start(:3, :), results, error)
     if (allocated(error)) return
     if (size(catalogues) > 0) then
       if (nint(results(2, 1)) /= nint(values(2))) audit%flips = audit%flips + 1

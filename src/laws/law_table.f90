@@ -17,7 +17,7 @@ module law_table
 
   public :: law_row_t, parameter_row_t
   public :: find_law, law_names, parameters_of, table_of, path_of, part_kind, part_law, is_hidden, law_choice, value_of, list_of, &
-    set_value, change_parameter, split_element
+    set_value, change_parameter, split_element, is_start_parameter
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
@@ -234,8 +234,20 @@ contains
   pure logical function is_hidden(row)
     type(parameter_row_t), intent(in) :: row
     is_hidden = row%family == part_family .and. (index(row%law, 'point:') == 1 .or. &
-                                                 any(row%name == [character(len=6) :: 'first_end', 'second_end', 'body']))
+                                                 any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body']))
   end function is_hidden
+
+  !> Whether a path names where a body of several, or a coordinate of a structure, starts: 'body.NAME.x0',
+  !> 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
+  pure logical function is_start_parameter(path)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: name
+    integer :: element, mark
+    call split_element(path, name, element)
+    mark = index(name, '.', back=.true.)
+    is_start_parameter = (name(mark + 1:) == 'x0' .or. name(mark + 1:) == 'v0') .and. &
+      ((index(name, 'body.') == 1 .and. mark > 5 .and. element == 0) .or. (index(name, 'structure.') == 1 .and. element > 0))
+  end function is_start_parameter
 
   !> A law with every parameter at its default (zero where it has none, empty lists): set the
   !> others before use. Stops nothing: an unknown law has no parameters.

@@ -9,9 +9,11 @@ module axis
 
   public :: linear_values
 
+  integer, parameter, public :: name_length = 48
+
   type, public :: axis_t
     !> 'x0', 'v0', 'crank_angle' or 'family.parameter'.
-    character(len=48) :: name = ''
+    character(len=name_length) :: name = ''
     !> SI unit, '1' for none.
     character(len=:), allocatable :: unit
     !> Ascending values in that unit.

@@ -110,12 +110,12 @@ contains
       starts = slice_starts(grid, sample, seed)
       return
     end if
-    allocate (starts(3, 0))
+    allocate (starts(3 + size(grid%others), 0))
     ! A start has no place for the driving body of two.
     if (is_pair(grid%laws)) return
     do i = 1, size(neighbours)
       if (neighbours(i)%rests) cycle
-      starts = reshape([starts, neighbours(i)%points(:2, 1), 0.0_wp], [3, size(starts, 2) + 1])
+      starts = reshape([starts, neighbours(i)%points(:2, 1), 0.0_wp, grid%others], [size(starts, 1), size(starts, 2) + 1])
     end do
   end function search_starts
 
@@ -187,7 +187,7 @@ contains
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
     type(outcome_t) :: outcomes(size(members))
-    real(wp) :: starts(3, size(members))
+    real(wp) :: starts(3 + size(grid%others), size(members))
     integer :: i
     do i = 1, size(members)
       starts(:, i) = point_start(grid, index(:, members(i)))
@@ -207,13 +207,13 @@ contains
     real(wp), intent(inout) :: values(:, :)
     type(attractor_t), allocatable :: own(:)
     type(outcome_t) :: outcome
-    real(wp) :: start(3)
+    real(wp) :: start(3 + size(grid%others))
     integer :: i
     do i = 1, size(members)
       start = point_start(grid, index(:, members(i)))
       if (allocated(own)) deallocate (own)
-      call discover_attractors(journey%moving, journey%span, reshape(start, [3, 1]), max_period, own)
-      call run_trajectory(journey%moving, own, journey%span, start(1), start(2), start(3), outcome)
+      call discover_attractors(journey%moving, journey%span, reshape(start, [size(start), 1]), max_period, own)
+      call run_trajectory(journey%moving, own, journey%span, start(1), start(2), start(3), outcome, others=start(4:))
       values(members(i), :) = outcome_values(outcome)
     end do
   end subroutine lone_points

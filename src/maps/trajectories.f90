@@ -39,7 +39,7 @@ module trajectories
 
 contains
 
-  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad]; one column each).
+  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_strobe` takes; one column each).
   pure subroutine run_trajectories(journey, catalogue, starts, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
@@ -50,7 +50,8 @@ contains
     integer :: lane, i, next
     if (.not. journey%flow%available) then
       do i = 1, size(starts, 2)
-        call run_trajectory(journey%moving, catalogue, journey%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i))
+        call run_trajectory(journey%moving, catalogue, journey%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i), &
+                            others=starts(4:, i))
       end do
       return
     end if
@@ -92,7 +93,7 @@ contains
       passenger%unseen = .false.
       associate (start => starts(:, next), outcome => outcomes(next))
         next = next + 1
-        call begin_course(journey%moving, journey%span, start(1), start(2), start(3), passenger%course)
+        call begin_course(journey%moving, journey%span, start, passenger%course)
         call go_on(journey, catalogue, start, passenger, outcome)
       end associate
       if (passenger%course%phase /= phase_over) then
@@ -142,7 +143,7 @@ contains
   pure subroutine attend(journey, catalogue, start, lane, passenger, batch, outcome)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
-    real(wp), intent(in) :: start(3)
+    real(wp), intent(in) :: start(:)
     integer, intent(in) :: lane
     type(passenger_t), intent(inout) :: passenger
     type(lane_batch_t), intent(inout) :: batch
@@ -181,7 +182,7 @@ contains
   pure subroutine go_on(journey, catalogue, start, passenger, outcome)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
-    real(wp), intent(in) :: start(3)
+    real(wp), intent(in) :: start(:)
     type(passenger_t), intent(inout) :: passenger
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped
@@ -194,7 +195,8 @@ contains
       if (course%phase /= phase_over) return
       if (passenger%unseen .and. course%reason == 0 .and. course%captured == 0 .and. journey%describe == describe_all) then
         ! It was captured when its window began, and lost: once more, in the event loop.
-        call run_trajectory(journey%moving, catalogue, journey%span, start(1), start(2), start(3), outcome)
+        call run_trajectory(journey%moving, catalogue, journey%span, start(1), start(2), start(3), outcome, &
+                            others=start(4:))
       else
         call conclude(journey%moving, catalogue, course, outcome)
       end if

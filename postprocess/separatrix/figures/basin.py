@@ -50,6 +50,8 @@ def figures(
     Without any label there is no map of the attractors, unless it is asked for; "shares" is their share over
     the parameter of a stack of maps. `path`: the file, which is read by slabs; None: the result is in memory.
     """
+    if "sample" in result["regime"].dims and field in (None, "shares"):
+        return {"shares": shares.sampled(result, title, look)}
     if field == "shares":
         return {"shares": shares.diagram(result, title, look)}
     names = [field] if field else [*(["attractor"] if _labelled(result) else []), "regime"]

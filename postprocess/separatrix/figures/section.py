@@ -12,10 +12,10 @@ from separatrix.errors import CaseError
 from separatrix.figures.caption import resolved_case
 from separatrix.library import Model
 from separatrix.open import table
+from separatrix.variables import is_start
 
 # Attractors of a slice, and points of one, beyond which marks hide the map.
 _MOST, _LONGEST = 12, 64
-_STARTS = ("x0", "v0", "crank_angle")
 
 
 def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
@@ -29,7 +29,7 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
     case = resolved_case(result)
     if "attractor" not in catalogue or not case or "driven_mass" in case.get("body", {}):
         return
-    parameters = [name for name in result["regime"].dims if name not in _STARTS]
+    parameters = [name for name in result["regime"].dims if not is_start(name)]
     shape = tuple(result.sizes[name] for name in parameters)
     number = int(np.ravel_multi_index([place[name] for name in parameters], shape)) if parameters else 0
     rows = np.flatnonzero((catalogue["slice"].values == number) & (catalogue["count"].values > 0))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shares of the attractors of a stack of maps over its parameter."""
+"""Shares of the attractors over a parameter, and of starts drawn at random with their intervals."""
 
 import numpy as np
 import xarray as xr
@@ -14,15 +14,15 @@ from separatrix.figures.caption import caption_pieces, describe_case, shown, sta
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, count_text, plain
 from separatrix.layout import compose
-
-_STARTS = ("x0", "v0", "crank_angle")
+from separatrix.open import table
+from separatrix.variables import is_start
 
 
 def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the share of each attractor over the one parameter of a map that varies, stacked to 100 %."""
     result = look.selected(result)
     labels = result["attractor"]
-    varying = [name for name in labels.dims if name not in _STARTS and result.sizes[name] > 1]
+    varying = [name for name in labels.dims if not is_start(name) and result.sizes[name] > 1]
     if len(varying) != 1:
         raise SeparatrixError(
             f"shares: found {len(varying)} parameters that vary, allowed one; choose values of the others",
@@ -55,6 +55,56 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     caption = caption_pieces(result, look, [*describe_case(result), *start_pieces(result)])
     caption += [
         f"{count_text(slices.shape[1])} starts at each of {values.size} values",
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), handles)
+    return figure
+
+
+def sampled(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the shares of the attractors of starts drawn at random, with intervals of 95 % confidence.
+
+    Over the one parameter that varies, or one beside the other.
+    """
+    labels, catalogue = result["attractor"], table(result, "catalogue")
+    varying = [name for name in labels.dims if not is_start(name)]
+    if len(varying) > 1:
+        raise SeparatrixError(f"shares: found {len(varying)} parameters, allowed one", USAGE)
+    codes, numbers = np.unique(labels.values, return_counts=True)
+    totals = dict(zip(codes.tolist(), numbers.tolist(), strict=True))
+    entries = recoloured(classes(result, "attractor", totals), look.colours)
+    places = result[varying[0]].values if varying else np.array([0.0])
+    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 50.0)))
+    ax = figure.add_subplot()
+    columns = {
+        name: catalogue[name].values for name in ("slice", "attractor", "share", "share_lower", "share_upper")
+    }
+    for number, entry in enumerate(entries):
+        mine = np.isin(columns["attractor"], entry.codes)
+        if not mine.any():
+            continue
+        at = places[columns["slice"][mine]] if varying else np.full(mine.sum(), number)
+        share, low, high = (100 * columns[name][mine] for name in ("share", "share_lower", "share_upper"))
+        ax.errorbar(
+            at, share, np.abs([share - low, high - share]), color=entry.colour, marker="o", markersize=3,
+            capsize=2, linewidth=0.8, linestyle="-" if varying else "none",
+        )  # fmt: skip
+    ax.set_ylim(-3, 103)
+    ax.set_ylabel("share of the starts (%)")
+    if varying:
+        ax.set_xlabel(axis_label(result[varying[0]]))
+    else:
+        ax.set_xlim(-0.5, len(entries) - 0.5)
+        ax.set_xticks(range(len(entries)), [entry.text.split(":")[0] for entry in entries])
+    handles = [
+        Patch(facecolor=entry.colour, edgecolor="#555555", linewidth=0.3, label=entry.text)
+        for entry in entries
+    ]
+    drawn = [name for name in result.data_vars if is_start(name) and name != "sample"]
+    caption = caption_pieces(result, look, [*describe_case(result)])
+    caption += [
+        f"{count_text(result.sizes['sample'])} starts drawn at random over "
+        f"{', '.join(plain(name) for name in drawn)}; bars: 95 % confidence",
         plain(version_text(result)),
     ]
     compose(figure, title, shown(caption, look), handles)
