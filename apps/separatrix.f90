@@ -12,6 +12,7 @@ program separatrix
   use laws_driver, only: run_laws
   use merge_driver, only: run_merge
   use points_driver, only: run_points
+  use stability_driver, only: run_stability
   use sweep_driver, only: run_sweep
   use status, only: exit_io
   use system, only: exit_at_once, exit_program, sleep_microseconds
@@ -41,6 +42,8 @@ program separatrix
         call run_sweep(command)
       case ('branches')
         call run_branches(command)
+      case ('stability')
+        call run_stability(command)
       case ('trajectory')
         call run_trajectory_command(command)
       case ('points')

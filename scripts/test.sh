@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-scripts/bootstrap.sh --browser
+scripts/bootstrap.sh --browser --docs
 # shellcheck source=scripts/environment.sh
 source scripts/environment.sh
 jobs=$(nproc)

@@ -11,13 +11,19 @@ from pathlib import Path
 
 import numpy as np
 import report
+import rows_report
+from accuracy import Accuracy, compare
 from compiled import Compiled, build
 from ours import FULL, ONE_BY_ONE, Maps, Program, Timing, flips, read_points
-from published_case import SEED, SOURCE, TOLERANCE, Outcomes, published_machine, start_points
 from python_peers import Heyoka, Scipy
 from reference_run import run_on_all_cores
+from rows import ROWS, Row
+from rows_run import keep, measure
+
+from machine import SEED, SOURCE, TOLERANCE, Outcomes, published_machine, start_points
 
 BATCH = 8
+MACHINES = SOURCE / "docs" / "performance_machines.md"
 
 
 @dataclass
@@ -85,17 +91,6 @@ class Peer:
 
 
 @dataclass
-class Accuracy:
-    """A contestant against quadruple precision."""
-
-    points: int
-    deviation: float | None
-    """Largest of |dx|/max|x| and |dv|/max|v| of final states, where the numbers of impacts agree."""
-    counts: int | None
-    labels: int
-
-
-@dataclass
 class Results:
     """Everything that the page shows."""
 
@@ -109,18 +104,6 @@ class Results:
     """Coulomb-Stribeck in lanes against one by one."""
     version: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
-
-
-def compare(found: Outcomes, reference: Outcomes) -> Accuracy:
-    """Compare as many starts as both have."""
-    points = min(len(found.x), len(reference.x))
-    same = found.impacts[:points] == reference.impacts[:points]
-    deviation = max(
-        float(np.max(np.abs(mine[:points] - true[:points])[same]) / np.max(np.abs(true)))
-        for mine, true in ((found.x, reference.x), (found.v, reference.v))
-    )
-    labels = int(np.sum(found.label[:points] != reference.label[:points]))
-    return Accuracy(points, deviation, int(np.sum(~same)), labels)
 
 
 def contestants(program: Program, build_folder: Path, sizes: Sizes) -> dict[str, Peer | Maps]:
@@ -184,6 +167,7 @@ def main() -> None:
     """Run everything."""
     parser = argparse.ArgumentParser(prog="bench")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--machines", nargs="*", choices=[row.key for row in ROWS])
     parser.add_argument("--build", type=Path, default=SOURCE / "build")
     parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "performance.md")
     options = parser.parse_args()
@@ -192,20 +176,39 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         program = Program(options.build / "bin" / "separatrix", Path(folder))
         results.version = program.version
-        everybody = contestants(program, options.build, results.sizes)
-        results.timings = {name: [] for name in everybody}
-        names = list(everybody)
-        for number in range(results.sizes.rounds):
-            print(f"bench: round {number + 1} of {results.sizes.rounds}", flush=True)
-            # everybody follows everybody else in turn
-            for name in names[number % len(names) :] + names[: number % len(names)]:
-                results.timings[name].append(everybody[name].round())
-        judge(everybody, options.build / "lib" / "libseparatrix_reference.so", program, results)
+        if options.machines is not None:
+            chosen = tuple(row for row in ROWS if not options.machines or row.key in options.machines)
+            report_machines(chosen, program, options)
+            return
+        run_published(program, options.build, results)
     results.seconds = time.perf_counter() - began
     text = report.page(results, options.quick)
     options.output.write_text(text)
     print(text)
     print(f"bench: wrote {options.output}")
+
+
+def report_machines(chosen: tuple[Row, ...], program: Program, options: argparse.Namespace) -> None:
+    """Measures the machines chosen; the page has them and those that were measured before."""
+    results = []
+    for row in chosen:
+        results.append(measure(row, program, options.build, 3, options.quick))
+        if not options.quick:
+            MACHINES.write_text(rows_report.page(keep(MACHINES.with_suffix(".json"), results)))
+    print(rows_report.speed_table(results), rows_report.accuracy_table(results), sep="\n\n")
+
+
+def run_published(program: Program, build_folder: Path, results: Results) -> None:
+    """The published case, by everybody."""
+    everybody = contestants(program, build_folder, results.sizes)
+    results.timings = {name: [] for name in everybody}
+    names = list(everybody)
+    for number in range(results.sizes.rounds):
+        print(f"bench: round {number + 1} of {results.sizes.rounds}", flush=True)
+        # everybody follows everybody else in turn
+        for name in names[number % len(names) :] + names[: number % len(names)]:
+            results.timings[name].append(everybody[name].round())
+    judge(everybody, build_folder / "lib" / "libseparatrix_reference.so", program, results)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-from published_case import Machine, Outcomes
+
+from machine import Machine, Outcomes
 
 FOLDER = Path(__file__).resolve().parent
 COMPILER = "cc"
@@ -23,7 +24,7 @@ def build(peer: str, folder: Path) -> Path:
     """Compile the driver of a peer and return the library; the compiler's messages go to stderr."""
     folder.mkdir(parents=True, exist_ok=True)
     library = folder / f"libbench_{peer}.so"
-    sources = [FOLDER / f"{peer}_driver.c", FOLDER / "published_case.c"]
+    sources = [FOLDER / f"{peer}_driver.c", FOLDER / "machine.c"]
     subprocess.run([COMPILER, *FLAGS, "-o", library, *sources, *LIBRARIES[peer], "-lm"], check=True)
     return library
 

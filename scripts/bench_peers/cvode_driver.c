@@ -3,7 +3,7 @@
  *
  * SUNDIALS CVODE with its own rootfinding: Adams with fixed-point iteration, the choice for problems that are
  * not stiff, started anew after every event. */
-#include "published_case.h"
+#include "machine.h"
 
 #include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>
@@ -12,38 +12,26 @@
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 typedef struct {
-  const machine_t *machine;
-  int direction; /* sign of v in this phase */
-} flow_t;
-
-typedef struct {
   void *cvode;
   N_Vector y;
-  flow_t flow;
+  phase_t phase;
 } solver_t;
 
 static int derivatives(realtype time, N_Vector y, N_Vector dydt, void *context) {
-  const flow_t *flow = context;
-  const double *state = N_VGetArrayPointer(y);
-  double *rate = N_VGetArrayPointer(dydt);
-  rate[0] = state[1];
-  rate[1] = spring_acceleration(flow->machine, time, state[0]) - flow->direction * flow->machine->friction;
+  rates(context, time, N_VGetArrayPointer(y), N_VGetArrayPointer(dydt));
   return 0;
 }
 
-static int events(realtype time, N_Vector y, realtype *values, void *context) {
-  const flow_t *flow = context;
-  const double *state = N_VGetArrayPointer(y);
-  (void)time;
-  values[0] = flow->direction * state[1];
-  values[1] = state[0] - flow->machine->barrier;
+static int roots(realtype time, N_Vector y, realtype *values, void *context) {
+  int kinds[MOST_EVENTS], count = events_of(context, kinds), i;
+  for (i = 0; i < MOST_EVENTS; i++)
+    values[i] = i < count ? event(context, kinds[i], time, N_VGetArrayPointer(y)).value : 1;
   return 0;
 }
 
 /* Interpolates back from a turning point beyond the barrier to the impact that the sign tests stepped over.
  */
-static double impact_before(solver_t *solver, double turning) {
-  const double barrier = solver->flow.machine->barrier;
+static double passage_before(solver_t *solver, int kind, double turning) {
   double *state = N_VGetArrayPointer(solver->y), current, last, low, high = turning;
   CVodeGetCurrentTime(solver->cvode, &current);
   CVodeGetLastStep(solver->cvode, &last);
@@ -53,7 +41,7 @@ static double impact_before(solver_t *solver, double turning) {
     if (middle <= low || middle >= high)
       break;
     CVodeGetDky(solver->cvode, middle, 0, solver->y);
-    if (state[0] > barrier)
+    if (event(&solver->phase, kind, middle, state).value < 0)
       high = middle;
     else
       low = middle;
@@ -62,36 +50,36 @@ static double impact_before(solver_t *solver, double turning) {
   return high;
 }
 
-/* One phase: on return v = 0 at a turning point, v after the impact at the barrier, or the time is over. */
+/* One phase, to its event or until the time is over. */
 static int run_phase(solver_t *solver, double *time, outcome_t *outcome) {
-  const machine_t *machine = solver->flow.machine;
+  const double duration = solver->phase.machine->duration;
   double *state = N_VGetArrayPointer(solver->y);
-  int found[2], code, hit;
+  int found[MOST_EVENTS], kinds[MOST_EVENTS], count = events_of(&solver->phase, kinds), code, passed;
   CVodeReInit(solver->cvode, *time, solver->y);
-  CVodeSetStopTime(solver->cvode, machine->duration);
-  code = CVode(solver->cvode, machine->duration, solver->y, time, CV_NORMAL);
+  CVodeSetStopTime(solver->cvode, duration);
+  code = CVode(solver->cvode, duration, solver->y, time, CV_NORMAL);
   if (code != CV_ROOT_RETURN)
     return code < 0;
   CVodeGetRootInfo(solver->cvode, found);
-  hit = found[1] != 0;
-  if (!hit && state[0] > machine->barrier) {
-    hit = 1;
+  passed = found[1] != 0;
+  if (!passed && count > 1 && event(&solver->phase, kinds[1], *time, state).value < 0) {
+    passed = 1;
     outcome->repaired += 1;
-    *time = impact_before(solver, *time);
+    *time = passage_before(solver, kinds[1], *time);
   }
-  state[1] = hit ? impact(machine, *time, state[1], outcome) : 0;
-  if (hit)
-    state[0] = machine->barrier;
+  end_phase(&solver->phase, passed ? kinds[1] : TURNING, *time, state, outcome);
   return 0;
 }
 
 static int run_one(solver_t *solver, const double start[2], outcome_t *outcome) {
-  const machine_t *machine = solver->flow.machine;
+  const machine_t *machine = solver->phase.machine;
   double *state = N_VGetArrayPointer(solver->y), time = 0;
   memset(outcome, 0, sizeof *outcome);
+  N_VConst(0, solver->y);
   memcpy(state, start, 2 * sizeof(double));
+  solver->phase.pressed = 0;
   while (time < machine->duration) {
-    solver->flow.direction = next_direction(machine, &time, state[0], state[1], outcome);
+    begin_phase(&solver->phase, &time, state, outcome);
     if (time < machine->duration && run_phase(solver, &time, outcome) != 0)
       return 1;
   }
@@ -102,24 +90,25 @@ static int run_one(solver_t *solver, const double start[2], outcome_t *outcome) 
 
 long run_trajectories(const machine_t *machine, double tolerance, long points, const double *starts,
                       outcome_t *outcomes) {
-  int directions[2] = {-1, 1};
+  int directions[MOST_EVENTS] = {-1, -1};
   SUNContext context;
   SUNNonlinearSolver iteration;
   solver_t solver;
   long i, failed = 0;
   SUNContext_Create(NULL, &context);
-  solver.flow.machine = machine;
-  solver.flow.direction = 0;
-  solver.y = N_VNew_Serial(2, context);
+  solver.phase.machine = machine;
+  solver.phase.direction = 1;
+  solver.phase.pressed = 0;
+  solver.y = N_VNew_Serial(dimension(machine), context);
   N_VConst(0, solver.y);
   solver.cvode = CVodeCreate(CV_ADAMS, context);
   iteration = SUNNonlinSol_FixedPoint(solver.y, 0, context);
   CVodeInit(solver.cvode, derivatives, 0, solver.y);
   CVodeSStolerances(solver.cvode, tolerance, tolerance);
-  CVodeSetUserData(solver.cvode, &solver.flow);
+  CVodeSetUserData(solver.cvode, &solver.phase);
   CVodeSetNonlinearSolver(solver.cvode, iteration);
   CVodeSetMaxNumSteps(solver.cvode, 100000);
-  CVodeRootInit(solver.cvode, 2, events);
+  CVodeRootInit(solver.cvode, MOST_EVENTS, roots);
   CVodeSetRootDirection(solver.cvode, directions);
   CVodeSetNoInactiveRootWarn(solver.cvode);
   for (i = 0; i < points && failed == 0; i++)

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from published_case import SOURCE, Outcomes
 from reference_run import IMPACT_REGIMES
+
+from machine import SOURCE, Outcomes
 
 
 @dataclass

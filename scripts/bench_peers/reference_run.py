@@ -11,7 +11,8 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from published_case import Outcomes, read_case
+
+from machine import CASE, Outcomes, read_case
 
 REFERENCE_TOLERANCE = 1e-20
 DOMAIN = 1e6
@@ -25,20 +26,21 @@ FAMILIES = ("body", "restoring", "friction", "contact", "drive")
 class Reference:
     """Runs starts for the whole duration, without a catalogue."""
 
-    def __init__(self, library: Path, program: Path) -> None:
+    def __init__(self, library: Path, program: Path, path: Path = CASE) -> None:
         self.entry = ctypes.CDLL(str(library)).separatrix_reference_run
         table = subprocess.run([program, "laws", "--json"], capture_output=True, text=True, check=True).stdout
-        self.set_laws(json.loads(table), read_case())
+        self.set_laws(json.loads(table), read_case(path))
 
     def set_laws(self, table: list[dict], case: dict) -> None:
         """The laws of the case as rows of the program's table, and their parameters one after the other."""
+        chosen = [(family, case[family].get("law", "point_mass"), case[family]) for family in FAMILIES]
+        chosen += [("effect", name, given) for name, given in case.get("effect", {}).items()]
         rows, lengths, values = [], [], []
-        for family in FAMILIES:
-            chosen = case[family].get("law", "point_mass")
-            law = next(law for law in table if (law["family"], law["law"]) == (family, chosen))
+        for family, name, given in chosen:
+            law = next(law for law in table if (law["family"], law["law"]) == (family, name))
             rows.append(law["row"])
             for parameter in law["parameters"]:
-                value = self.value_of(case[family], parameter)
+                value = self.value_of(given, parameter)
                 lengths.append(len(value))
                 values += value
         self.rows = (ctypes.c_int * len(rows))(*rows)
@@ -85,15 +87,18 @@ class Reference:
         return Outcomes(x, v, impacts.astype(int), np.isin(regime, IMPACT_REGIMES))
 
 
-def run_share(share: tuple[Path, Path, np.ndarray]) -> Outcomes:
+def run_share(share: tuple[Path, Path, Path, np.ndarray]) -> Outcomes:
     """Run some of the starts in a process of their own."""
-    library, program, starts = share
-    return Reference(library, program).run(starts)
+    library, program, path, starts = share
+    return Reference(library, program, path).run(starts)
 
 
-def run_on_all_cores(library: Path, program: Path, starts: np.ndarray) -> Outcomes:
+def run_on_all_cores(
+    library: Path, program: Path, starts: np.ndarray, path: Path = CASE, share: int | None = None
+) -> Outcomes:
     """Run every start (x0, v0), on as many cores as this process may use."""
-    shares = [(library, program, starts[i : i + SHARE]) for i in range(0, len(starts), SHARE)]
+    share = share or SHARE
+    shares = [(library, program, path, starts[i : i + share]) for i in range(0, len(starts), share)]
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=spawn) as pool:
         parts = list(pool.map(run_share, shares))

@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING
 
 import compiled
 from markdown import table
-from published_case import SEED, SOURCE, TOLERANCE, fingerprint, start_points
+from rows_report import number
+
+from machine import SEED, SOURCE, TOLERANCE, fingerprint, start_points
 
 if TYPE_CHECKING:
-    from bench import Accuracy, Results
+    from accuracy import Accuracy
+    from bench import Results
 
 NAMES = {
     "full": "Separatrix, lanes, full 50 s",
@@ -49,12 +52,6 @@ def ratio(results: Results, name: str, peer: str) -> float:
     """Median over the rounds of our rate over the peer's in the same round."""
     pairs = zip(rates(results, name), rates(results, peer), strict=True)
     return statistics.median(mine / other for mine, other in pairs)
-
-
-def number(value: float) -> str:
-    """Three digits, thousands apart."""
-    digits = f"{value:.3g}"
-    return f"{float(digits):,.0f}".replace(",", " ") if value >= 100 else digits
 
 
 def speed_table(results: Results) -> str:

@@ -12,9 +12,9 @@
 #ifndef SEPARATRIX_LANE_KERNEL_HPP
 #define SEPARATRIX_LANE_KERNEL_HPP
 
+#include "lane_contact.hpp"
 #include "lane_layer.hpp"
 #include "lane_modes.hpp"
-#include "lane_series.hpp"
 #include "lane_stops.hpp"
 
 namespace {
@@ -353,31 +353,46 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
   store<true>(g, first, batch);
 }
 
-// The same where the equation changes with the mode: a flight begins anew after every event.
+// The same where the equation changes with the mode: a flight begins anew after every event. Contacts without
+// a closed form are expanded in series.
 void fly_through_modes(const lane_machine &m, int first, lane_batch &batch) {
+  const bool in_series = m.contact.stiffness > 0;
   lane_group g;
   lane_modes f(m);
   load<true>(batch, first, g);
   f.enter((g.status == lane_fresh) | (g.status == lane_flying), g);
   begin_flight<true, false>(f, g);
   mask flying = g.status == lane_flying, sent = flying;
+  vec limit = 1e300;
   while (any(sent) && !any(sent & (g.status != lane_flying))) {
+    mask passed = {};
     flying = sent;
     while (any(flying)) {
-      mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
-      if (any(seek))
-        left = look_ahead<true, false>(f, seek, upward, f.barrier, g);
-      left = left | (flying & (g.flights >= g.budget));
-      flying = flying & ~left & (g.start + g.span < g.until);
-      if (any(flying)) {
-        left = left | take_mode_events(f, flying, g);
-        f.enter(g.status == lane_fresh, g);
-        begin_flight<true, false>(f, g);
+      mask pressed = in_series ? flying & (g.place > 0.5) : mask{}, left = {};
+      if (in_series && contacts_first(pressed, flying)) {
+        mask there = press_on(m, pressed, limit, left, g);
+        if (any(there))
+          stop_or_pass(m.period, m.domain, there, g.x, g.v, batch, g);
+        passed = passed | there;
+        flying = flying & ~left & ~there;
+        put(g.status, left, lane_left);
+        put(g.status, flying & pressed & (g.place < 0.5), lane_fresh);
+      } else {
+        mask free = flying & ~pressed, seek = free & (g.found < 0.5);
+        if (any(seek))
+          left = look_ahead<true, false>(f, seek, g.direction > 0.0, f.barrier, g);
+        left = left | (free & (g.flights >= g.budget));
+        mask due = free & ~left & (g.start + g.span < g.until);
+        flying = pressed | due;
+        if (any(due))
+          left = left | take_mode_events(f, due, g);
+        put(g.status, left, lane_left);
+        flying = flying & ~left;
       }
-      put(g.status, left, lane_left);
-      flying = flying & ~left;
+      f.enter(g.status == lane_fresh, g);
+      begin_flight<true, false>(f, g);
     }
-    take_stops<true>(f, g.status == lane_flying, batch, g);
+    take_stops<true>(f, (g.status == lane_flying) & ~passed, batch, g);
   }
   store<true>(g, first, batch);
 }

@@ -102,6 +102,7 @@ inline mask take_mode_events(const lane_modes &f, mask due, lane_group &g) {
   put(g.x, due, place);
   put(g.v, due, pick(passage, g.end_v, pick(impact, -restitution * g.end_v, 0)));
   put(g.direction, due & ~passage, -g.direction);
+  put(g.touch, due & passage & free, w);
   put(g.place, due & passage, f.leads_to);
   put(g.status, due, lane_fresh);
   return rare;

@@ -10,6 +10,28 @@
 
 namespace {
 
+// Value of a curve; as `value_at` of `curve_law.f90`.
+inline vec curve_at(const lane_curve &c, vec x) {
+  const int last = int(c.count) - 1;
+  vec from = c.at[0], width = c.at[1] - c.at[0], left = c.value[0], right = c.value[1], start = c.slope[0],
+      end = c.slope[1];
+  for (int i = 1; i < last; i++) {
+    mask beyond = x >= c.at[i];
+    put(from, beyond, c.at[i]);
+    put(width, beyond, c.at[i + 1] - c.at[i]);
+    put(left, beyond, c.value[i]);
+    put(right, beyond, c.value[i + 1]);
+    put(start, beyond, c.slope[i]);
+    put(end, beyond, c.slope[i + 1]);
+  }
+  vec s = (x - from) / width, r = 1.0 - s;
+  vec value = left * r * r * (1.0 + 2.0 * s) + right * s * s * (3.0 - 2.0 * s) +
+              width * s * r * (start * r - end * s);
+  put(value, x <= c.at[0], c.value[0]);
+  put(value, x >= c.at[last], c.value[last]);
+  return value;
+}
+
 // Restitution at an impact speed w; as `restitution_at` of `contact_law.f90`.
 inline vec restitution_at(const lane_machine &m, vec w) {
   vec k = m.restitution;
@@ -24,6 +46,11 @@ inline vec restitution_at(const lane_machine &m, vec w) {
     vec fallen = 1.0 - m.coefficients[0] * root + m.coefficients[1] * (root * root);
     put(fallen, fallen < 0.0, vec{});
     put(k, w > 2.2250738585072014e-308, pick(fallen < 1.0, fallen, 1));
+  }
+  if (m.restitution_law == curve_restitution) {
+    k = k + curve_at(m.curve, w);
+    put(k, k < 0.0, vec{});
+    put(k, k > 1.0, vec(1.0));
   }
   return k;
 }

@@ -13,8 +13,10 @@
 
 namespace {
 
-// At a ratio of exp(-2) between successive terms the term of this order is below rounding.
 enum { order = 18, most_root_rounds = 30 };
+
+// Successive terms of a step shrink by exp(-shrinking); the last is then 2e-14 of the first.
+const double shrinking = 2;
 
 // Coefficients of position and velocity in the time since the start of a step.
 struct expansion {
@@ -56,17 +58,17 @@ LANE_LEAF vec chain(const vec *a, const vec *b, int k) {
   return (1.0 / k) * sum;
 }
 
-// The motion of the foot of the spring.
-inline void expand_foot(const lane_machine &m, vec time, vec *foot) {
+// The motion of the foot of the spring, so many coefficients.
+inline void expand_foot(const lane_machine &m, vec time, int terms, vec *foot) {
   vec sine, cosine;
   sine_cosine(time * m.drive_frequency, sine, cosine);
-  for (int k = 0; k < order - 1; k++)
+  for (int k = 0; k < terms; k++)
     foot[k] = {};
   vec c = cosine, s = sine;
   for (int n = 0; n < m.harmonics; n++) {
     const double w = (n + 1) * m.drive_frequency;
     vec part = m.cosine[n] * c + m.sine[n] * s, slope = m.sine[n] * c - m.cosine[n] * s;
-    for (int k = 0; k < order - 1; k++) {
+    for (int k = 0; k < terms; k++) {
       foot[k] += part;
       const double turn = w / (k + 1);
       vec next = turn * slope;
@@ -84,9 +86,8 @@ struct excess_series {
   vec u[order], square[order], value[order];
 };
 
-inline vec next_excess(const lane_law &l, int i, mask within, vec d, const expansion &p, int k,
-                       excess_series &e) {
-  e.u[k] = (1 / l.velocity[i]) * d * p.v[k];
+inline vec next_excess(const lane_law &l, int i, mask within, vec d, const vec *v, int k, excess_series &e) {
+  e.u[k] = (1 / l.velocity[i]) * d * v[k];
   const bool squared = l.exponent[i] > 1.5;
   e.square[k] = squared ? square_of(e.u, k) : e.u[k];
   if (k == 0)
@@ -96,22 +97,21 @@ inline vec next_excess(const lane_law &l, int i, mask within, vec d, const expan
   return e.value[k];
 }
 
-// Expands the motion of every lane from where it is, slipping as `direction` says.
-inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
-  const lane_law &l = m.law;
-  const vec d = g.direction, viscous = l.viscous + l.asymmetric_viscous * d;
-  const vec level = pick(d > 0.0, l.dahl_level[0], l.dahl_level[1]);
-  vec foot[order], stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order],
-      factor[order];
+// The acceleration of a body that slips as `direction` says, by everything but a soft barrier, as a series.
+struct force_series {
+  vec stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order], factor[order];
   excess_series excess[2];
-  expand_foot(m, g.time, foot);
-  p.x[0] = g.x;
-  p.v[0] = g.v;
-  for (int k = 0; k < order - 1; k++) {
-    stretch[k] = foot[k] - p.x[k];
+
+  // Coefficient k, from those of the foot of the spring (k alone), the position, the velocity and the rate of
+  // the position in the variable of the series.
+  LANE_LEAF vec next(const lane_machine &m, const lane_group &g, mask within, vec foot, const vec *x,
+                     const vec *v, const vec *rate, int k) {
+    const lane_law &l = m.law;
+    const vec d = g.direction, viscous = l.viscous + l.asymmetric_viscous * d;
+    stretch[k] = foot - x[k];
     if (k == 0)
       stretch[0] += l.length;
-    vec a = l.stiffness * stretch[k] - viscous * p.v[k];
+    vec a = l.stiffness * stretch[k] - viscous * v[k];
     if (l.pendulum != 0) {
       if (k == 0)
         sine_cosine(stretch[0], sine[0], cosine[0]);
@@ -126,40 +126,52 @@ inline void expand(const lane_machine &m, const lane_group &g, mask within, expa
       a += l.cubic * product(square, stretch, k);
     }
     if (l.quadratic != 0)
-      a -= l.quadratic * d * square_of(p.v, k);
+      a -= l.quadratic * d * square_of(v, k);
     dry[k] = {};
     if (l.dahl_stiffness > 0) {
-      // z - level: its derivative is -(sigma/level) v times itself.
+      // z - level: its derivative is -(sigma/level) times itself and the rate of the position.
+      const vec level = pick(d > 0.0, l.dahl_level[0], l.dahl_level[1]);
       behind[k] =
-          k == 0 ? g.z - level : (-l.dahl_stiffness / (double(k) * level)) * product(p.v, behind, k - 1);
+          k == 0 ? g.z - level : (-l.dahl_stiffness / (double(k) * level)) * product(rate, behind, k - 1);
       dry[k] = l.inverse_mass * (k == 0 ? g.z : behind[k]);
     } else {
       if (k == 0)
         dry[0] = l.kinetic * d + l.asymmetric;
       for (int i = 0; i < 2; i++)
         if (l.excess[i] > 0)
-          dry[k] += d * next_excess(l, i, within, d, p, k, excess[i]);
+          dry[k] += d * next_excess(l, i, within, d, v, k, excess[i]);
     }
-    factor[k] = m.friction_slope * p.x[k];
+    factor[k] = m.friction_slope * x[k];
     if (k == 0) {
       factor[0] += 1.0;
       a += l.offset;
     }
-    a -= m.friction_slope != 0 ? product(factor, dry, k) : dry[k];
-    p.v[k + 1] = (1.0 / (k + 1)) * a;
+    return a - (m.friction_slope != 0 ? product(factor, dry, k) : dry[k]);
+  }
+};
+
+// Expands the motion of every lane from where it is, in time.
+inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
+  vec foot[order];
+  force_series forces;
+  expand_foot(m, g.time, order - 1, foot);
+  p.x[0] = g.x;
+  p.v[0] = g.v;
+  for (int k = 0; k < order - 1; k++) {
+    p.v[k + 1] = (1.0 / (k + 1)) * forces.next(m, g, within, foot[k], p.x, p.v, p.v, k);
     p.x[k + 1] = (1.0 / (k + 1)) * p.v[k];
   }
   p.x[order] = (1.0 / order) * p.v[order - 1];
 }
 
-// Length of a step over which the terms shrink by exp(-2) from one to the next.
+// Length of a step over which the terms shrink so.
 inline vec step_length(const lane_machine &m, const expansion &p) {
   const double smallest = 1e-290;
   vec last = logarithm(magnitude(p.x[order]) + smallest),
       before = logarithm(magnitude(p.x[order - 1]) + smallest);
   const double scale = m.law.log_scale;
   vec a = (1.0 / order) * (scale - last), b = (1.0 / (order - 1)) * (scale - before);
-  return exponential(pick(a < b, a, b) - 2.0);
+  return exponential(pick(a < b, a, b) - shrinking);
 }
 
 // A polynomial over a step, in the fraction of the step, with its derivatives.
@@ -186,7 +198,9 @@ template <int degree> inline mask fall(const vec (&c)[degree + 1], mask seek, ve
     put(high, f <= 0.0, s);
     vec next = s - 2.0 * f * f1 / (2.0 * f1 * f1 - f * f2);
     mask guided = (f1 < 0.0) & (next >= low) & (next <= high);
-    mask done = seek & ((guided & (magnitude(next - s) <= 1e-7 * high)) | (high - low <= 4e-16 * high));
+    // Newton's step is asked, too: where the slope vanishes Halley's says nothing.
+    mask close = (magnitude(next - s) <= 1e-7 * high) & (magnitude(f) <= -2e-7 * high * f1);
+    mask done = seek & ((guided & close) | (high - low <= 4e-16 * high));
     put(root, done, pick(guided, next, s));
     seek = seek & ~done;
     s = pick(guided, next, 0.5 * (low + high));
@@ -278,6 +292,7 @@ inline stride_of_lanes look_for_events(const lane_machine &m, const expansion &p
 // What follows the steps `due`. Returns the lanes that the scalar code must look at.
 inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, mask due, vec barrier,
                                lane_group &g) {
+  const bool soft = m.contact.stiffness > 0;
   vec x, scaled_v, scaled_a;
   value_at<order>(t.x, t.end, x, scaled_v, scaled_a);
   vec per_time = 1.0 / t.length, v = scaled_v * per_time, a = scaled_a * (per_time * per_time);
@@ -287,7 +302,8 @@ inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, 
   vec restitution = m.restitution;
   if (any(due & t.hits))
     restitution = restitution_at(m, w);
-  mask rare = due & ((t.turns & (push <= m.break_away * factor)) | (t.hits & (restitution * w <= m.slow)) |
+  mask slow = soft ? w <= 0.0 : restitution * w <= m.slow;
+  mask rare = due & ((t.turns & (push <= m.break_away * factor)) | (t.hits & slow) |
                      (magnitude(x) >= m.domain) | (factor <= 0.0));
   due = due & ~rare;
   mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
@@ -303,45 +319,16 @@ inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, 
   put(g.margin, turns & (gap < g.margin), gap);
   put(g.time, due, g.time + t.end * t.length);
   put(g.x, due, pick(hits, barrier, x));
-  put(g.v, due, pick(turns, 0, pick(hits, -restitution * v, v)));
-  put(g.direction, events, -g.direction);
-  return rare;
-}
-
-// Steps on with all lanes of one vector until one has stopped or is left to the scalar code.
-void fly_in_series(const lane_machine &m, int first, lane_batch &batch) {
-  const double shortest = 1e-12 * m.period;
-  lane_group g;
-  load<true>(batch, first, g);
-  put(g.status, g.status == lane_fresh, lane_flying);
-  mask flying = g.status == lane_flying, sent = flying;
-  // A step that could not be proven is taken in halves.
-  vec limit = m.stride;
-  while (any(sent) && !any(sent & (g.status != lane_flying))) {
-    flying = sent;
-    mask upward = g.direction > 0.0;
-    mask within = m.law.edge <= 0 ? ~mask{} : g.direction * g.v <= m.law.edge;
-    vec barrier = pick(upward, m.upper, m.lower);
-    expansion p;
-    expand(m, g, within, p);
-    vec length = step_length(m, p), ahead = g.until - g.time;
-    put(length, limit < length, limit);
-    mask last = length >= ahead;
-    put(length, last, ahead);
-    stride_of_lanes t = look_for_events(m, p, flying, within, barrier, length, g);
-    mask proven = flying & ~t.lost & positive_until(t.fall, flying, t.end);
-    // At a barrier that it moves towards, a body hits at once.
-    mask left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
-    proven = proven & ~left;
-    left =
-        left | (proven & take_series_events(m, t, proven, barrier, g)) | (flying & (g.flights >= g.budget));
-    limit = pick(proven, m.stride, 0.5 * t.end * length);
-    put(g.status, left, lane_left);
-    mask there = proven & ~left & last & ~(t.turns | t.hits | t.slows);
-    if (any(there))
-      stop_or_pass(m.period, m.domain, there, g.x, g.v, batch, g);
+  if (soft) {
+    put(g.touch, hits, w);
+    put(g.place, hits, pick(g.direction > 0.0, vec(1.0), vec(2.0)));
+    put(g.v, due, pick(turns, 0, v));
+    put(g.direction, turns, -g.direction);
+  } else {
+    put(g.v, due, pick(turns, 0, pick(hits, -restitution * v, v)));
+    put(g.direction, events, -g.direction);
   }
-  store<true>(g, first, batch);
+  return rare;
 }
 
 } // namespace

@@ -5,7 +5,14 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
-enum { lanes = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64, lane_modes_count = 6 };
+enum {
+  lanes = 16,
+  most_harmonics = 64,
+  layer_nodes = 10,
+  most_regions = 64,
+  lane_modes_count = 6,
+  most_knots = 16
+};
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
 struct lane_layer {
@@ -53,6 +60,25 @@ struct lane_law {
   double log_scale;
 };
 
+// A soft barrier whose contacts are expanded in series: stiffness p^n (1 + damping p'), or stiffness p +
+// damping p' if `linear`, per unit of mass. No such barrier: stiffness 0.
+struct lane_contact {
+  double stiffness, damping;
+  // 2 n.
+  double twice_exponent, linear;
+  // Each impact has the damping divided by its speed.
+  double by_impact;
+  // Degree of the polynomial of the foot of the spring, and the time over which it holds [s].
+  double foot_terms, foot_time;
+  // Logarithms of the stiffness and of half of that time.
+  double log_stiffness, log_foot_time;
+};
+
+// Change of the restitution over the speed, by knots; see `curve_law.f90`.
+struct lane_curve {
+  double count, at[most_knots], value[most_knots], slope[most_knots];
+};
+
 // The machine, per unit of mass where forces are meant, SI.
 struct lane_machine {
   enum { modal = 0 };
@@ -81,13 +107,16 @@ struct lane_machine {
   // rate of the drive's force [m/s^3].
   double several_modes, friction_slope, force_rate;
   lane_mode mode[lane_modes_count];
-  // Without a closed form; then `cosine` and `sine` are those of the foot of the spring.
+  // Without a closed form, or with contacts in series; then `cosine` and `sine` are those of the foot of the
+  // spring.
   lane_law law;
+  lane_contact contact;
+  lane_curve curve;
 };
 
 // Laws of restitution, by the numbers of `contact_law.f90`.
 const double constant_restitution = 0, linear_restitution = 1, power_restitution = 2,
-             viscoelastic_restitution = 3;
+             viscoelastic_restitution = 3, curve_restitution = 6;
 
 // What a lane is doing.
 const double lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4;
@@ -117,6 +146,8 @@ template <class T> struct lane_fields {
   // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
   // lower barrier (2).
   T place;
+  // Speed of the impact that the contact began with [m/s], 0 if none did.
+  T touch;
   // Dahl's friction [N].
   T z;
   // The time since the start of the flight at which the body leaves

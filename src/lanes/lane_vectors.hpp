@@ -83,9 +83,27 @@ inline bool any(mask m) {
   return (bits[0] | bits[1]) != 0;
 }
 
+// Lanes of a mask.
+inline int count(mask m) {
+  reg_mask both = m.low + m.high;
+  int64_t sum = 0;
+  for (int i = 0; i < width; i++)
+    sum -= both[i];
+  return int(sum);
+}
+
 inline vec magnitude(vec a) {
   return {(reg)((reg_mask)a.low & INT64_MAX), (reg)((reg_mask)a.high & INT64_MAX)};
 }
+
+inline reg square_root(reg a) {
+  reg root;
+  for (int i = 0; i < width; i++)
+    root[i] = __builtin_sqrt(a[i]);
+  return root;
+}
+
+inline vec square_root(vec a) { return {square_root(a.low), square_root(a.high)}; }
 
 // Adding it rounds to the nearest integer, which then stands in the last bits.
 const double to_integer = 6755399441055744.0;

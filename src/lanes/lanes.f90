@@ -6,7 +6,8 @@
 !> not depend on its neighbours, nor on the width of the vectors.
 module lanes
   use elementary, only: exponential, logarithm
-  use contact_law, only: contact_curve, contact_kelvin_voigt
+  use contact_law, only: contact_hunt_crossley, contact_kelvin_voigt
+  use curve_law, only: most_knots
   use effect_law, only: constant_force
   use exact_flow, only: flow_t, largest_damping_ratio
   use kinds, only: wp
@@ -65,6 +66,17 @@ module lanes
     real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
   end type law_t
 
+  !> Mirrors `lane_contact` of lane_types.hpp.
+  type, bind(c) :: contact_series_t
+    real(c_double) :: stiffness = 0, damping = 0, twice_exponent = 0, linear = 0, by_impact = 0, foot_terms = 0, foot_time = 0, &
+      log_stiffness = 0, log_foot_time = 0
+  end type contact_series_t
+
+  !> Mirrors `lane_curve` of lane_types.hpp.
+  type, bind(c) :: restitution_curve_t
+    real(c_double) :: count = 0, at(most_knots) = 0, value(most_knots) = 0, slope(most_knots) = 0
+  end type restitution_curve_t
+
   !> Mirrors `lane_machine` of lane_types.hpp.
   type, bind(c) :: machine_t
     real(c_double) :: natural = 0, damped = 0, decay = 0, drive_frequency = 0, period = 0
@@ -77,6 +89,8 @@ module lanes
     real(c_double) :: several_modes = 0, friction_slope = 0, force_rate = 0
     type(mode_t) :: mode(0:5)
     type(law_t) :: law
+    type(contact_series_t) :: contact
+    type(restitution_curve_t) :: curve
   end type machine_t
 
   !> Mirrors `lane_region` of lane_types.hpp.
@@ -91,7 +105,7 @@ module lanes
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
       flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
-      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, z = 0, skip = 0, &
+      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, touch = 0, z = 0, skip = 0, &
       reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
     integer(c_int) :: regions = 0, complete = 1
     type(region_t) :: region(most_regions)
@@ -153,8 +167,6 @@ contains
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
     if (flow%width <= 0 .or. allocated(moving%pair) .or. allocated(moving%jointed)) return
-    ! A table of the restitution is left to single flights.
-    if (moving%machine%contact%kind == contact_curve) return
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
     else
@@ -178,6 +190,9 @@ contains
       m%restitution = law%contact%restitution
       m%restitution_law = law%contact%kind
       m%coefficients = law%contact%coefficients
+      associate (curve => law%contact%change)
+        m%curve = restitution_curve_t(real(curve%count, wp), curve%at, curve%value, curve%slope)
+      end associate
       m%slow = chatter_speed(law)
       m%domain = moving%options%domain
       m%harmonics = size(law%drive%cosine)
@@ -225,9 +240,14 @@ contains
       m%upper = min(law%contact%upper, law%contact%soft_upper)
       m%lower = max(law%contact%lower, law%contact%soft_lower)
       m%friction_slope = law%effects%friction_slope
+      if (law%contact%kind == contact_hunt_crossley) then
+        call set_law(moving, flow)
+        call set_contact(law, m%contact, flow%available)
+        if (.not. flow%available) return
+      end if
       m%force_rate = law%natural_frequency**2*law%foot_speed_bound
       do place = 0, 2
-        if (place > 0 .and. .not. law%contact%soft) cycle
+        if (place > 0 .and. .not. law%contact%kind == contact_kelvin_voigt) cycle
         if (abs(surface_of(law, place)) >= huge(1.0_wp)) cycle
         do direction = -1, 1, 2
           call set_mode(law, place, direction, m, m%mode(2*place + (1 - direction)/2), flow%available)
@@ -244,7 +264,6 @@ contains
         law%friction%layer_speed <= 0 .and. size(law%drive%cosine) <= most_harmonics
       linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic, effects%dahl_stiffness]) > 0)
       linear = linear .and. .not. (abs(effects%friction_slope) > 0 .and. abs(effects%asymmetric_coulomb) > 0)
-      if (law%contact%soft) linear = linear .and. law%contact%kind == contact_kelvin_voigt
     end associate
   end function has_linear_modes
 
@@ -346,23 +365,44 @@ contains
     end associate
   end subroutine set_layer
 
-  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, rigid barriers. Lanes know no
-  !> coordinate on a circle.
+  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, barriers that are rigid or whose
+  !> contacts have one. Lanes know no coordinate on a circle.
   pure subroutine prepare_series(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(inout) :: flow
+    associate (law => moving%machine, friction => moving%machine%friction, effects => moving%machine%effects)
+      flow%available = .not. law%drive%interval > 0 .and. size(law%drive%cosine) <= most_harmonics .and. .not. law%turn > 0
+      if (friction%excess > 0) flow%available = flow%available .and. has_series(friction%stribeck_exponent)
+      if (friction%second_excess > 0) flow%available = flow%available .and. has_series(friction%second_exponent)
+      if (effects%dahl_stiffness > 0) flow%available = flow%available .and. &
+        effects%dahl_sliding > 2*abs(effects%asymmetric_coulomb)
+      if (law%contact%soft) call set_contact(law, flow%machine%contact, flow%available)
+      if (.not. flow%available) return
+      call set_common(moving, flow)
+      call set_law(moving, flow)
+      flow%machine%law%series = 1
+      flow%machine%friction_slope = effects%friction_slope
+      flow%machine%upper = min(law%contact%upper, law%contact%soft_upper)
+      flow%machine%lower = max(law%contact%lower, law%contact%soft_lower)
+      flow%machine%stride = 0.25_wp*law%period
+    end associate
+
+  contains
+
+    pure logical function has_series(exponent)
+      real(wp), intent(in) :: exponent
+      has_series = abs(exponent - 1) <= 0 .or. abs(exponent - 2) <= 0
+    end function has_series
+
+  end subroutine prepare_series
+
+  !> The forces but those of a soft barrier, per unit of mass, for series.
+  pure subroutine set_law(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
     real(wp) :: length
     associate (law => moving%machine, m => flow%machine, l => flow%machine%law, friction => moving%machine%friction, &
                effects => moving%machine%effects)
-      flow%available = .not. (law%drive%interval > 0 .or. law%contact%soft) .and. size(law%drive%cosine) <= most_harmonics &
-        .and. .not. law%turn > 0
-      if (friction%excess > 0) flow%available = flow%available .and. has_series(friction%stribeck_exponent)
-      if (friction%second_excess > 0) flow%available = flow%available .and. has_series(friction%second_exponent)
-      if (effects%dahl_stiffness > 0) flow%available = flow%available .and. &
-        effects%dahl_sliding > 2*abs(effects%asymmetric_coulomb)
-      if (.not. flow%available) return
-      call set_common(moving, flow)
-      l%series = 1
       l%stiffness = merge(law%restoring%stiffness, 0.0_wp, law%restoring%is_linear)/law%mass
       l%pendulum = merge(0.0_wp, law%restoring%stiffness, law%restoring%is_linear)/law%mass
       l%cubic = effects%cubic/law%mass
@@ -381,25 +421,62 @@ contains
       l%dahl_stiffness = effects%dahl_stiffness
       l%dahl_level = [effects%dahl_sliding, -effects%dahl_sliding] + effects%asymmetric_coulomb
       l%inverse_mass = 1/law%mass
-      m%friction_slope = effects%friction_slope
-      m%upper = law%contact%upper
-      m%lower = law%contact%lower
       m%cosine(:m%harmonics) = law%drive%cosine
       m%sine(:m%harmonics) = law%drive%sine
-      m%stride = 0.25_wp*law%period
       length = 1
       if (law%restoring%stiffness > 0) length = law%force_scale/law%restoring%stiffness
       if (length > 0) l%log_scale = logarithm(length)
     end associate
+  end subroutine set_law
 
-  contains
+  !> A soft barrier whose contacts have a series in the root of the penetration: p^n with a whole 2n, a linear one that may pull.
+  pure subroutine set_contact(law, contact, available)
+    type(oscillator_t), intent(in) :: law
+    type(contact_series_t), intent(out) :: contact
+    logical, intent(inout) :: available
+    integer :: twice
+    twice = nint(2*law%contact%exponent)
+    contact%stiffness = law%contact%stiffness/law%mass
+    contact%damping = law%contact%damping
+    contact%twice_exponent = 2
+    contact%by_impact = merge(1, 0, law%contact%by_impact)
+    if (law%contact%kind == contact_kelvin_voigt) then
+      contact%linear = 1
+      contact%damping = law%contact%damping/law%mass
+      available = available .and. (law%contact%tension .or. .not. law%contact%damping > 0)
+    else
+      contact%twice_exponent = twice
+      available = available .and. abs(2*law%contact%exponent - twice) <= 0 .and. twice >= 2 .and. twice <= 6
+    end if
+    contact%log_stiffness = logarithm(contact%stiffness)
+    call set_foot(law, contact)
+  end subroutine set_contact
 
-    pure logical function has_series(exponent)
-      real(wp), intent(in) :: exponent
-      has_series = abs(exponent - 1) <= 0 .or. abs(exponent - 2) <= 0
-    end function has_series
-
-  end subroutine prepare_series
+  !> A degree with which the polynomial of the foot holds over a step of a contact, up to an error of 1e-13 in the velocity.
+  pure subroutine set_foot(law, contact)
+    type(oscillator_t), intent(in) :: law
+    type(contact_series_t), intent(inout) :: contact
+    integer, parameter :: most = 16
+    real(wp) :: speed, w, step, error, stiffness
+    integer :: degree, n
+    speed = max(law%foot_speed_bound, tiny(speed)**0.25_wp)
+    ! A contact at this speed lasts about 3/w, of which a step is a tenth.
+    associate (power => contact%twice_exponent + 2)
+      w = exponential(logarithm(contact%stiffness)*2/power + logarithm(speed)*(power - 4)/power)
+    end associate
+    step = 0.3_wp/w
+    stiffness = law%natural_frequency**2
+    do degree = 3, most
+      error = sum([(sqrt(law%drive%cosine(n)**2 + law%drive%sine(n)**2)*(n*law%drive_frequency)**(degree + 1), &
+                   n=1, size(law%drive%cosine))])
+      error = stiffness*error/gamma(degree + 3.0_wp)
+      contact%foot_terms = degree
+      contact%foot_time = law%period
+      if (error > 0) contact%foot_time = exponential(logarithm(1e-13_wp*speed/error)/(degree + 2))
+      if (contact%foot_time >= step) exit
+    end do
+    contact%log_foot_time = logarithm(0.5_wp*contact%foot_time)
+  end subroutine set_foot
 
   !> Periodic response of y'' + 2 g y' + w^2 y = sum f_cos cos + f_sin sin with bounds on its seventh and sixth derivative; not
   !> available at resonance.
@@ -456,6 +533,7 @@ contains
     batch%v(lane) = state%v
     batch%direction(lane) = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
     batch%z(lane) = state%z
+    batch%touch(lane) = state%touch_speed
     if (flow%machine%several_modes > 0 .or. flow%machine%law%series > 0) call find_place(flow%machine, lane, batch)
     if (.not. new) return
     batch%up_span(lane) = 0.4_wp*flow%machine%period
@@ -473,7 +551,7 @@ contains
     associate (x => batch%x(lane), v => batch%v(lane), up => batch%direction(lane) > 0)
       if (m%friction_slope*x <= -1) batch%status(lane) = lane_left
       place = 0
-      if (m%several_modes > 0 .and. m%mode(0)%leads_to >= 0) then
+      if (m%contact%stiffness > 0 .or. (m%several_modes > 0 .and. m%mode(0)%leads_to >= 0)) then
         if (x > m%upper .or. (up .and. x >= m%upper)) place = 1
         if (x < m%lower .or. (.not. up .and. x <= m%lower)) place = 2
       end if
@@ -493,6 +571,7 @@ contains
     state%x = batch%x(lane)
     state%v = batch%v(lane)
     state%z = batch%z(lane)
+    state%touch_speed = batch%touch(lane)
     state%time = batch%time(lane)
     state%mode = merge(mode_slip_minus, mode_slip_plus, batch%direction(lane) < 0)
   end subroutine lane_state

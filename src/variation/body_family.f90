@@ -17,7 +17,7 @@ module body_family
   implicit none
   private
 
-  public :: body_neighbourhood, body_of_family, map_with_variation, size_of_motion
+  public :: body_neighbourhood, body_of_family, map_with_variation, size_of_motion, vary_period
 
   !> Distance of the neighbours, as a share of the parameter's size.
   real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
@@ -147,6 +147,31 @@ contains
         body%slope(mode, periods*body%period, image)
     end select
   end subroutine map_with_variation
+
+  !> Moves a body from one section to the next: derivatives of its state there by that before, and the events on the way. `log` is
+  !> the caller's, opened once, and holds them too. `ok` is false if the trajectory had to be given up or the derivatives
+  !> are not known.
+  pure subroutine vary_period(machines, body, state, log, events, by_start, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    type(one_body_t), intent(in) :: body
+    type(state_t), intent(inout) :: state
+    type(log_t), intent(inout) :: log
+    type(event_t), allocatable, intent(out) :: events(:)
+    real(wp), intent(out) :: by_start(2, 2)
+    logical, intent(out) :: ok
+    type(state_t) :: start
+    type(tally_t) :: tally
+    integer :: reason, mode
+    by_start = 0
+    log%events = 0
+    log%origin = 0
+    start = state
+    call advance_period(body%moving, state, tally, reason, log)
+    ok = reason == 0
+    if (.not. ok) return
+    call events_of_body(body, start, log, state, .false., events, mode)
+    call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok)
+  end subroutine vary_period
 
   !> Derivative of the period by the parameter.
   pure real(wp) function period_slope(machines) result(slope)

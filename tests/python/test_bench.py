@@ -33,7 +33,8 @@ def test_the_driver_of_a_peer_agrees_with_ours(
         pytest.skip(f"{library} has not been built; scripts/bench does")
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
     from compiled import Compiled
-    from published_case import CASE, TOLERANCE, published_machine
+
+    from machine import CASE, TOLERANCE, published_machine
 
     peers = Compiled(library, published_machine(), TOLERANCE).run(np.array(STARTS))
     (tmp_path / "list.csv").write_text("x0,v0\n" + "".join(f"{x},{v}\n" for x, v in STARTS))
@@ -44,10 +45,37 @@ def test_the_driver_of_a_peer_agrees_with_ours(
         np.testing.assert_allclose(peers.v, ours["v"][()], atol=1e-6)
 
 
+@pytest.mark.parametrize("key", ["hunt_crossley", "kelvin_voigt_cut", "cubic", "power", "dahl"])
+def test_a_peer_has_the_machine_of_the_row(source_dir, separatrix, tmp_path, monkeypatch, key):
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    from compiled import Compiled, build
+    from rows import ROWS
+
+    from machine import TOLERANCE, machine_of, read_case
+
+    case = next(row for row in ROWS if row.key == key).write(tmp_path)
+    library = build("gsl", tmp_path)
+    peers = Compiled(library, machine_of(read_case(case)), TOLERANCE).run(np.array(STARTS))
+    (tmp_path / "list.csv").write_text("x0,v0\n" + "".join(f"{x},{v}\n" for x, v in STARTS))
+    succeed(separatrix, "points", case, "--list", "list.csv", "-o", "ours.h5", "--quiet", folder=tmp_path)
+    with h5py.File(tmp_path / "ours.h5") as ours:
+        assert peers.impacts.tolist() == ours["impacts"][()].tolist()
+        np.testing.assert_allclose(peers.x, ours["x"][()], atol=1e-6)
+
+
+def test_every_row_is_a_case(source_dir, separatrix, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    from rows import ROWS
+
+    for row in ROWS:
+        succeed(separatrix, "basin", row.write(tmp_path), "--validate", folder=tmp_path)
+
+
 def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separatrix, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
     import reference_run
-    from published_case import CASE
+
+    from machine import CASE
 
     monkeypatch.setattr(reference_run, "SHARE", 2)
     library = build_dir / "lib" / "libseparatrix_reference.so"

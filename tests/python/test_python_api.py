@@ -338,3 +338,14 @@ def test_the_code_of_the_guide_runs(
         exec(compile(block, "docs/python.md", "exec"), names)
     assert said == re.findall(r"print\(error\) +# (.*)", guide)
     assert (tmp_path / "bifurcation.png").stat().st_size > 10_000
+
+
+def test_several_bodies_with_and_without_a_drive(source_dir: Path, separatrix: Path, library: Path) -> None:
+    """A belt drives without a period; maps of several bodies are those of the program."""
+    belt = sx.trajectory(source_dir / "examples" / "structure_blocks_on_a_belt.toml", duration=20.0)
+    assert belt.attrs["drive_ratio"] == 0.0 and (belt.event_kind == 3).any()
+    case = sx.load(source_dir / "examples" / "structure_two_masses.toml").with_(
+        {"run.duration": 100.0, "attractors.sample": 8}
+    )
+    found = sx.basin(case, x0=(-1.0, 1.0, 3), v0=(-1.0, 1.0, 3), progress=False)
+    assert found.regime.shape == (3, 3)

@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The machines of the second table: each is the published one with one change."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from machine import SOURCE, V0, X0, start_points
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BACKLASH = ((-0.1, 0.1), (-1.0, 1.0))
+KELVIN_VOIGT = {"law": "kelvin_voigt", "stiffness": 1e5, "damping": 100.0, "upper": "1.1 m"}
+COULOMB = "basin_coulomb"
+
+
+@dataclass
+class Checks:
+    """Starts in quadruple precision and how many of them a process takes, starts in lanes and one by one, and
+    the side of the map whose labels are compared."""
+
+    quadruple: int
+    share: int
+    single: int
+    side: int
+
+
+EXACT = Checks(100, 25, 10_000, 150)
+ADAPTIVE = Checks(2, 1, 300, 60)
+
+
+@dataclass
+class Row:
+    """A machine: what it is called, what is changed, and the rate that is its goal [trajectories/s/core]."""
+
+    key: str
+    title: str
+    goal: int
+    changes: dict = field(default_factory=dict)
+    """Tables that replace those of the example, or effects that are added."""
+    example: str = COULOMB
+    linear: bool = False
+    """Linear between its events: bar on its accuracy 1e-11, else 1e-10."""
+    fast: tuple[int, int] = (30, 100)
+    """Two maps of so many starts along either axis; their difference is timed."""
+    sizes: Checks | None = None
+
+    def checks(self, quick: bool) -> Checks:
+        """What is checked on how much."""
+        sizes = self.sizes or (EXACT if self.linear else ADAPTIVE)
+        return Checks(8, 1, min(sizes.single, 500), min(sizes.side, 50)) if quick else sizes
+
+    def starts(self, count: int) -> np.ndarray:
+        """Start points."""
+        if self.example == COULOMB:
+            return start_points(count)
+        (x_low, x_high), (v_low, v_high) = BACKLASH
+        shares = start_points(count) / (X0[1], V0[1])
+        return np.column_stack(
+            [x_low + (x_high - x_low) * shares[:, 0], v_low + (v_high - v_low) * (0.5 + 0.5 * shares[:, 1])]
+        )
+
+    def write(self, folder: Path) -> Path:
+        """The case file."""
+        case = tomllib.loads((SOURCE / "examples" / f"{self.example}.toml").read_text())
+        for name, change in self.changes.items():
+            case[name] = change
+        path = folder / f"{self.key}.toml"
+        path.write_text(toml(case))
+        return path
+
+    @property
+    def has_peers(self) -> bool:
+        """The drivers of the peers know one body, and no table of the restitution."""
+        return self.example == COULOMB and "restitution_curve" not in self.changes.get("effect", {})
+
+
+def effect(name: str, **parameters: float | list[float]) -> dict:
+    """One effect."""
+    return {"effect": {name: parameters}}
+
+
+ROWS = (
+    Row("coulomb", "Coulomb friction", 300_000, linear=True, fast=(100, 400)),
+    Row(
+        "viscous",
+        "viscous friction",
+        300_000,
+        {"friction": {"law": "viscous", "damping": 0.2}},
+        linear=True,
+        fast=(100, 400),
+    ),
+    Row("ripple", "drive ripple", 200_000, effect("drive_ripple", sine=0.05), linear=True, fast=(100, 400)),
+    Row(
+        "slope",
+        "restitution falls linearly",
+        150_000,
+        effect("restitution_slope", slope=0.03),
+        linear=True,
+        fast=(100, 400),
+    ),
+    Row(
+        "power",
+        "restitution falls as a power",
+        150_000,
+        {"contact": {"law": "newton_power", "restitution": 0.7, "yield_speed": 0.5, "upper": "1.1 m"}},
+        linear=True,
+        fast=(100, 400),
+    ),
+    Row(
+        "viscoelastic",
+        "viscoelastic restitution",
+        150_000,
+        {"contact": {"law": "newton_viscoelastic", "first": 0.4, "second": 0.096, "upper": "1.1 m"}},
+        linear=True,
+        fast=(100, 400),
+    ),
+    Row(
+        "curve",
+        "restitution by a table",
+        150_000,
+        effect("restitution_curve", speed=[0.0, 1.0, 2.0, 4.0], change=[0.0, -0.05, -0.08, -0.1]),
+        linear=True,
+        fast=(100, 400),
+    ),
+    Row(
+        "kelvin_voigt",
+        "Kelvin-Voigt wall, pulls",
+        50_000,
+        {"contact": KELVIN_VOIGT | {"tension": 1}},
+        linear=True,
+        fast=(50, 200),
+    ),
+    Row(
+        "kelvin_voigt_cut",
+        "Kelvin-Voigt wall, never pulls",
+        50_000,
+        {"contact": KELVIN_VOIGT | {"tension": 0}},
+        linear=True,
+        sizes=Checks(2, 1, 5_000, 150),
+        fast=(50, 200),
+    ),
+    Row(
+        "hunt_crossley",
+        "Hunt-Crossley wall, 1e6 N/m^1.5",
+        10_000,
+        effect("compliant_contact", stiffness=1e6, damping=0.1),
+        fast=(8, 16),
+    ),
+    Row("cubic", "cubic spring, 20 N/m^3", 10_000, effect("cubic_spring", stiffness=20.0)),
+    Row("drag", "quadratic drag, 0.05 N s^2/m^2", 10_000, effect("quadratic_drag", coefficient=0.05)),
+    Row("dahl", "Dahl's friction, 300 N/m", 5_000, effect("dahl", stiffness=300.0)),
+    Row(
+        "place",
+        "position-dependent friction",
+        10_000,
+        effect("position_dependent_friction", slope=0.2),
+        linear=True,
+        sizes=Checks(1, 1, 1_000, 200),
+        fast=(50, 200),
+    ),
+    Row(
+        "asymmetric",
+        "asymmetric friction",
+        10_000,
+        effect("asymmetric_friction", coulomb=0.3, viscous=0.1),
+        linear=True,
+        sizes=Checks(1, 1, 1_000, 200),
+        fast=(50, 200),
+    ),
+    Row("stribeck", "Stribeck effect, 0.2 m/s", 10_000, effect("stribeck", excess=0.5, velocity=0.2)),
+    Row(
+        "pair",
+        "two bodies with backlash, 60 s",
+        30_000,
+        example="basin_pair_backlash",
+        fast=(16, 48),
+        sizes=Checks(0, 0, 1000, 61),
+    ),
+)
+
+
+def toml(table: dict, prefix: str = "") -> str:
+    """A case file of a dictionary."""
+    plain = {key: value for key, value in table.items() if not is_table(value)}
+    text = "".join(f"{key} = {literal(value)}\n" for key, value in plain.items())
+    for key, value in table.items():
+        for part in value if isinstance(value, list) and is_table(value) else [value]:
+            if isinstance(part, dict):
+                mark = "[[{}]]" if isinstance(value, list) else "[{}]"
+                text += "\n" + mark.format(prefix + key) + "\n" + toml(part, f"{prefix}{key}.")
+    return text
+
+
+def is_table(value: object) -> bool:
+    """A table, or a list of them."""
+    return isinstance(value, dict) or (
+        isinstance(value, list) and any(isinstance(part, dict) for part in value)
+    )
+
+
+def literal(value: object) -> str:
+    """A value."""
+    return (
+        f'"{value}"'
+        if isinstance(value, str)
+        else str(value).lower()
+        if isinstance(value, bool)
+        else repr(value)
+    )
