@@ -3,6 +3,7 @@
 
 !> What is allowed in a case and hardly meant.
 module case_warnings
+  use attractors, only: most_coordinates
   use case_setup, only: grid_of
   use case_type, only: case_t
   use contact_law, only: contact_at_speed, contact_hunt_crossley, contact_t
@@ -12,6 +13,8 @@ module case_warnings
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
   use jointed, only: joint_contact, jointed_t
+  use jointed_motion, only: jointed_motion_t
+  use jointed_section, only: coordinates_of_jointed, fits_section
   use journal, only: journal_t
   use kinds, only: int64, wp
   use motion, only: motion_t
@@ -24,8 +27,8 @@ module case_warnings
 
   public :: warn_about
 
-  !> Share of the upper half of the modes in what an impact feels, above which restitution is in doubt.
-  real(wp), parameter :: doubtful_share = 0.2_wp
+  !> A restitution is one of the structure, not of its modes, if no more than this yields in the upper half of them.
+  real(wp), parameter :: converged_share = 0.2_wp
 
 contains
 
@@ -41,6 +44,7 @@ contains
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
     if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
+    if (allocated(moving%jointed)) call warn_about_bodies(command, the_case, moving%jointed, journal)
     if (allocated(moving%pair)) then
       associate (machine => moving%pair%machine)
         if (abs(machine%blow) > 0 .and. machine%blow_time > the_case%run%duration) then
@@ -54,29 +58,45 @@ contains
         end if
       end associate
     end if
-    if (allocated(moving%jointed)) call warn_about_restitution(the_case, moving%jointed%machine, journal)
     if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
-  !> Says if a rigid contact acts on a flexible structure, where restitution does not converge with the number of modes
-  !> (Melcher, Champneys, Wagg, Phil. Trans. R. Soc. A, 2013).
-  subroutine warn_about_restitution(the_case, machine, journal)
+  !> Says if several bodies are too many for a search of attractors, and where a restitution is one of a flexible structure: it
+  !> then depends on the number of modes.
+  subroutine warn_about_bodies(command, the_case, moving, journal)
+    character(len=*), intent(in) :: command
     type(case_t), intent(in) :: the_case
-    type(jointed_t), intent(in) :: machine
+    type(jointed_motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
-    real(wp) :: squares(machine%n), shapes(machine%n, machine%n), felt(machine%n), share
-    integer :: i, j
-    if (machine%n < 2 .or. .not. any([(index(the_case%laws(i)%name, 'structure:') == 1, i=1, size(the_case%laws))])) return
-    call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
-    do j = 1, size(machine%joints)
-      if (machine%joints(j)%kind /= joint_contact) cycle
-      felt = matmul(machine%joints(j)%row, shapes)**2
-      share = sum(felt((machine%n + 3)/2:))/sum(felt)
-      if (share > doubtful_share) call journal%line('warning', 'warning: the upper half of the modes has '// &
-        to_text(100*share, 3)//' % of what an impact at '//trim(machine%joints(j)%name)//' feels: its restitution says more '// &
-        'about the number of modes than about the material. A soft contact (law = "kelvin_voigt") does not depend on it')
+    real(wp) :: share
+    integer :: j
+    if ((command == 'basin' .or. command == 'sweep') .and. .not. fits_section(moving)) then
+      call journal%line('warning', 'warning: no attractors are looked for: the section has '// &
+        to_text(coordinates_of_jointed(moving))//' coordinates, more than '//to_text(most_coordinates)//'. Points get the '// &
+        'regime at the end of their run')
+    end if
+    if (.not. any(index(the_case%laws%name, 'structure:') == 1)) return
+    do j = 1, size(moving%machine%joints)
+      if (moving%machine%joints(j)%kind /= joint_contact) cycle
+      share = upper_share(moving%machine, moving%machine%joints(j)%row)
+      if (share <= converged_share) cycle
+      call journal%line('warning', 'warning: '//trim(moving%machine%joints(j)%name)//': the upper half of the modes makes '// &
+        to_text(nint(100*share))//' % of what yields at an impact, and a restitution does not converge with their number. '// &
+        'Compare with fewer and with more modes, or give the stop a stiffness (kelvin_voigt)')
     end do
-  end subroutine warn_about_restitution
+  end subroutine warn_about_bodies
+
+  !> Share of the upper half of the undamped modes in the mobility along a row.
+  function upper_share(machine, row) result(share)
+    type(jointed_t), intent(in) :: machine
+    real(wp), intent(in) :: row(:)
+    real(wp) :: share, squares(machine%n), shapes(machine%n, machine%n), part(machine%n)
+    share = 0
+    if (machine%n < 2) return
+    call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
+    part = matmul(row, shapes)**2
+    share = sum(part((machine%n + 1)/2 + 1:))/sum(part)
+  end function upper_share
 
   !> Says if a record of a force jumps where it begins again.
   subroutine warn_about_force(command, the_case, moving, journal)

@@ -66,3 +66,29 @@ def test_progress_of_the_capsule(separatrix, source_dir, tmp_path):
             assert per_period == samples
             last = (len(x) - 2) // per_period * per_period
             assert x[last] - x[last - per_period] == pytest.approx(progress, abs=2e-8)
+
+
+def test_a_restitution_at_a_flexible_place_is_warned_of(separatrix, source_dir, tmp_path):
+    """All modes of a cantilever move its tip alike: half of what yields are the upper half of them."""
+    case = source_dir / "examples" / "validation" / "structures" / "cantilever.toml"
+    text = case.read_text()
+    (tmp_path / "one.toml").write_text(text)
+    four = text.replace("frequency = [1]", "frequency = [1, 6.26689, 17.5475, 34.3861]")
+    (tmp_path / "four.toml").write_text(four.replace("[2]", "[2, -2, 2, -2]"))
+    short = ["--set", "run.duration=14", "--set", "run.window=7"]
+    assert "warning" not in succeed(separatrix, "trajectory", "one.toml", *short, folder=tmp_path).out
+    said = succeed(separatrix, "trajectory", "four.toml", *short, folder=tmp_path).out
+    assert "warning: contact.stop: the upper half of the modes makes 50 %" in said
+
+
+def test_too_many_bodies_for_a_search_are_warned_of(separatrix, tmp_path):
+    """Nine bodies have 18 coordinates on the section."""
+    bodies = "".join(
+        f'[body.b{i}]\nmass = 1\n[spring.s{i}]\nbetween = ["b{i}"]\nstiffness = {i}\ndamping = 0.1\n'
+        for i in range(1, 10)
+    )
+    axes = "".join(f'[[axis]]\nname = "{name}"\nfrom = 0\nto = 1\ncount = 2\n' for name in ("x0", "v0"))
+    drive = '[drive.force]\nlaw = "force"\nbody = "b1"\namplitude = 1\nfrequency = 1\n'
+    (tmp_path / "case.toml").write_text(bodies + drive + "[run]\nduration = 20\nwindow = 7\n" + axes)
+    said = succeed(separatrix, "basin", "case.toml", folder=tmp_path).out
+    assert "warning: no attractors are looked for: the section has 18 coordinates, more than 16" in said
