@@ -4,6 +4,7 @@
 !> One executable with subcommands: reads the arguments, calls the command, returns the exit code.
 program separatrix
   use basin_driver, only: run_basin
+  use branches_driver, only: run_branches
   use command_line, only: command_t, help_text, read_command_line
   use errors, only: error_t
   use info_driver, only: run_info
@@ -11,6 +12,7 @@ program separatrix
   use laws_driver, only: run_laws
   use merge_driver, only: run_merge
   use points_driver, only: run_points
+  use stability_driver, only: run_stability
   use sweep_driver, only: run_sweep
   use status, only: exit_io
   use system, only: exit_at_once, exit_program, sleep_microseconds
@@ -38,6 +40,10 @@ program separatrix
         call run_basin(command)
       case ('sweep')
         call run_sweep(command)
+      case ('branches')
+        call run_branches(command)
+      case ('stability')
+        call run_stability(command)
       case ('trajectory')
         call run_trajectory_command(command)
       case ('points')

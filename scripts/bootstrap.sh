@@ -4,24 +4,27 @@
 #
 # Installs what Separatrix needs on Debian or Ubuntu and makes .venv with the Python packages.
 # Running it again is quick: it does only what is missing. With --browser also what the browser tests of the viewer need:
-# Chromium, and Playwright to drive it.
+# Chromium, and Playwright to drive it. With --docs also what scripts/docs builds the site with.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 browser=false
-case "${1:-}" in
-  --browser) browser=true ;;
-  "") ;;
-  *)
-    echo "usage: bootstrap.sh [--browser]" >&2
-    exit 64
-    ;;
-esac
+docs=false
+for option in "$@"; do
+  case "$option" in
+    --browser) browser=true ;;
+    --docs) docs=true ;;
+    *)
+      echo "usage: bootstrap.sh [--browser] [--docs]" >&2
+      exit 64
+      ;;
+  esac
+done
 
 packages=(
   gfortran gcc g++ cmake ninja-build git
   openmpi-bin libopenmpi-dev libhdf5-openmpi-dev libhdf5-dev hdf5-tools
-  libgsl-dev libtoml11-dev zlib1g-dev python3-venv
+  libgsl-dev libtoml11-dev zlib1g-dev python3-venv libpangoft2-1.0-0 libpangocairo-1.0-0
 )
 
 if $browser && ! command -v chromium > /dev/null; then
@@ -99,16 +102,20 @@ make_venv() {
   wanted > "$stamp"
 }
 
-# Kept out of .venv's stamp: who does not test the browser has neither.
-add_playwright() {
-  if ! .venv/bin/python -c 'import playwright' 2> /dev/null; then
-    echo "bootstrap: installing Playwright into .venv"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-browser.txt
+# Kept out of .venv's stamp: who does not test the browser or build the site has neither.
+add_packages() {
+  local module=$1 list=$2
+  if ! .venv/bin/python -c "import $module" 2> /dev/null; then
+    echo "bootstrap: installing $list into .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$list"
   fi
 }
 
 install_packages
 make_venv
 if $browser; then
-  add_playwright
+  add_packages playwright requirements-browser.txt
+fi
+if $docs; then
+  add_packages myst_parser requirements-docs.txt
 fi

@@ -82,8 +82,8 @@ if $check; then
     "$tools/clang-format" --dry-run -Werror "${c_files[@]}" || failed=1
   fi
   echo "format: Python (ruff)"
-  "$tools/ruff" format --check tests postprocess scripts || failed=1
-  "$tools/ruff" check tests postprocess scripts || failed=1
+  "$tools/ruff" format --check tests postprocess scripts docs/conf.py docs/_ext docs/gallery || failed=1
+  "$tools/ruff" check tests postprocess scripts docs/conf.py docs/_ext docs/gallery || failed=1
 else
   "$tools/fortitude" check --fix --output-format concise src apps tests || failed=1
   lint_suites || failed=1
@@ -92,8 +92,8 @@ else
     "$tools/clang-format" -i "${c_files[@]}"
   fi
   echo "format: Python (ruff)"
-  "$tools/ruff" format tests postprocess scripts
-  "$tools/ruff" check --fix tests postprocess scripts || failed=1
+  "$tools/ruff" format tests postprocess scripts docs/conf.py docs/_ext docs/gallery
+  "$tools/ruff" check --fix tests postprocess scripts docs/conf.py docs/_ext docs/gallery || failed=1
 fi
 
 if ((failed)); then

@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-scripts/bootstrap.sh --browser
+scripts/bootstrap.sh --browser --docs
 # shellcheck source=scripts/environment.sh
 source scripts/environment.sh
 jobs=$(nproc)
@@ -31,8 +31,14 @@ ctest --test-dir build-serial -L "$serial_layers" -j "$jobs" --output-on-failure
   --output-junit ctest.xml || status=1
 
 echo "test: running the Python tests"
-SEPARATRIX_BUILD=$PWD/build .venv/bin/python -m pytest -q -ra tests/python tests/faults \
+export SEPARATRIX_BUILD=$PWD/build
+.venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile --durations=15 tests/python \
   --junit-xml=build/pytest.xml || status=1
 
-.venv/bin/python scripts/count_tests.py build/ctest.xml build-serial/ctest.xml build/pytest.xml || status=1
+# Alone: they kill what runs, at times that they choose.
+echo "test: running the tests of faults"
+.venv/bin/python -m pytest -q -ra tests/faults --junit-xml=build/pytest-faults.xml || status=1
+
+.venv/bin/python scripts/count_tests.py build/ctest.xml build-serial/ctest.xml build/pytest.xml \
+  build/pytest-faults.xml || status=1
 exit "$status"

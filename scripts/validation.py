@@ -15,6 +15,7 @@ from itertools import groupby
 from pathlib import Path
 
 import validation_rows as rows
+import validation_structures
 from markdown import table
 from validation_numbers import NOT_YET, THEIRS
 from validation_rows import SOURCE, Program, Row
@@ -43,7 +44,7 @@ def section(source: str, found: list[Row]) -> str:
     return f"### {source}\n\n{table(head, [line(row) for row in found])}\n\nHow ours were computed:\n\n{told}"
 
 
-def page(found: list[Row], report: dict, version: dict[str, str]) -> str:
+def page(found: list[Row], structures: list, report: dict, version: dict[str, str]) -> str:
     """The text of docs/validation.md."""
     order = list(THEIRS)
     found = sorted(found, key=lambda row: order.index(row.key))
@@ -58,6 +59,7 @@ def page(found: list[Row], report: dict, version: dict[str, str]) -> str:
             differs=table(head, missed) if missed else "Nothing.",
             count=len(found),
             tables="\n\n".join(parts),
+            structures=validation_structures.section(structures),
             not_yet=table(["source", "what", "why"], [list(item) for item in NOT_YET]),
             referee=compare.summary_table(report),
             disagreements=compare.disagreements(report),
@@ -89,10 +91,12 @@ def main() -> int:
     for compute in rows.COMPUTED:
         print(f"validation: {compute.__name__}", flush=True)
         found += compute(program)
+    print("validation: structures", flush=True)
+    structures = validation_structures.numbers(validation_structures.Program(build, folder / "structures"))
     report = compare.kept_report(build, folder / "referee")
-    (SOURCE / "docs" / "validation.md").write_text(page(found, report, version))
+    (SOURCE / "docs" / "validation.md").write_text(page(found, structures, report, version))
     print("validation: wrote docs/validation.md", flush=True)
-    bad = [row for row in found if row.verdict != "agrees"]
+    bad = [row for row in [*found, *structures] if row.verdict != "agrees"]
     return 1 if bad or compare.wrong_in(report) else 0
 
 

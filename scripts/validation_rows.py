@@ -296,11 +296,11 @@ def soft(program: Program) -> list[Row]:
         "`separatrix basin examples/validation/soft_impact.toml`",
     )
     free = entries["impacts_per_period"].ravel() == 0
-    others = entries["period"].ravel()[~free]
+    others = entries["kind"].ravel()[~free]
     model, rig = program.models["soft_impact"], program.models["soft_impact_rig"]
     rows = [
         Row("soft.amplitude", float(entries["amplitude"].ravel()[free][0]), command),
-        Row("soft.chaos", float(np.sum(others == 0)), command),
+        Row("soft.chaos", float(np.sum(others == 3)), command),
         Row("soft.graze", graze_of(model, "drive.ratio", 0.42, 0.6, 0.63), NEWTON.format("soft_impact")),
     ]
     for a in (0.7, 0.9):

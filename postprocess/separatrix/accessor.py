@@ -130,6 +130,21 @@ class Accessor:
             raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)
         return made[name] if name else next(iter(made.values()))
 
+    def difference(
+        self, other: xr.Dataset, field: str | None = None, *, title: str | None = None, **wishes: object
+    ) -> "Figure":
+        """Return the map of this result with black where `other`, of the same points, has another motion.
+
+        Compared are regime, period and event word. `field` (attractor) and `wishes` as for `plot`.
+        """
+        from separatrix import style
+        from separatrix.figures.difference import difference
+        from separatrix.labels import plain
+
+        heading = plain(title or str(self._result.attrs.get("title", "")))
+        with style.context():
+            return difference(self._result, other, field, heading, _look(wishes))
+
     def save(
         self,
         stem: str | Path,

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import basin, contact, points, sweep, trajectory
+from separatrix.figures import basin, branches, contact, points, sweep, trajectory
 from separatrix.figures.animation import animate
+from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
@@ -22,6 +23,7 @@ from separatrix.save import FORMATS, save
 from separatrix.version import __version__
 
 _FILM_DPI = 150
+_BY_KIND = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,9 +40,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except SeparatrixError as error:
             reported = _report(error)
             code = code or reported
-    if options.beside and code == 0:
+    for wanted, together in ((options.beside, make_beside), (options.difference, make_difference)):
+        if not wanted or code != 0:
+            continue
         try:
-            for written in make_beside(options):
+            for written in together(options):
                 print(written, flush=True)
         except SeparatrixError as error:
             return _report(error)
@@ -60,6 +64,23 @@ def make_beside(options: argparse.Namespace) -> list[Path]:
         target = (options.output or first.parent) / f"{first.name.removesuffix('.h5')}_beside"
         title = plain(options.title or "Contact forces")
         return save(contact.beside(results, title), target, options.formats, options.dpi)
+
+
+def make_difference(options: argparse.Namespace) -> list[Path]:
+    """Write the map of the first of two files, black where the second differs; return the paths."""
+    if len(options.files) != 2:
+        raise SeparatrixError(f"--difference: found {len(options.files)} files, allowed 2", USAGE)
+    first, second = options.files
+    with (
+        style.context(options.style),
+        reading(second),
+        open_result(second) as other,
+        open_result(first) as result,
+    ):
+        title = plain(options.title or result.attrs.get("title", first.stem))
+        figure = difference(result, other, options.field, title, _look(options))
+        target = (options.output or first.parent) / f"{first.name.removesuffix('.h5')}_difference"
+        return save(figure, target, options.formats, options.dpi)
 
 
 def make(path: Path, options: argparse.Namespace) -> list[Path]:
@@ -89,7 +110,7 @@ def _figures(path: Path, result: object, field: str | None, title: str, look: Lo
         return basin.figures(path, result, field, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
-    return {"sweep": sweep, "trajectory": trajectory, "points": points}[kind].figures(result, title, look)
+    return _BY_KIND[kind].figures(result, title, look)
 
 
 def _animated(
@@ -147,6 +168,11 @@ def _parser() -> Parser:
         "--beside",
         action="store_true",
         help="trajectories with soft barriers: also one figure of the fastest contact of each",
+    )
+    parser.add_argument(
+        "--difference",
+        action="store_true",
+        help="two basin files of the same points: also the map of the first, black where the second differs",
     )
     parser.add_argument("--title", help="title of the figures [that of the file]")
     parser.add_argument(

@@ -26,8 +26,9 @@ def can_label(case: Case) -> bool:
     """Whether the library does it: one body on a line, every point of the grid, an axis of starts."""
     resolved = case.resolved
     starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
-    angle = resolved["restoring"]["law"] == "pendulum"
-    return starts and not angle and "refine" not in resolved and "driven_mass" not in resolved["body"]
+    # a machine of several bodies has no restoring law
+    line = resolved.get("restoring", {}).get("law", "pendulum") != "pendulum"
+    return starts and line and "refine" not in resolved and "driven_mass" not in resolved["body"]
 
 
 class SecondLookError(Exception):

@@ -118,10 +118,12 @@ def _window(run: dict, period: float) -> float:
 def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None) -> dict[str, object]:
     resolved = case.resolved
     steady = cycle or summary
+    # several bodies may have no drive at all
+    ratio = float(resolved.get("drive", {}).get("ratio", 0.0))
     about: dict[str, object] = {
         "format": "separatrix", "format_version": 1, "kind": "trajectory", "complete": 1, "title": case.title,
         "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
-        "drive_period": summary["drive_period"], "drive_ratio": float(resolved["drive"].get("ratio", 0.0)),
+        "drive_period": summary["drive_period"], "drive_ratio": ratio,
         "window": _window(resolved["run"], summary["drive_period"]),
         "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],
         "regime": REGIMES[int(steady["regime"])],

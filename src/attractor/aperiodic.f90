@@ -16,10 +16,12 @@ module aperiodic
   implicit none
   private
 
-  public :: watch_long, add_aperiodic
+  public :: watch_long, outlast, meets_chaos, add_aperiodic
 
   !> Drive periods over which the motion is watched, and batches of them whose mean drifts are compared.
   integer, parameter :: box_periods = 512, batches = 16
+  !> Drive periods after which a transient is no longer expected to end, on closed forms and where flights are marched.
+  integer, parameter :: lasting_exact = 16384, lasting = 4096
   !> Distance of the neighbour, in units of the motion's size, and the smallest that is told from rounding.
   real(wp), parameter :: neighbour = 1e-8_wp, rounding = 1e-15_wp
   !> The mean drift counts as positive if it is so many of its standard errors.
@@ -70,6 +72,43 @@ contains
     call judge_drift(drift, found)
   end subroutine watch_long
 
+  !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the catalogue
+  !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly.
+  pure subroutine outlast(moving, catalogue, strobe, known, ok)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(strobe_t), intent(inout) :: strobe
+    logical, intent(out) :: known, ok
+    type(returns_t) :: returns
+    type(tally_t) :: tally
+    integer(int64) :: slips
+    integer :: i, reason
+    known = .false.
+    ok = .true.
+    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    do i = 1, merge(lasting_exact, lasting, moving%exact)
+      slips = tally%slips
+      call advance_strobe_period(moving, strobe, tally, reason)
+      ok = reason == 0
+      if (.not. ok) return
+      known = find_capture(catalogue, section_point(moving, strobe), tally%slips > slips .or. .not. rest_lasts(moving)) > 0
+      if (known) return
+      call watch_returns(moving, strobe, tally%chatters, returns)
+      if (returns%period > 0) return
+    end do
+  end subroutine outlast
+
+  !> Whether the box of a motion meets that of an entry of its regime that is chaotic.
+  pure logical function meets_chaos(catalogue, found)
+    type(attractor_t), intent(in) :: catalogue(:), found
+    integer :: k
+    meets_chaos = .false.
+    do k = 1, size(catalogue)
+      if (catalogue(k)%kind /= kind_chaotic .or. catalogue(k)%features%regime /= found%features%regime) cycle
+      meets_chaos = meets_chaos .or. boxes_meet(found, catalogue(k))
+    end do
+  end function meets_chaos
+
   !> Logarithm of the factor by which the distance to a neighbour in `direction` (0: any) grows from the section point `before` to
   !> the next, `now`; the direction becomes that of the neighbour there.
   pure subroutine follow_neighbour(moving, n, scale, before, now, direction, drift)
@@ -94,6 +133,12 @@ contains
     reached = point_near(reached, now, moving%machine%turn)
     direction(:n) = (reached(:n) - now(:n))/scale(:n)
     distance = norm2(direction(:n))
+    ! A neighbour that had to be given up tells nothing.
+    if (reason /= 0 .or. .not. distance <= huge(distance)) then
+      direction = 0
+      drift = 0
+      return
+    end if
     drift = logarithm(max(distance, rounding)/neighbour)
     if (distance > rounding) then
       direction = direction/distance

@@ -4,9 +4,9 @@
 !> Builds the catalogue of attractors of one machine from a sample of starts. Serial and in a fixed order; frozen
 !> before any trajectory of a map is labelled.
 module discover
-  use aperiodic, only: add_aperiodic, watch_long
-  use attractors, only: attractor_t, find_box, find_capture, kind_rest, longest_period, make_points, most_coordinates, &
-    regime_non_impact
+  use aperiodic, only: add_aperiodic, meets_chaos, outlast, watch_long
+  use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_rest, longest_period, make_points, &
+    most_coordinates, regime_non_impact
   use circle, only: point_near
   use contact_law, only: contact_t
   use cycle, only: map_point, refine_cycle
@@ -85,7 +85,7 @@ contains
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     type(attractor_t) :: found, cycle_found
     type(returns_t) :: returns
-    logical :: known, ok
+    logical :: known, ok, lasts
     if (is_linear(moving) .and. stretch%regime == regime_non_impact) then
       call motion_without_impact(moving, found, ok)
       if (ok) then
@@ -93,14 +93,21 @@ contains
         return
       end if
     end if
-    call watch_long(moving, catalogue, stretch%amplitude, strobe, found, returns, known, ok)
-    if (known .or. .not. ok) return
-    call identify(moving, strobe, returns, max_period, cycle_found, ok)
-    if (ok) then
-      if (.not. holds(catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
-    else
-      call add_aperiodic(moving, found, catalogue)
-    end if
+    lasts = .false.
+    do
+      call watch_long(moving, catalogue, stretch%amplitude, strobe, found, returns, known, ok)
+      if (known .or. .not. ok) return
+      call identify(moving, strobe, returns, max_period, cycle_found, ok)
+      if (ok) then
+        if (.not. holds(catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
+        return
+      end if
+      if (lasts .or. found%kind /= kind_chaotic .or. meets_chaos(catalogue, found)) exit
+      call outlast(moving, catalogue, strobe, known, ok)
+      if (known .or. .not. ok) return
+      lasts = .true.
+    end do
+    call add_aperiodic(moving, found, catalogue)
   end subroutine look_longer
 
   !> The one motion without impact of a linear damped oscillator, if it stays clear of the barriers: its map is linear, so that

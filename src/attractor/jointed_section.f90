@@ -60,7 +60,8 @@ contains
     fits_section = coordinates_of_jointed(moving) <= most_coordinates
   end function fits_section
 
-  !> A state with the watched body at `x` [m], `v` [m/s], the others where the machine says, and the drive at `angle` [rad].
+  !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, the drive at
+  !> `angle` [rad].
   !> One that no mode fits, or that lies beyond a stop, is not a number.
   pure function start_of_jointed(moving, x, v, angle) result(state)
     type(jointed_motion_t), intent(in) :: moving
@@ -68,8 +69,11 @@ contains
     type(jointed_state_t) :: state
     real(wp) :: start(2, moving%machine%n)
     logical :: ok
-    start = moving%machine%start
-    start(:, moving%machine%watched) = [x, v]
+    associate (machine => moving%machine)
+      start = machine%start
+      start(1, :) = start(1, :) + machine%start_shape(:, 1)*(x - start(1, machine%watched))
+      start(2, :) = start(2, :) + machine%start_shape(:, 2)*(v - start(2, machine%watched))
+    end associate
     call start_jointed(moving, start(1, :), start(2, :), angle, state, ok)
     if (ok) ok = is_allowed(moving, start(1, :), state%time)
     if (.not. ok) state%q = ieee_value(1.0_wp, ieee_quiet_nan)

@@ -2,7 +2,8 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A machine of one body, two or several as the stroboscopic map sees it: a state that moves from section to section, and the
-!> coordinates that fix it there. Those of one body are x and v. Of two, what nothing depends on is left out: the driving
+!> coordinates that fix it there. Those of one body are x and v, and what its laws remember: the force of Dahl's friction, the speed
+!> at which a contact that lasts began. Of two, what nothing depends on is left out: the driving
 !> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
 !> velocity of both where nothing ties either to the ground.
 module strobe
@@ -88,10 +89,54 @@ contains
   !> Number of coordinates on the section.
   pure integer function coordinates_of(moving) result(n)
     type(motion_t), intent(in) :: moving
-    n = 2
-    if (allocated(moving%pair)) n = count(counts_of(moving))
-    if (allocated(moving%jointed)) n = coordinates_of_jointed(moving%jointed)
+    if (allocated(moving%jointed)) then
+      n = coordinates_of_jointed(moving%jointed)
+    else if (allocated(moving%pair)) then
+      n = count(counts_of(moving))
+    else
+      n = 2 + count(remembers(moving))
+    end if
   end function coordinates_of
+
+  !> What the laws of one body remember: the force of Dahl's friction, the speed at which a contact began.
+  pure function remembers(moving)
+    type(motion_t), intent(in) :: moving
+    logical :: remembers(2)
+    associate (machine => moving%machine)
+      remembers = [machine%effects%dahl_stiffness > 0, machine%contact%soft .and. machine%contact%by_impact]
+    end associate
+  end function remembers
+
+  !> A body at a point of the section.
+  pure type(state_t) function body_at(moving, point) result(state)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    real(wp) :: memory(2)
+    logical :: has(2)
+    has = remembers(moving)
+    memory = 0
+    if (any(has)) memory = unpack(point(3:2 + count(has)), has, memory)
+    if (has(1)) then
+      state = start_state(moving, point(1), point(2), 0.0_wp, z=memory(1), touch_speed=abs(memory(2)))
+    else if (has(2)) then
+      state = start_state(moving, point(1), point(2), 0.0_wp, touch_speed=abs(memory(2)))
+    else
+      state = start_state(moving, point(1), point(2), 0.0_wp)
+    end if
+    call take_turns(moving%machine%turn, state)
+  end function body_at
+
+  !> The coordinates of a body on the section; the speed of a contact that is over is zero.
+  pure function body_point(moving, state) result(point)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(in) :: state
+    real(wp), allocatable :: point(:)
+    logical :: lasts
+    associate (contact => moving%machine%contact)
+      lasts = state%x > contact%soft_upper .or. state%x < contact%soft_lower
+    end associate
+    point = [state%x, state%v, pack([state%z, merge(state%touch_speed, 0.0_wp, lasts)], remembers(moving))]
+  end function body_point
 
   !> Whether the state on the section tells what follows: not with a controller that acts at times of its own, nor before
   !> a blow.
@@ -137,6 +182,14 @@ contains
     end if
     if (.not. allocated(moving%pair) .or. before%pair%mode == 0) then
       strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
+      if (allocated(moving%pair) .or. allocated(moving%jointed) .or. before%state%mode == 0) return
+      associate (state => before%state)
+        strobe%state = start_state(moving, state%x, state%v, angle, touch_speed=state%touch_speed)
+        if (moving%machine%effects%dahl_stiffness > 0) then
+          strobe%state = start_state(moving, state%x, state%v, angle, z=state%z, touch_speed=state%touch_speed)
+        end if
+      end associate
+      call take_turns(moving%machine%turn, strobe%state)
       return
     end if
     associate (y => before%pair%y)
@@ -173,8 +226,7 @@ contains
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
       return
     else if (.not. allocated(moving%pair)) then
-      strobe%state = start_state(moving, point(1), point(2), 0.0_wp)
-      call take_turns(moving%machine%turn, strobe%state)
+      strobe%state = body_at(moving, point)
       return
     end if
     n = coordinates_of(moving)
@@ -201,7 +253,8 @@ contains
       point = jointed_point(moving%jointed, strobe%jointed)
       return
     else if (.not. allocated(moving%pair)) then
-      point(:2) = [strobe%state%x, strobe%state%v]
+      n = coordinates_of(moving)
+      point(:n) = body_point(moving, strobe%state)
       return
     end if
     all_of_them = strobe%pair%y([at_x2, at_v2, at_x1, at_v1, at_integral])
@@ -240,7 +293,8 @@ contains
     else if (.not. allocated(moving%pair)) then
       length = half_range
       if (moving%machine%turn > 0) length = min(length, moving%machine%turn/2)
-      scales(:2) = length*[1.0_wp, w]
+      n = coordinates_of(moving)
+      scales(:n) = [length*[1.0_wp, w], pack([moving%machine%effects%dahl_sliding, length*w], remembers(moving))]
     else
       counts = counts_of(moving)
       n = count(counts)

@@ -7,7 +7,7 @@ module case_echo
   use axis, only: axis_t, linear_values
   use case_type, only: case_t, sweep_t
   use kinds, only: wp
-  use law_table, only: effect_family, is_hidden, label_length, law_choice_t, parameter_row_t, parameters_of, part_family, &
+  use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, &
     part_kind, part_law, path_of, value_of
   use refinement, only: refine_t
   use text, only: to_text
@@ -32,7 +32,7 @@ contains
     if (len(the_case%title) > 0) text = text//'title = '//quoted(the_case%title)//newline
     text = text//deciding_text(the_case, '')
     do i = 1, size(the_case%laws)
-      if (is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i), body_names(the_case%laws))
+      if (is_sensor(the_case%laws(i))) text = text//law_text(the_case%laws(i), the_case%laws)
     end do
     associate (record => the_case%record)
       text = text//newline//'[record]'//newline//line('rate', to_text(record%rate))//line('noise', to_text(record%noise))// &
@@ -61,7 +61,7 @@ contains
     text = ''
     do i = 1, size(the_case%laws)
       if (.not. is_sensor(the_case%laws(i)) .and. is_written(the_case, i)) text = text//law_text(the_case%laws(i), &
-                                                                                body_names(the_case%laws))
+                                                                                                     the_case%laws)
     end do
     text = text//settings_text(the_case)
     if (kind == '' .or. kind == 'trajectory') text = text//newline//'[trajectory]'//newline// &
@@ -81,17 +81,21 @@ contains
     is_sensor = law%family == effect_family .and. index(law%name, 'sensor_') == 1
   end function is_sensor
 
-  !> One table of a law; a barrier that is not there (at the largest number) is left out. `names` are those of the bodies.
-  pure function law_text(law, names) result(text)
-    type(law_choice_t), intent(in) :: law
-    character(len=*), intent(in) :: names(:)
+  !> One table of a law; a barrier that is not there (at the largest number) is left out. Points have lines in the table of
+  !> their structure.
+  pure function law_text(law, laws) result(text)
+    type(law_choice_t), intent(in) :: law, laws(:)
     character(len=:), allocatable :: text
     type(parameter_row_t), allocatable :: rows(:)
     integer :: i
-    text = newline//'['//path_of(law)//']'//newline
-    if (law%family == part_family) then
+    text = ''
+    if (law%name == 'point:row') return
+    if (law%name /= 'point:watched') text = newline//'['//path_of(law)//']'//newline
+    if (law%name == 'point:watched') then
+      continue
+    else if (law%family == part_family) then
       if (part_kind(law%name) /= 'body') text = text//line('law', quoted(part_law(law%name)))
-      text = text//ends_text(law, names)
+      text = text//ends_text(law, place_names(laws))
     else if (law%family /= effect_family .and. law%name /= 'structure') then
       text = text//line('law', quoted(trim(law%name)))
     end if
@@ -106,7 +110,10 @@ contains
         end if
       end associate
     end do
-    if (law%name == 'body:watched') text = text//newline//'[watch]'//newline//line('body', quoted(trim(law%label)))
+    if (part_kind(law%name) == 'structure') text = text//points_text(law, laws)
+    if (law%name == 'body:watched' .or. law%name == 'point:watched') then
+      text = text//newline//'[watch]'//newline//line('body', quoted(trim(law%label)))
+    end if
   end function law_text
 
   !> The ends of a part.
@@ -115,12 +122,12 @@ contains
     character(len=*), intent(in) :: names(:)
     character(len=:), allocatable :: text
     select case (part_kind(law%name))
-    case ('body')
+    case ('body', 'structure')
       text = ''
     case ('drive')
       text = line('body', quoted(trim(names(nint(value_of(law, 'body'))))))
     case default
-      text = line('between', '['//end_text('first')//', '//end_text('second')//']')
+      text = line('between', '['//end_text('first_end')//', '//end_text('second_end')//']')
     end select
 
   contains
@@ -136,12 +143,27 @@ contains
 
   end function ends_text
 
-  !> Names of the bodies of a machine of several.
-  pure function body_names(laws) result(names)
+  !> The points of a structure, a table below its own.
+  pure function points_text(structure, laws) result(text)
+    type(law_choice_t), intent(in) :: structure, laws(:)
+    character(len=:), allocatable :: text
+    integer :: i, mark
+    text = ''
+    do i = 1, size(laws)
+      if (index(laws(i)%name, 'point:') /= 1) cycle
+      mark = index(laws(i)%label, '.')
+      if (laws(i)%label(:mark - 1) /= structure%label) cycle
+      text = text//line(trim(laws(i)%label(mark + 1:)), reals(list_of(laws(i), 'row')))
+    end do
+    if (len(text) > 0) text = newline//'['//path_of(structure)//'.point]'//newline//text
+  end function points_text
+
+  !> Names of the places of a machine of several bodies and structures.
+  pure function place_names(laws) result(names)
     type(law_choice_t), intent(in) :: laws(:)
     character(len=label_length), allocatable :: names(:)
-    names = pack(laws%label, index(laws%name, 'body:') == 1)
-  end function body_names
+    names = pack(laws%label, index(laws%name, 'body:') == 1 .or. index(laws%name, 'point:') == 1)
+  end function place_names
 
   !> Whether the case has the table of a law: of several bodies, only those that it wrote.
   pure logical function is_written(the_case, i)

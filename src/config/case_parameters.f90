@@ -8,9 +8,10 @@ module case_parameters
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
-    path_of
+    path_of, split_element
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
+  use text, only: to_text
   implicit none
   private
 
@@ -33,21 +34,26 @@ contains
     is_start = path == 'x0' .or. path == 'v0' .or. path == 'crank_angle'
   end function is_start
 
-  !> Positions of the scalar parameter `path` of the chosen laws: law in `laws`, row in its
-  !> parameters. Both 0 if the laws have no such parameter or it is a list.
-  pure subroutine find_parameter(laws, path, law, row)
+  !> Positions of the parameter `path` of the chosen laws: law in `laws`, row in its parameters, and of an element of a list
+  !> ('drive.sine[2]') its number. All 0 if the laws have no such parameter, or it is a list as a whole.
+  pure subroutine find_parameter(laws, path, law, row, element)
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: path
     integer, intent(out) :: law, row
+    integer, intent(out), optional :: element
     type(parameter_row_t), allocatable :: rows(:)
-    integer :: i, j
+    character(len=:), allocatable :: name
+    integer :: i, j, number
     law = 0
     row = 0
+    call split_element(canonical_name(path), name, number)
+    if (present(element)) element = max(number, 0)
     do i = 1, size(laws)
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
-        if (rows(j)%list .or. path_of(laws(i))//'.'//trim(rows(j)%name) /= canonical_name(path)) cycle
-        if (is_hidden(rows(j))) cycle
+        if (path_of(laws(i))//'.'//trim(rows(j)%name) /= name .or. is_hidden(rows(j))) cycle
+        if (rows(j)%list .neqv. number > 0) cycle
+        if (number > size(laws(i)%parameters(j)%values)) cycle
         law = i
         row = j
       end do
@@ -85,7 +91,7 @@ contains
     end select
   end subroutine parameter_bounds
 
-  !> Names of the scalar parameters of the chosen laws, for messages.
+  !> Names of the scalar parameters of the chosen laws, and of the elements of lists, for messages.
   pure function parameter_names(laws) result(names)
     type(law_choice_t), intent(in) :: laws(:)
     character(len=:), allocatable :: names
@@ -95,9 +101,12 @@ contains
     do i = 1, size(laws)
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
-        if (rows(j)%list .or. is_hidden(rows(j))) cycle
+        if (is_hidden(rows(j)) .or. size(laws(i)%parameters(j)%values) == 0) cycle
         if (len(names) > 0) names = names//', '
         names = names//path_of(laws(i))//'.'//trim(rows(j)%name)
+        if (rows(j)%list) names = names//'[1]'
+        if (rows(j)%list .and. size(laws(i)%parameters(j)%values) > 1) names = names//' to ['// &
+          to_text(size(laws(i)%parameters(j)%values))//']'
       end do
     end do
   end function parameter_names
@@ -107,10 +116,10 @@ contains
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: absent
-    integer :: law, row
+    integer :: law, row, element
     parameter_value = absent
-    call find_parameter(laws, path, law, row)
-    if (law > 0) parameter_value = laws(law)%parameters(row)%values(1)
+    call find_parameter(laws, path, law, row, element)
+    if (law > 0) parameter_value = laws(law)%parameters(row)%values(max(element, 1))
   end function parameter_value
 
   !> Replaces the scalar parameter `path` ('family.parameter', 'effect.NAME.parameter' or 'ratio') in the laws. An unknown

@@ -5,7 +5,8 @@
 !> occur, and the problems found so far with their places.
 module case_source
   use errors, only: error_t, fail
-  use status, only: exit_bad_case
+  use status, only: exit_bad_case, exit_no_input
+  use structure_data, only: structure_file_reader
   use suggest, only: nearest_word
   use text, only: join, replace_all, starts_with, to_text
   use toml_bindings, only: read_toml, toml_array, toml_boolean, toml_entry_t, toml_float, toml_integer, &
@@ -27,6 +28,8 @@ module case_source
     character(len=:), allocatable :: path, text
     !> Something is not there that is needed.
     logical :: missing = .false.
+    !> A file that the case names cannot be opened.
+    logical :: file_missing = .false.
   end type problem_t
 
   integer, parameter :: path_length = 96
@@ -38,6 +41,8 @@ module case_source
     !> Paths of the keys that may occur.
     character(len=path_length), allocatable :: known(:)
     type(problem_t), allocatable :: problems(:)
+    !> Reads HDF5 files of structures, where the program can.
+    procedure(structure_file_reader), pointer, nopass :: structure_file => null()
   end type case_source_t
 
 contains
@@ -210,12 +215,12 @@ contains
   end subroutine enter_table
 
   !> Notes a problem with the key `path` (or the table that lacks it); `shown` replaces the key in
-  !> the message. `missing`: something that is needed is not there.
-  subroutine report(source, path, problem, shown, missing)
+  !> the message. `missing`: something that is needed is not there; `file_missing`: a file that cannot be opened.
+  subroutine report(source, path, problem, shown, missing, file_missing)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path, problem
     character(len=*), intent(in), optional :: shown
-    logical, intent(in), optional :: missing
+    logical, intent(in), optional :: missing, file_missing
     type(problem_t) :: new
     character(len=:), allocatable :: above, place
     integer :: at, line
@@ -239,6 +244,7 @@ contains
     if (present(shown)) above = shown
     new = problem_t(line, path, place//': key '''//above//''': '//problem)
     if (present(missing)) new%missing = missing
+    if (present(file_missing)) new%file_missing = file_missing
     call insert(source, new)
   end subroutine report
 
@@ -278,7 +284,8 @@ contains
     end do
   end function has_problems
 
-  !> The problems as one error, a line each; none leaves `error` unallocated.
+  !> The problems as one error, a line each; none leaves `error` unallocated. Code 65, or 66 if files are missing and all else
+  !> is well.
   subroutine problems_of(source, error)
     type(case_source_t), intent(in) :: source
     type(error_t), allocatable, intent(out) :: error
@@ -289,7 +296,7 @@ contains
     do i = 2, size(source%problems)
       message = message//new_line('a')//source%problems(i)%text
     end do
-    call fail(error, exit_bad_case, message)
+    call fail(error, merge(exit_no_input, exit_bad_case, all(source%problems%file_missing)), message)
   end subroutine problems_of
 
   !> Notes every entry that no reader has asked for.

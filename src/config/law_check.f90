@@ -122,7 +122,7 @@ contains
     type(jointed_t) :: jointed
     type(error_t), allocatable :: error
     if (is_jointed(laws)) then
-      if (.not. is_good(source, ['spring'])) return
+      if (.not. is_good(source, ['spring   ', 'structure'])) return
       call jointed_of(laws, jointed, error)
     else if (is_pair(laws)) then
       call build_pair(laws, pair, error)

@@ -1,17 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables of a machine of several bodies: [body.NAME], [spring.NAME], [friction.NAME], [contact.NAME], [drive.NAME] and
-!> [watch].
+!> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME],
+!> [contact.NAME], [drive.NAME] and [watch].
 module part_reader
   use case_parameters, only: row_bounds
-  use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, report
+  use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
   use kinds, only: wp
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, set_value, value_of
+  use structure_reader, only: read_structure
   use suggest, only: nearest_word
-  use text, only: join, starts_with, to_text
+  use text, only: join, replace_all, starts_with, to_text
   use toml_bindings, only: toml_array, toml_string, toml_table
   implicit none
   private
@@ -22,14 +23,14 @@ module part_reader
   character(len=8), parameter :: kinds_of_parts(5) = ['body    ', 'spring  ', 'friction', 'contact ', 'drive   ']
   character(len=8), parameter :: default_law(5) = ['mass    ', 'linear  ', 'coulomb ', '        ', '        ']
   character(len=*), parameter :: ground = 'ground'
-  !> Name and number of every body.
+  !> Names of the places between which joints act: bodies, then points of structures.
   type :: bodies_t
     character(len=label_length), allocatable :: names(:)
   end type bodies_t
 
 contains
 
-  !> Whether a case has tables [body.NAME]. A table in the place of a key of [body] is none.
+  !> Whether a case has tables [body.NAME] or [structure.NAME]. A table in the place of a key of [body] is none.
   pure logical function has_parts(source)
     type(case_source_t), intent(in) :: source
     character(len=label_length), allocatable :: names(:)
@@ -39,6 +40,7 @@ contains
     do i = 1, size(names)
       if (.not. any(parameters%family == 'body' .and. parameters%name == names(i))) has_parts = .true.
     end do
+    if (size(names_of(source, 'structure')) > 0) has_parts = .true.
   end function has_parts
 
   !> Names of the tables [kind.NAME], in the order of the text.
@@ -72,9 +74,18 @@ contains
     type(bodies_t) :: bodies
     character(len=label_length), allocatable :: names(:)
     character(len=:), allocatable :: watched
+    type(law_choice_t), allocatable :: structures(:)
     integer :: i, k
     bodies%names = names_of(source, 'body')
     call check_names(source, 'body', bodies%names)
+    names = names_of(source, 'structure')
+    call check_names(source, 'structure', names)
+    allocate (structures(0))
+    do k = 1, size(names)
+      call read_structure(source, trim(names(k)), k, structures)
+    end do
+    bodies%names = [bodies%names, pack(structures%label, index(structures%name, 'point:') == 1)]
+    call check_columns(source, bodies%names)
     call read_watch(source, bodies, watched)
     do i = 1, size(kinds_of_parts)
       names = names_of(source, trim(kinds_of_parts(i)))
@@ -82,6 +93,11 @@ contains
       do k = 1, size(names)
         call read_part(source, trim(kinds_of_parts(i)), trim(default_law(i)), trim(names(k)), watched, bodies, choices)
       end do
+      if (i > 1) cycle
+      do k = 1, size(structures)
+        if (structures(k)%name == 'point:row' .and. structures(k)%label == watched) structures(k)%name = 'point:watched'
+      end do
+      choices = [choices, structures]
     end do
   end subroutine read_parts
 
@@ -101,13 +117,34 @@ contains
     end do
   end subroutine check_names
 
-  !> The body that the start and the results refer to: the first, unless [watch] names another.
+  !> Columns of results are named after the places, with _ for a point.
+  subroutine check_columns(source, names)
+    type(case_source_t), intent(inout) :: source
+    character(len=label_length), intent(in) :: names(:)
+    integer :: i, k
+    do i = 1, size(names)
+      do k = 1, i - 1
+        if (replace_all(trim(names(i)), '.', '_') /= replace_all(trim(names(k)), '.', '_')) cycle
+        call report(source, 'structure.'//names(i)(:index(names(i), '.') - 1), 'found the point "'//trim(names(i))// &
+                    '" and a "'//trim(names(k))//'", allowed names that differ in more than a dot')
+      end do
+    end do
+  end subroutine check_columns
+
+  !> The body or point that the start and the results refer to: the first, unless [watch] names another.
   subroutine read_watch(source, bodies, watched)
     type(case_source_t), intent(inout) :: source
     type(bodies_t), intent(in) :: bodies
     character(len=:), allocatable, intent(out) :: watched
     logical :: found
     call enter_table(source, 'watch', found)
+    watched = ''
+    if (size(bodies%names) == 0) then
+      call know_all_below(source, 'watch')
+      if (.not. has_problems(source)) call report(source, 'structure', 'found no body and no point, allowed '// &
+        '[structure.NAME.point] with one or more')
+      return
+    end if
     watched = trim(bodies%names(1))
     call take_text(source, 'watch.body', watched)
     if (.not. any(bodies%names == watched)) call report(source, 'watch.body', 'found "'//watched//'"'// &
@@ -253,8 +290,8 @@ contains
       call report(source, key, 'found the same end twice, allowed two bodies, or one for it and the ground')
       return
     end if
-    call set_value(choice, 'first', [real(ends(1), wp)])
-    call set_value(choice, 'second', [real(ends(2), wp)])
+    call set_value(choice, 'first_end', [real(ends(1), wp)])
+    call set_value(choice, 'second_end', [real(ends(2), wp)])
   end subroutine read_ends
 
   !> Number of a body, 0 the ground, -1 if there is none of that name.
@@ -266,6 +303,10 @@ contains
     number = findloc(bodies%names, name, 1)
     if (number > 0 .or. (or_ground .and. name == ground)) return
     number = -1
+    ! Of a structure that could not be read nobody knows the points.
+    if (index(name, '.') > 1) then
+      if (has_problems(source, 'structure.'//name(:index(name, '.') - 1))) return
+    end if
     call report(source, key, 'found "'//name//'"'//hint(name, bodies%names)//', allowed '//join(bodies%names, ', ')// &
                 trim(merge(', ground', '        ', or_ground)))
   end function number_of

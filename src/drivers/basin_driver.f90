@@ -61,7 +61,7 @@ contains
     call require_axes(session%the_case, error)
     call session%stop_if(error)
     call prepare_basin(session%the_case, work, tile)
-    call check_slices(work%grid, error)
+    call check_slices(work%grid, work%span, error)
     call session%stop_if(error)
     if (command%validate) then
       call session%journal%line('valid', command%path//' is a valid case for basin')
@@ -209,7 +209,8 @@ contains
       source, '"attractors": '//to_text(last))
     if (len(not_known_text(work%catalogues, work%span%extension)) > 0) call session%journal%line('warning', &
       not_known_text(work%catalogues, work%span%extension))
-    call session%journal%line('missed', missed_text(work%catalogues, session%the_case%attractors%sample))
+    if (len(missed_text(work%catalogues, session%the_case%attractors%sample)) > 0) call session%journal%line('missed', &
+      missed_text(work%catalogues, session%the_case%attractors%sample))
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
       call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k), &

@@ -66,13 +66,15 @@ contains
   end function not_known_text
 
   !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where
-  !> there is no catalogue. The bound is that of independent starts.
+  !> a slice has none, whether or not it was looked for. The bound is that of independent starts.
   function missed_text(catalogues, sample) result(line)
     type(catalogue_t), intent(in) :: catalogues(:)
     integer, intent(in) :: sample
     character(len=:), allocatable :: line
+    integer :: i
     line = ''
     if (size(catalogues) == 0) return
+    if (any([(size(catalogues(i)%attractors) == 0, i=1, size(catalogues))])) return
     line = 'an attractor that was not found attracts less than '//to_text(100*share_upper_limit(0, sample, confidence), 3)// &
       ' % of the starts'
     if (size(catalogues) > 1) line = line//' of its slice'

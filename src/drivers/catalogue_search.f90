@@ -31,13 +31,18 @@ module catalogue_search
 
 contains
 
-  !> Refuses a grid (code 65) whose slices, with one attractor each, would have more than fit.
-  pure subroutine check_slices(grid, error)
+  !> Refuses a grid (code 65) whose slices, with one attractor each, would have more than fit, and a duration that does not suit
+  !> the drive of the first slice or the last.
+  subroutine check_slices(grid, span, error)
     type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
     type(error_t), allocatable, intent(out) :: error
+    type(motion_t) :: moving
     if (any(grid%start_axis > 0) .and. grid%slices > most_slices) call fail(error, exit_bad_case, &
       "key 'axis.count': found "//to_text(grid%slices)//' slices of starts over the parameters of the machine, allowed at most '// &
       to_text(most_slices)//'; divide the map')
+    if (.not. allocated(error)) call open_slice(grid, span, 0_int64, moving, error)
+    if (.not. allocated(error)) call open_slice(grid, span, grid%slices - 1, moving, error)
   end subroutine check_slices
 
   !> Catalogues of every slice, labelled along the slices; none if no start is an axis (then every point is its own

@@ -14,8 +14,8 @@ module command_line
 
   integer, parameter :: longest_argument = 4096
 
-  character(len=*), parameter, public :: commands(8) = [character(len=10) :: 'basin', 'sweep', &
-    'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
+  character(len=*), parameter, public :: commands(10) = [character(len=10) :: 'basin', 'sweep', &
+    'branches', 'stability', 'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
 
   !> The commands that keep what is done when they are stopped.
   character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
@@ -42,6 +42,13 @@ module command_line
     !> Seconds between lines of progress; 0 = as the journal thinks fit.
     real(wp) :: progress = 0
     integer :: ranks_per_node = 0
+    !> `branches`: the parameter, its range, and at how many values orbits are searched.
+    character(len=:), allocatable :: parameter
+    real(wp) :: from = 0, to = 0
+    logical :: has_from = .false., has_to = .false.
+    integer :: searches = 12
+    !> `stability`: drive periods that are watched.
+    integer :: periods = 20000
     !> `verify`: points rerun, and the seed that chooses them.
     integer :: sample = 200, seed = 1
     !> `verify`: share of the labels that may change, in per cent.
@@ -61,6 +68,7 @@ contains
     command%path = ''
     command%output = ''
     command%list = ''
+    command%parameter = ''
     command%csv = ''
     command%record = ''
     command%tile_times = ''
@@ -116,6 +124,14 @@ contains
       call fail(error, exit_usage, '--search-only searches, --catalogue takes what was found: choose one')
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
+    else if (command%name == 'stability' .and. len(command%output) > 0) then
+      call fail(error, exit_usage, 'stability writes no file: -o does not belong to it (--log FILE keeps its report)')
+    else if (command%name == 'stability' .and. command%periods < 64) then
+      call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed is a whole number from 64')
+    else if (command%name == 'branches' .and. len(command%parameter) == 0) then
+      call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
+    else if (command%name /= 'branches' .and. (len(command%parameter) > 0 .or. command%has_from .or. command%has_to)) then
+      call fail(error, exit_usage, '--parameter, --from and --to belong to the command branches')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. .not. any(command%name == tabulated)) then
@@ -191,6 +207,7 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
+          '--parameter', '--from', '--to', '--searches', '--periods', &
           '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
@@ -233,6 +250,18 @@ contains
       call read_integer(name, value, 1, command%sample, error)
     case ('--seed')
       call read_integer(name, value, 0, command%seed, error)
+    case ('--parameter')
+      command%parameter = value
+    case ('--from')
+      command%has_from = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%from, error)
+    case ('--to')
+      command%has_to = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
+    case ('--searches')
+      call read_integer(name, value, 1, command%searches, error)
+    case ('--periods')
+      call read_integer(name, value, 1, command%periods, error)
     case ('--max-changes')
       call read_number_in(name, value, 0.0_wp, 100.0_wp, 'per cent', command%max_changes, error)
     end select
@@ -330,6 +359,16 @@ contains
       lines = 'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
         '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
         '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl
+    case ('branches')
+      lines = 'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
+        '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
+        '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
+        '  --searches N       values at which orbits are searched (default 12)'//nl
+    case ('stability')
+      lines = 'separatrix stability CASE [--periods N]: Lyapunov exponents and the kind of one motion'//nl// &
+        '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
+        '  the 0-1 test, and what the motion is. One body. Writes no file.'//nl// &
+        '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl
     case ('trajectory')
       lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
         '  --csv FILE      also write the events as a table'//nl// &
@@ -364,6 +403,8 @@ contains
       lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl// &
         '  basin CASE       where every point of a grid of starts or parameters ends up'//nl// &
         '  sweep CASE       amplitude-frequency and bifurcation diagram, run up, run down and from many starts'//nl// &
+        '  branches CASE    periodic orbits over a parameter, stable and unstable, with their bifurcations'//nl// &
+        '  stability CASE   Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic'//nl// &
         '  trajectory CASE  one motion with all its events'//nl// &
         '  points CASE      a list of starts'//nl// &
         '  merge OUT SHARD  one file from the shares of a map'//nl// &

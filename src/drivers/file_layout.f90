@@ -28,11 +28,11 @@ module file_layout
 
 contains
 
-  !> Name of an axis in a file.
+  !> Name of a parameter or place in a file: drive_sine_2 for drive.sine[2].
   pure function axis_dimension(name) result(dimension)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: dimension
-    dimension = replace_all(trim(name), '.', '_')
+    dimension = replace_all(replace_all(replace_all(trim(name), '.', '_'), '[', '_'), ']', '')
   end function axis_dimension
 
   !> Dimensions and coordinate variables of the axes; returns the dimension names.

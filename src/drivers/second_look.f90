@@ -48,7 +48,7 @@ contains
     if (budget == 0) return
     looks = min(most_looks, budget)
     call schema%add_dimension('look', int(looks, int64))
-    call schema%add_dimension('look_column', int((budget + looks - 1)/looks + 1, int64))
+    call schema%add_dimension('look_column', int(budget/looks + 1, int64))
     call add_record(schema, group, record, 'look', 'look_column', 'points (C order, from 0) from which attractors were '// &
                     'searched again, -1 = none; last column: check number of the row, 0 = no such look')
   end subroutine offer_second_look
@@ -93,10 +93,11 @@ contains
     end associate
   end subroutine recall_second_look
 
+  !> Where the search has found nothing there is no section, or no start that ends anywhere.
   logical function is_offered(session, work)
     type(session_t), intent(in) :: session
     type(basin_work_t), intent(in) :: work
-    is_offered = session%the_case%attractors%second_look > 0 .and. size(work%catalogues) > 0
+    is_offered = session%the_case%attractors%second_look > 0 .and. entries(work%catalogues) > 0
   end function is_offered
 
   !> Looks again as long as points are without an attractor and the budget lasts. `complete` is false after a stop.
@@ -274,7 +275,7 @@ contains
         if (slice(k) /= i - 1 .or. allocated(error)) cycle
         start(:, 1) = point_start(grid, index_of(grid, row(k)))
         call discover_attractors(moving, span, start, max_period, catalogues(i)%attractors)
-        call check_stop(journal, time_limit, 'looking again for attractors', error)
+        call check_stop(journal, time_limit, 'looking again for attractors', error, resumable=.true.)
       end do
     end do
     call team%agree(error)

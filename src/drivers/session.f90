@@ -23,6 +23,7 @@ module session
   use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
+  use structure_file, only: read_structure_file
   use system, only: exit_program, sleep_microseconds
   use team, only: team_t
   use text, only: to_text
@@ -78,7 +79,7 @@ contains
     if (command%name /= 'trajectory') call install_signals(error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
-                                                   wants_sweep=command%name == 'sweep')
+                                                   wants_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
   end subroutine open_session
 

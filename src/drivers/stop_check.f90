@@ -17,19 +17,25 @@ module stop_check
 contains
 
   !> Code 75 if a stop signal came or `time_limit` [s] since the start is over (0 = none); `doing` says what is left undone.
-  subroutine check_stop(journal, time_limit, doing, error)
+  !> `resumable`: a working file is there, with which --resume goes on.
+  subroutine check_stop(journal, time_limit, doing, error, resumable)
     type(journal_t), intent(in) :: journal
     real(wp), intent(in) :: time_limit
     character(len=*), intent(in) :: doing
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: resumable
     real(wp) :: elapsed
-    logical :: stop_now
+    logical :: stop_now, has_file
     stop_now = signal_count() > 0
     elapsed = monotonic_seconds() - journal%started
     if (time_limit > 0) stop_now = stop_now .or. elapsed >= time_limit
-    if (stop_now) then
-      call fail(error, exit_resumable, 'stopped while '//doing//'; nothing was written yet, the same command '// &
-                'starts again')
+    if (.not. stop_now) return
+    has_file = .false.
+    if (present(resumable)) has_file = resumable
+    if (has_file) then
+      call fail(error, exit_resumable, 'stopped while '//doing//'; the same command with --resume goes on')
+    else
+      call fail(error, exit_resumable, 'stopped while '//doing//'; nothing was written yet, the same command starts again')
     end if
   end subroutine check_stop
 

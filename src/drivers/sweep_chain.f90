@@ -28,8 +28,8 @@ module sweep_chain
   !> not a number there.
   integer, parameter :: hold_numbers = 11, hold_codes = 4
   integer, parameter, public :: hold_reason = 2
-  !> Most limits that are kept of one chain, and numbers kept of each.
-  integer, parameter :: most_limits = 64, limit_numbers = 7
+  !> Numbers kept of each limit.
+  integer, parameter :: limit_numbers = 7
 
   type, public :: limit_t
     !> Marks of the holds (see `hold_t`) before and behind it, and whether the parameter goes up.
@@ -108,7 +108,7 @@ contains
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), observed(2), bracket(2)
-    real(wp) :: limits(limit_numbers, most_limits), course(size(values))
+    real(wp) :: limits(limit_numbers, size(values)), course(size(values))
     type(hold_t) :: held
     type(settled_t) :: settled(size(values))
     type(strobe_t) :: state
@@ -129,7 +129,7 @@ contains
       points(:, :, k) = held%samples
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == reason_time_over) then
-        if (before > 0 .and. held%mark /= mark .and. found < most_limits) then
+        if (before > 0 .and. held%mark /= mark) then
           next = held%mark
           call observe_limit(grid, span, path, course(before), course(i), state, mark, tolerance, next, observed, error)
           if (.not. allocated(error)) call branch_end(grid, path, course, settled(:before), state, mark, longest, tolerance, &

@@ -11,7 +11,7 @@ module trajectory_driver
   use command_line, only: command_t
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
-  use file_layout, only: add_events
+  use file_layout, only: add_events, axis_dimension
   use grid, only: grid_t, slice_motion
   use jointed, only: jointed_t
   use journal, only: duration_text
@@ -211,18 +211,23 @@ contains
     call schema%add_attribute('', 'energy_closing_error', closing_error(book))
   end subroutine add_book
 
-  !> Position and velocity of every body of several.
+  !> Position and velocity of every body of several, and of the coordinates of structures, whose names end in a number.
   subroutine add_bodies(machine, log, schema)
     type(jointed_t), intent(in) :: machine
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: name, column
+    logical :: inner
     integer :: i
     do i = 1, machine%n
       name = trim(machine%names(i))
-      call schema%add_variable(name//'_x', type_float64, ['time'], units='m', long_name='position of '//name, &
+      column = axis_dimension(name)
+      inner = index(name, '.') > 0 .and. verify(name(index(name, '.') + 1:), '0123456789') == 0
+      call schema%add_variable(column//'_x', type_float64, ['time'], units=trim(merge('1', 'm', inner)), &
+                               long_name=trim(merge('coordinate', 'position  ', inner))//' of '//name, &
                                data=log%sample_coordinates(i, :log%samples))
-      call schema%add_variable(name//'_v', type_float64, ['time'], units='m/s', long_name='velocity of '//name, &
+      call schema%add_variable(column//'_v', type_float64, ['time'], units=trim(merge('1/s', 'm/s', inner)), &
+                               long_name=trim(merge('rate    ', 'velocity', inner))//' of '//name, &
                                data=log%sample_coordinates(machine%n + i, :log%samples))
     end do
   end subroutine add_bodies

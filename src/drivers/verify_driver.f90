@@ -57,6 +57,9 @@ module verify_driver
     character(len=:), allocatable :: first_difference
   end type audit_t
 
+  !> Deviations [m] above it are explained to the reader.
+  real(wp), parameter :: told_deviation = 1e-6_wp
+
 contains
 
   !> Verifies the file that `command` names. Code 74 naming what is wrong; 77 where the sample shows that more labels would
@@ -413,6 +416,8 @@ contains
       to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
       to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
       unit_of('m/s', audit%is_angle)
+    if (audit%x_deviation > told_deviation .and. audit%flips == 0) write (output_unit, '(a)') &
+      '  a deviation so large with the same label: the phase on the cycle, or chaos, hangs on the last digits of the start'
     if (.not. audit%whole) write (output_unit, '(a)') &
       '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &
       ' % of the labels would change'

@@ -5,14 +5,16 @@
 !> exponential series.
 module flight_path
   use elementary, only: exponential, sine_cosine
+  use guards, only: joint_guard_t
   use jointed, only: joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees, most_joints
-  use jointed_state, only: acts_as_spring, is_held, joint_force, jointed_state_t, turning_at
+  use jointed_state, only: acts_as_spring, is_curved, is_held, joint_force, jointed_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
+  use polynomial, only: value_at
   implicit none
   private
 
-  public :: begin_path, path_at, place_powers, force_powers, unknowns_of, series_step, constant_forces
+  public :: begin_path, begin_series, path_at, place_powers, force_powers, unknowns_of, series_step, constant_forces, guard_row
 
   !> Terms of the exponential series over a stretch no longer than 1/rate.
   integer, parameter, public :: terms = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)
@@ -27,6 +29,10 @@ module flight_path
     real(wp) :: force(most_degrees) = 0, force_rate(most_degrees) = 0
     !> Unknowns of the series at the start, and the matrix with its constant columns.
     real(wp), allocatable :: unknowns(:), matrix(:, :)
+    !> Of a step of a marched flight: its length [s], and the coordinates and speeds by rising powers of its fraction; 0 of
+    !> other flights.
+    real(wp) :: length = 0
+    real(wp), allocatable :: step(:, :)
   end type path_t
 
 contains
@@ -60,7 +66,7 @@ contains
     rate = 0
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
-        if (is_held(joint, state%phase(j))) cycle
+        if (is_held(joint, state%phase(j)) .or. is_curved(joint, state%phase(j))) cycle
         if (acts_as_spring(joint, state%phase(j))) then
           now = joint%offset%mean + joint%offset%rate*state%time
           if (joint%kind == joint_soft) then
@@ -220,7 +226,13 @@ contains
     real(wp) :: sine, cosine, w
     integer :: k, n
     n = machine%n
-    if (.not. flow%modal) then
+    if (path%length > 0) then
+      do k = 1, n
+        q(k) = value_at(path%step(:, k), t/path%length)
+        v(k) = value_at(path%step(:, n + k), t/path%length)
+      end do
+      return
+    else if (.not. flow%modal) then
       call series_at(machine, flow, path, t, q, v)
       return
     end if
@@ -295,5 +307,26 @@ contains
     p(0) = p(0) - sum(flow%reaction(i, :)*path%force(:n))
     p(1) = p(1) - sum(flow%reaction(i, :)*path%force_rate(:n))
   end function force_powers
+
+  !> The row of a guard over the unknowns of the series.
+  pure function guard_row(machine, flow, path, guard) result(row)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: guard
+    real(wp) :: row(size(path%unknowns))
+    integer :: one
+    one = 2*machine%n + 1
+    associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
+      row = guard%place*flow%place_row(:, guard%joint) + guard%speed*flow%speed_row(:, guard%joint)
+      row(one) = row(one) + guard%constant + guard%place*(offset%mean + offset%rate*path%start) + guard%speed*offset%rate
+      row(one + 1) = row(one + 1) + guard%place*offset%rate
+      if (guard%held > 0) then
+        row = row + guard%force*flow%force_row(:, guard%held)
+        row(one) = row(one) - guard%force*sum(flow%reaction(guard%held, :)*path%force(:n))
+        row(one + 1) = row(one + 1) - guard%force*sum(flow%reaction(guard%held, :)*path%force_rate(:n))
+      end if
+    end associate
+  end function guard_row
 
 end module flight_path

@@ -3,7 +3,7 @@
 
 !> One flight of a linear mode: to the first guard that falls, or to a time.
 module linear_flight
-  use flight_path, only: begin_path, path_at, path_t, series_step, terms
+  use flight_path, only: begin_path, guard_row, path_at, path_t, series_step, terms
   use guard_search, only: find_first, prepare_search, search_t
   use guards, only: guards_of, joint_guard_t, most_guards
   use jointed, only: jointed_t
@@ -77,7 +77,7 @@ contains
     fallen = .false.
     y = path%unknowns
     do g = 1, count_guards
-      row(:, g) = row_of(machine, flow, path, list(g))
+      row(:, g) = guard_row(machine, flow, path, list(g))
     end do
     stretches = max(1, ceiling(flow%rate*duration))
     length = duration/stretches
@@ -145,27 +145,6 @@ contains
       end do
     end function value
   end subroutine watch_series
-
-  !> The row of a guard over the unknowns.
-  pure function row_of(machine, flow, path, guard) result(row)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(path_t), intent(in) :: path
-    type(joint_guard_t), intent(in) :: guard
-    real(wp) :: row(size(path%unknowns))
-    integer :: one
-    one = 2*machine%n + 1
-    associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
-      row = guard%place*flow%place_row(:, guard%joint) + guard%speed*flow%speed_row(:, guard%joint)
-      row(one) = row(one) + guard%constant + guard%place*(offset%mean + offset%rate*path%start) + guard%speed*offset%rate
-      row(one + 1) = row(one + 1) + guard%place*offset%rate
-      if (guard%held > 0) then
-        row = row + guard%force*flow%force_row(:, guard%held)
-        row(one) = row(one) - guard%force*sum(flow%reaction(guard%held, :)*path%force(:n))
-        row(one + 1) = row(one + 1) - guard%force*sum(flow%reaction(guard%held, :)*path%force_rate(:n))
-      end if
-    end associate
-  end function row_of
 
   !> Drops the leading terms of a series that are no more than the rounding of what they are sums of.
   pure subroutine drop_rounding(row, matrix, y, length, p)

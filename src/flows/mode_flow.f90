@@ -90,9 +90,7 @@ contains
     harmonics = harmonics_of(machine)
     call set_constraints(machine, flow)
     call set_forcing(machine, flow, harmonics, forcing, surface)
-    if (machine%linear) then
-      call set_modes(machine, flow, forcing, surface)
-    end if
+    call set_modes(machine, flow, forcing, surface)
     if (with_matrix .or. .not. flow%modal) call set_matrix(machine, flow, forcing, surface)
   end subroutine build_flow
 

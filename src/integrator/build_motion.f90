@@ -65,10 +65,6 @@ contains
     type(jointed_t) :: machine
     call jointed_of(laws, machine, error)
     if (allocated(error)) return
-    if (options%flight == flight_adaptive) then
-      call fail(error, exit_bad_case, 'integrator.flight = "adaptive": several bodies are flown in closed form; use "auto"')
-      return
-    end if
     moving%options = options
     moving%machine%mass = machine%mass(machine%watched, machine%watched)
     moving%machine%period = machine%period

@@ -70,6 +70,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     moving%machine = machine
     moving%options = options
+    ! Tables are left to single flights.
+    if (machine%effects%upwards%count > 0 .or. machine%effects%over_place%count > 0) moving%options%lane_width = 0
     moving%layer = machine%friction%layer_speed
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive
@@ -83,16 +85,19 @@ contains
     end if
   end subroutine prepare_motion
 
-  !> State of a body set off at `x` [m], `v` [m/s] with the crank at `crank_angle` [rad].
-  pure function start_state(moving, x, v, crank_angle) result(state)
+  !> State of a body set off at `x` [m], `v` [m/s] with the crank at `crank_angle` [rad]. Dahl's friction is `z` [N], or what
+  !> it is after a long slip this way; a contact that lasts has begun with `touch_speed` [m/s], or with |v|.
+  pure function start_state(moving, x, v, crank_angle, z, touch_speed) result(state)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, crank_angle
+    real(wp), intent(in), optional :: z, touch_speed
     type(state_t) :: state
     state = state_t(x=x, v=v, mode=mode_slip_plus, touch_speed=abs(v))
+    if (present(touch_speed)) state%touch_speed = touch_speed
     state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
-    ! Dahl's friction is taken to have slipped this way for long.
     if (abs(v) > 0) state%z = dahl_level(moving%machine%effects, sign(1.0_wp, v))
+    if (present(z)) state%z = z
     if (v == 0) state%mode = mode_from_rest(moving%machine, state)
   end function start_state
 

@@ -6,7 +6,7 @@
 module rest
   use certified_step, only: departure_step, positive_step
   use contact_law, only: contact_constant, contact_force, restitution_at
-  use effect_law, only: break_away_level, friction_factor
+  use effect_law, only: break_away_level, friction_change, friction_factor, steepest_by_place, steepest_by_speed
   use drive_law, only: foot_motion, measured_force, next_sample
   use friction_law, only: friction_t, power
   use kinds, only: wp
@@ -161,18 +161,20 @@ contains
     type(state_t), intent(in) :: state
     integer, intent(in) :: direction
     real(wp), intent(in) :: speed
-    real(wp) :: force, rate, curvature, out, back, shrink, friction, change, bounce
+    real(wp) :: force, rate, curvature, out, back, shrink, friction, changed(2), change, bounce
     left = -1
     call net_force(machine, state, force, rate, curvature)
     associate (law => machine%friction, effects => machine%effects)
       if (direction*force <= strongest_hold(machine, state%x, direction)) return
       friction = law%kinetic + law%excess + law%second_excess
+      changed = 0
       if (effects%present) then
+        changed = [friction_change(effects, -real(direction, wp), 0.0_wp), friction_change(effects, real(direction, wp), 0.0_wp)]
         friction = friction_factor(effects, state%x)*friction
         if (.not. effects%dahl_stiffness > 0) force = force - friction_factor(effects, state%x)*effects%asymmetric_coulomb
       end if
-      out = (direction*force + friction)/machine%mass
-      back = (direction*force - friction)/machine%mass
+      out = (direction*force + friction + changed(1))/machine%mass
+      back = (direction*force - friction - changed(2))/machine%mass
       if (back <= 0) return
       bounce = speed/out + speed/sqrt(back*out)
       shrink = sqrt(back/out)*chatter_restitution(machine, speed, bounce)
@@ -234,8 +236,9 @@ contains
       call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
       stretch = machine%restoring%free_length + foot - state%x
       change = (effects%quadratic_drag*speed + abs(effects%asymmetric_viscous))*speed + height* &
-               (3*abs(effects%cubic)*stretch**2 + 2*effects%dahl_stiffness + abs(effects%friction_slope)* &
+               (3*abs(effects%cubic)*stretch**2 + 2*effects%dahl_stiffness + steepest_by_place(effects)* &
                 (law%kinetic + law%excess + law%second_excess + abs(effects%asymmetric_coulomb) + abs(state%z)))
+      change = change + steepest_by_speed(effects)*speed
     end associate
   end function effect_change
 

@@ -21,7 +21,7 @@ module map_reader
   implicit none
   private
 
-  public :: open_final
+  public :: open_final, open_reader
 
   !> What `variables` tells about a dataset. `group` '' is the root.
   type, public :: variable_info_t
@@ -35,6 +35,7 @@ module map_reader
     type(h5_file_t), private :: file
   contains
     procedure :: variables
+    procedure :: children
     procedure :: has
     procedure :: lengths
     procedure :: read_values
@@ -57,22 +58,41 @@ contains
     type(reader_t), intent(out) :: reader
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: format
-    reader%path = path
-    if (.not. file_exists(path)) then
-      call fail(error, exit_no_input, 'there is no file '''//path//'''')
-    else if (is_folder(path)) then
-      call fail(error, exit_no_input, ''''//path//''' is a folder')
-    else if (is_text(path)) then
-      call fail(error, exit_bad_case, ''''//path//''' is a text, allowed is a file that Separatrix wrote')
-    end if
-    if (allocated(error)) return
-    call h5_open(path, reader%file, error)
+    call open_reader(path, 'a file that Separatrix wrote', reader, error)
     if (allocated(error)) return
     format = ''
     if (reader%has_attribute('/', 'format')) call reader%text_attribute('/', 'format', format, error)
     if (allocated(error)) return
     if (format /= 'separatrix') call fail(error, exit_io, ''''//path//''' is not a file of Separatrix')
   end subroutine open_final
+
+  !> Opens any HDF5 file for reading. Code 66 if there is none, 65 if it is a text where `allowed` is asked for, 74 if it is
+  !> not HDF5.
+  subroutine open_reader(path, allowed, reader, error)
+    character(len=*), intent(in) :: path, allowed
+    type(reader_t), intent(out) :: reader
+    type(error_t), allocatable, intent(out) :: error
+    reader%path = path
+    if (.not. file_exists(path)) then
+      call fail(error, exit_no_input, 'there is no file '''//path//'''')
+    else if (is_folder(path)) then
+      call fail(error, exit_no_input, ''''//path//''' is a folder')
+    else if (is_text(path)) then
+      call fail(error, exit_bad_case, ''''//path//''' is a text, allowed is '//allowed)
+    end if
+    if (allocated(error)) return
+    call h5_open(path, reader%file, error)
+  end subroutine open_reader
+
+  !> The names in a group, and which are groups.
+  subroutine children(self, group, names, are_groups, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: names(:)
+    logical, allocatable, intent(out) :: are_groups(:)
+    type(error_t), allocatable, intent(out) :: error
+    call h5_children(self%file, group, names, are_groups, error)
+  end subroutine children
 
   !> The variables of the root and of its groups in the order of the file, without dimensions that have
   !> no coordinates.

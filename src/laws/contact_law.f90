@@ -16,7 +16,7 @@ module contact_law
   private
 
   public :: contact_of, add_to_contact, compliant_contact, contact_at_speed, barrier_positions, velocity_after_impact, &
-    restitution_at, contact_force, contact_margin, force_on_body
+    restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
     contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6
@@ -209,6 +209,29 @@ contains
       force = law%stiffness*signed_power(p, law%exponent)*(1 + law%damping*rate)
     end if
   end function contact_force
+
+  !> Derivatives of `contact_force` by the penetration [N/m] and by its rate [N s/m].
+  pure function contact_force_slopes(law, p, rate) result(slopes)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: p, rate
+    real(wp) :: slopes(2)
+    slopes = [law%stiffness, law%damping]
+    if (law%kind == contact_kelvin_voigt) return
+    slopes(1) = law%stiffness*(1 + law%damping*rate)
+    if (law%exponent /= 1) slopes(1) = slopes(1)*law%exponent*abs(signed_power(p, law%exponent - 1))
+    slopes(2) = law%stiffness*signed_power(p, law%exponent)*law%damping
+  end function contact_force_slopes
+
+  !> Energy that the surface of a soft barrier holds at the penetration `p` [m], in J.
+  pure elemental real(wp) function contact_energy(law, p) result(energy)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: p
+    if (law%kind == contact_kelvin_voigt) then
+      energy = 0.5_wp*law%stiffness*p**2
+    else
+      energy = law%stiffness*signed_power(p, law%exponent)*p/(law%exponent + 1)
+    end if
+  end function contact_energy
 
   !> Force of soft barriers on a body at `x` [m] with `v` [m/s], in N.
   pure elemental real(wp) function force_on_body(law, x, v) result(force)

@@ -2,15 +2,15 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A function given by its values at a few knots: cubic between two of them (Hermite), with one slope at each, so that it is
-!> continuous with its derivative; constant beyond the first and the last. The slope at a knot is that of the polynomial
-!> through it and its neighbours, up to five knots: the error falls with the fourth power of their distance, and the function
-!> is linear in the values.
+!> continuous with its derivative; beyond the first and the last it is constant, or goes on straight. The slope at a knot is
+!> that of the polynomial through it and its neighbours, up to five knots: the error falls with the fourth power of their
+!> distance, and the function is linear in the values.
 module curve_law
   use kinds, only: wp
   implicit none
   private
 
-  public :: curve_of, value_at, knots_problem
+  public :: curve_of, value_at, continued_at, steepest, knots_problem
 
   integer, parameter, public :: most_knots = 16
 
@@ -88,5 +88,28 @@ contains
     value = curve%value(i)*r*r*(1 + 2*s) + curve%value(i + 1)*s*s*(3 - 2*s) + &
             width*s*r*(curve%slope(i)*r - curve%slope(i + 1)*s)
   end function value_at
+
+  !> Value at `x`; straight on beyond the knots, so that the derivative is continuous everywhere.
+  pure real(wp) function continued_at(curve, x) result(value)
+    type(curve_t), intent(in) :: curve
+    real(wp), intent(in) :: x
+    value = value_at(curve, x)
+    if (curve%count == 0) return
+    associate (last => curve%count)
+      if (x < curve%at(1)) value = value + curve%slope(1)*(x - curve%at(1))
+      if (x > curve%at(last)) value = value + curve%slope(last)*(x - curve%at(last))
+    end associate
+  end function continued_at
+
+  !> A bound on the derivative: that of 6 s (1 - s) d + (1 - s)(1 - 3 s) m_i - s (2 - 3 s) m_{i+1}, d the mean slope.
+  pure real(wp) function steepest(curve)
+    type(curve_t), intent(in) :: curve
+    integer :: i
+    steepest = 0
+    do i = 1, curve%count - 1
+      steepest = max(steepest, 1.5_wp*abs(curve%value(i + 1) - curve%value(i))/(curve%at(i + 1) - curve%at(i)) &
+                     + abs(curve%slope(i)) + abs(curve%slope(i + 1)))
+    end do
+  end function steepest
 
 end module curve_law

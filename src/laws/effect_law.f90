@@ -3,20 +3,22 @@
 
 !> Effects added to a machine that are not one of its own laws with other numbers, and what a sensor shows. While
 !> sliding in direction s = +1 or -1 at the position x, the spring stretched by l, they add the force
-!>   F - c s v^2 - b s v + k3 l^3 - (K + E)(h - 1) s - a h,  h = max(0, 1 + slope x),
-!> K + E being the dry friction of the machine. Dahl's friction -h z takes the place of all dry friction. As the velocity
-!> keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
+!>   F - c s v^2 - b s v + k3 l^3 - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
+!> K + E being the dry friction of the machine, g_+, g_- and p functions given by tables. Dahl's friction -h z takes the
+!> place of all dry friction. As the velocity keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
 !>   z = s K + (z_0 - s K) exp(-sigma s (x - x_0)/K),  K the level in that direction.
 module effect_law
+  use curve_law, only: continued_at, curve_of, curve_t, steepest
   use elementary, only: exponential
   use friction_law, only: friction_t, stribeck_excess
   use kinds, only: wp
-  use law_table, only: law_choice_t, value_of
+  use law_table, only: law_choice_t, list_of, value_of
   implicit none
   private
 
   public :: add_to_effects, add_to_sensor, replace_friction, finish_effects, effect_force, effect_energy, &
-    effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed
+    effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed, &
+    friction_change, steepest_by_speed, steepest_by_place
 
   real(wp), parameter :: farthest_behind = 100
 
@@ -27,6 +29,8 @@ module effect_law
     real(wp) :: quadratic_drag = 0, asymmetric_viscous = 0, asymmetric_coulomb = 0, friction_slope = 0, cubic = 0, offset = 0
     !> Dahl's friction: sigma [N/m], 0 = none, and mean sliding level [N].
     real(wp) :: dahl_stiffness = 0, dahl_sliding = 0
+    !> g_+ and g_- [N] over the speed [m/s], p over the place [m]; without knots where there is none.
+    type(curve_t) :: upwards, downwards, over_place
   end type effects_t
 
   !> A slip: its direction, and where it began with which z [N].
@@ -59,6 +63,13 @@ contains
       effects%offset = value_of(choice, 'force')
     case ('dahl')
       effects%dahl_stiffness = value_of(choice, 'stiffness')
+    case ('friction_curve')
+      if (.not. any(abs([list_of(choice, 'upwards'), list_of(choice, 'downwards')]) > 0)) return
+      effects%upwards = curve_of(list_of(choice, 'speed'), list_of(choice, 'upwards'))
+      effects%downwards = curve_of(list_of(choice, 'speed'), list_of(choice, 'downwards'))
+    case ('friction_place_curve')
+      if (.not. any(abs(list_of(choice, 'change')) > 0)) return
+      effects%over_place = curve_of(list_of(choice, 'place'), list_of(choice, 'change'))
     end select
   end subroutine add_to_effects
 
@@ -89,7 +100,8 @@ contains
   pure subroutine finish_effects(effects)
     type(effects_t), intent(inout) :: effects
     effects%nonlinear = effects%dahl_stiffness > 0 .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous, &
-                                                                 effects%friction_slope, effects%cubic]) > 0)
+                                                                 effects%friction_slope, effects%cubic]) > 0) .or. &
+                        effects%upwards%count > 0 .or. effects%over_place%count > 0
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
   end subroutine finish_effects
 
@@ -104,13 +116,14 @@ contains
     force = effects%offset - slip%direction*(effects%quadratic_drag*v + effects%asymmetric_viscous)*v + effects%cubic*stretch**3
     if (effects%dahl_stiffness > 0) then
       force = force - friction_factor(effects, x)*dahl_force(effects, slip, x)
-    else if (abs(effects%friction_slope) > 0) then
+    else if (abs(effects%friction_slope) > 0 .or. effects%over_place%count > 0) then
       factor = friction_factor(effects, x)
       force = force - slip%direction*(factor - 1)*(friction%kinetic + stribeck_excess(friction, slip%direction*v)) &
               - factor*effects%asymmetric_coulomb
     else
       force = force - effects%asymmetric_coulomb
     end if
+    if (effects%upwards%count > 0) force = force - slip%direction*friction_change(effects, slip%direction, slip%direction*v)
   end function effect_force
 
   !> Energy [J] of a body at `x` [m], the spring being stretched by `stretch` [m], in the cubic spring and the offset.
@@ -134,6 +147,7 @@ contains
       losses(1) = (factor - 1)*(friction%kinetic + stribeck_excess(friction, abs(v)))*abs(v) &
                   + factor*effects%asymmetric_coulomb*v
     end if
+    losses(1) = losses(1) + friction_change(effects, slip%direction, abs(v))*abs(v)
     losses(2) = (effects%quadratic_drag*abs(v) + effects%asymmetric_viscous*slip%direction)*v**2
   end function effect_losses
 
@@ -141,8 +155,34 @@ contains
   pure elemental real(wp) function friction_factor(effects, x) result(factor)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x
-    factor = max(0.0_wp, 1 + effects%friction_slope*x)
+    factor = 1 + effects%friction_slope*x
+    if (effects%over_place%count > 0) factor = factor + continued_at(effects%over_place, x)
+    factor = max(0.0_wp, factor)
   end function friction_factor
+
+  !> g [N], by which the sliding speed `speed` [m/s] in `direction` +1 or -1 changes friction; smooth continuation below zero.
+  pure real(wp) function friction_change(effects, direction, speed) result(change)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: direction, speed
+    change = 0
+    if (effects%upwards%count == 0) return
+    if (direction > 0) then
+      change = continued_at(effects%upwards, speed)
+    else
+      change = continued_at(effects%downwards, speed)
+    end if
+  end function friction_change
+
+  !> Bounds on the derivatives of g [N s/m] and of p [1/m].
+  pure real(wp) function steepest_by_speed(effects) result(slope)
+    type(effects_t), intent(in) :: effects
+    slope = max(steepest(effects%upwards), steepest(effects%downwards))
+  end function steepest_by_speed
+
+  pure real(wp) function steepest_by_place(effects) result(slope)
+    type(effects_t), intent(in) :: effects
+    slope = abs(effects%friction_slope) + steepest(effects%over_place)
+  end function steepest_by_place
 
   !> Largest force [N] in `direction` +1 or -1 that holds no body at `x` [m].
   pure real(wp) function break_away_level(effects, friction, x, direction) result(level)
@@ -153,6 +193,7 @@ contains
     level = 0
     if (effects%dahl_stiffness > 0) return
     level = friction_factor(effects, x)*(friction%break_away + direction*effects%asymmetric_coulomb)
+    if (effects%upwards%count > 0) level = max(0.0_wp, level + friction_change(effects, real(direction, wp), 0.0_wp))
   end function break_away_level
 
   !> Dahl's z [N] after a long slip in `direction`; 0 at rest, and without Dahl's friction.

@@ -13,7 +13,7 @@ module effect_rows
   character(len=*), parameter :: sum_of_laws = 'sum of two laws'
   character(len=*), parameter :: sensor = 'what a sensor shows; the motion is the same'
 
-  type(law_row_t), parameter, public :: effect_laws(18) = [ &
+  type(law_row_t), parameter, public :: effect_laws(20) = [ &
     law_row_t('effect', 'viscous', '-b v', sum_of_laws), &
     law_row_t('effect', 'coulomb', '-F sgn v; adds to sliding and to break-away friction', sum_of_laws), &
     law_row_t('effect', 'quadratic_drag', '-c v |v|', 'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
@@ -25,6 +25,10 @@ module effect_rows
     law_row_t('effect', 'asymmetric_friction', '-a - b |v| while sliding; sticks up to Fs + a upwards, Fs - a downwards', &
               'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)'), &
     law_row_t('effect', 'position_dependent_friction', 'dry friction times max(0, 1 + slope x)', &
+              'Armstrong-Helouvry, Control of Machines with Friction (1991)'), &
+    law_row_t('effect', 'friction_curve', '-change(|v|) sgn v, of each direction its own: a table over the speed, C1', &
+              'Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083'), &
+    law_row_t('effect', 'friction_place_curve', 'dry friction times max(0, 1 + change(x)): a table over the place, C1', &
               'Armstrong-Helouvry, Control of Machines with Friction (1991)'), &
     law_row_t('effect', 'cubic_spring', 'k3 s^3, s = l0 + x_A - x', 'Duffing, Erzwungene Schwingungen (1918)'), &
     law_row_t('effect', 'offset_force', 'constant force: preload or tilt', sum_of_laws), &
@@ -41,7 +45,7 @@ module effect_rows
     law_row_t('effect', 'sensor_gain', 'a record shows (1 + gain) x', sensor), &
     law_row_t('effect', 'sensor_delay', 'a record shows x(t - delay)', sensor)]
 
-  type(parameter_row_t), parameter, public :: effect_parameters(26) = [ &
+  type(parameter_row_t), parameter, public :: effect_parameters(31) = [ &
     parameter_row_t('effect', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
                     'b'), &
     parameter_row_t('effect', 'coulomb', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
@@ -64,6 +68,16 @@ module effect_rows
                     .false., 'b, viscous friction upwards above the mean of both directions'), &
     parameter_row_t('effect', 'position_dependent_friction', 'slope', '1/m', none_below, none_above, .false., .false., 0.0_wp, &
                     .false., 'relative change of dry friction per length'), &
+    parameter_row_t('effect', 'friction_curve', 'speed', 'm/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
+                    'sliding speeds, ascending; straight on beyond the first and the last'), &
+    parameter_row_t('effect', 'friction_curve', 'upwards', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'change of the friction at these speeds upwards; at speed 0 also of break-away'), &
+    parameter_row_t('effect', 'friction_curve', 'downwards', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'the same downwards'), &
+    parameter_row_t('effect', 'friction_place_curve', 'place', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'places, ascending; straight on beyond the first and the last'), &
+    parameter_row_t('effect', 'friction_place_curve', 'change', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'relative change of dry friction at these places'), &
     parameter_row_t('effect', 'cubic_spring', 'stiffness', 'N/m^3', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'k3'), &
     parameter_row_t('effect', 'offset_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .false., &
@@ -106,6 +120,8 @@ module effect_rows
     effect_trait_t('dahl', 'friction before sliding', 'flight', '', 'stiffness', 'friction'), &
     effect_trait_t('asymmetric_friction', 'friction by direction', 'flight', 'coulomb viscous', '', ''), &
     effect_trait_t('position_dependent_friction', 'friction over place', 'flight', 'slope', '', 'friction'), &
+    effect_trait_t('friction_curve', over_speed, 'flight', 'upwards downwards', '', ''), &
+    effect_trait_t('friction_place_curve', 'friction over place', 'flight', 'change', '', 'friction'), &
     effect_trait_t('cubic_spring', 'spring over stretch', 'flight', 'stiffness', '', ''), &
     effect_trait_t('offset_force', 'constant force', 'flight', 'force', '', ''), &
     effect_trait_t('restitution_slope', over_impacts, 'barrier', 'slope', '', 'contact.restitution'), &

@@ -11,7 +11,7 @@ module friction_law
   implicit none
   private
 
-  public :: friction_of, add_to_friction, sliding_friction, stribeck_excess, power
+  public :: friction_of, add_to_friction, sliding_friction, sliding_slope, stribeck_excess, power
 
   !> Exponent at which the Stribeck excess is below the rounding of the sliding friction.
   real(wp), parameter :: negligible_exponent = -log(0.01_wp*epsilon(1.0_wp))
@@ -117,6 +117,26 @@ contains
       end if
     end if
   end function stribeck_excess
+
+  !> Derivative of `sliding_friction` by the velocity [N s/m].
+  pure elemental real(wp) function sliding_slope(law, v, direction) result(slope)
+    type(friction_t), intent(in) :: law
+    real(wp), intent(in) :: v, direction
+    slope = -law%damping
+    if (.not. law%excess > 0) return
+    slope = slope + law%excess*falloff(direction*v/law%stribeck_velocity, law%stribeck_exponent)/law%stribeck_velocity
+    if (law%second_excess > 0) slope = slope &
+      + law%second_excess*falloff(direction*v/law%second_velocity, law%second_exponent)/law%second_velocity
+  end function sliding_slope
+
+  !> -d/du exp(-u^delta); finite where u = 0.
+  pure elemental real(wp) function falloff(u, delta)
+    real(wp), intent(in) :: u, delta
+    real(wp) :: at
+    at = max(u, -1.0_wp)
+    falloff = delta*exponential(-power(at, delta))
+    if (delta /= 1) falloff = falloff*power(abs(at), delta - 1)
+  end function falloff
 
   !> u**p for u >= 0 and its continuation to negative u, in reproducible arithmetic.
   pure elemental real(wp) function power(u, p)

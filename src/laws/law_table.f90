@@ -17,7 +17,7 @@ module law_table
 
   public :: law_row_t, parameter_row_t
   public :: find_law, law_names, parameters_of, table_of, path_of, part_kind, part_law, is_hidden, law_choice, value_of, list_of, &
-    set_value, change_parameter
+    set_value, change_parameter, split_element
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
@@ -29,7 +29,7 @@ module law_table
   !> The parts of a machine of several bodies: any number of laws, each with a name of its own. Their laws are named
   !> 'table:law'.
   character(len=*), parameter, public :: part_family = 'part'
-  integer, parameter, public :: label_length = 32
+  integer, parameter, public :: label_length = 48
 
   !> Largest |angle| [rad]: beyond it the rounding of the angle shows in its sine.
   real(wp), parameter, public :: largest_angle = 1e4_wp
@@ -201,12 +201,16 @@ contains
     if (family == effect_family) table = table//'.'//trim(law)
   end function table_of
 
-  !> Table of a choice in a case file: that of its law, of a part 'table.NAME'.
+  !> Table of a choice in a case file: that of its law, of a part 'table.NAME', of the point P of the structure S, whose label
+  !> is 'S.P', 'structure.S.point.P'.
   pure function path_of(choice) result(path)
     type(law_choice_t), intent(in) :: choice
     character(len=:), allocatable :: path
+    integer :: mark
     if (choice%family == part_family) then
       path = part_kind(choice%name)//'.'//trim(choice%label)
+      mark = index(choice%label, '.')
+      if (mark > 0) path = 'structure.'//choice%label(:mark)//'point'//trim(choice%label(mark:))
     else
       path = table_of(choice%family, choice%name)
     end if
@@ -229,8 +233,8 @@ contains
   !> Whether a row is set by names of bodies, not by a number.
   pure logical function is_hidden(row)
     type(parameter_row_t), intent(in) :: row
-    is_hidden = row%law == 'structure' .or. &
-      (row%family == part_family .and. (row%name == 'first' .or. row%name == 'second' .or. row%name == 'body'))
+    is_hidden = row%family == part_family .and. (index(row%law, 'point:') == 1 .or. &
+                                                 any(row%name == [character(len=6) :: 'first_end', 'second_end', 'body']))
   end function is_hidden
 
   !> A law with every parameter at its default (zero where it has none, empty lists): set the
@@ -276,28 +280,49 @@ contains
     choice%parameters(position_of(choice, parameter))%values = values
   end subroutine set_value
 
-  !> Changes the scalar parameter `path` = 'family.parameter' or 'effect.NAME.parameter' among `choices`; `found` is false if
-  !> none has it. A static coefficient that equals the kinetic one moves with it.
+  !> A path without the number of an element, 'drive.sine' of 'drive.sine[2]', and the number; 0 where it has none, -1 if what
+  !> stands in the brackets is not a number.
+  pure subroutine split_element(path, list, element)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: list
+    integer, intent(out) :: element
+    integer :: open, status
+    list = trim(path)
+    element = 0
+    open = index(list, '[', back=.true.)
+    if (open == 0 .or. list(len(list):) /= ']') return
+    element = -1
+    if (open + 1 < len(list) .and. verify(list(open + 1:len(list) - 1), '0123456789') == 0) then
+      read (list(open + 1:len(list) - 1), *, iostat=status) element
+      if (status /= 0 .or. element == 0) element = -1
+    end if
+    list = list(:open - 1)
+  end subroutine split_element
+
+  !> Changes the parameter `path` = 'family.parameter' or 'effect.NAME.parameter' among `choices`, of a list its element
+  !> 'family.parameter[2]'; `found` is false if none has it. A static coefficient that equals the kinetic one moves with it.
   pure subroutine change_parameter(choices, path, value, found)
     type(law_choice_t), intent(inout) :: choices(:)
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: value
     logical, intent(out) :: found
     type(parameter_row_t), allocatable :: rows(:)
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: name, list
     real(wp) :: before
-    integer :: i, k, mark
+    integer :: i, k, mark, element
     found = .false.
-    mark = index(path, '.', back=.true.)
-    name = trim(path(mark + 1:))
+    call split_element(path, list, element)
+    mark = index(list, '.', back=.true.)
+    name = trim(list(mark + 1:))
     do i = 1, size(choices)
-      if (path_of(choices(i)) /= path(:mark - 1)) cycle
+      if (path_of(choices(i)) /= list(:mark - 1)) cycle
       rows = parameters_of(choices(i)%family, choices(i)%name)
-      k = findloc(rows%name == name .and. .not. rows%list, .true., dim=1)
+      k = findloc(rows%name == name .and. (rows%list .eqv. element > 0), .true., dim=1)
       if (k == 0) cycle
+      if (element > size(choices(i)%parameters(k)%values)) cycle
       found = .true.
-      before = choices(i)%parameters(k)%values(1)
-      choices(i)%parameters(k)%values = [value]
+      before = choices(i)%parameters(k)%values(max(element, 1))
+      choices(i)%parameters(k)%values(max(element, 1)) = value
       k = findloc(rows%name == 'static_coefficient' .or. rows%name == 'static_force', .true., dim=1)
       if ((name /= 'kinetic_coefficient' .and. name /= 'force') .or. k == 0) cycle
       if (.not. abs(choices(i)%parameters(k)%values(1) - before) > 0) choices(i)%parameters(k)%values = [value]

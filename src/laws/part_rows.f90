@@ -4,6 +4,7 @@
 !> The parts of a machine of several bodies: rows of the catalogue. A law is named 'table:law' after the table
 !> [table.NAME] of a case file that it stands in.
 module part_rows
+  use contact_rows, only: contact_laws, contact_parameters
   use kinds, only: wp
   use law_row, only: law_length, law_row_t, none_above, none_below, parameter_row_t
   implicit none
@@ -12,29 +13,51 @@ module part_rows
   integer :: i
 
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
-  character(len=law_length), parameter :: joints(5) = [character(len=law_length) :: 'spring:linear', 'friction:coulomb', &
-    'friction:elastic_coulomb', 'contact:newton', 'contact:kelvin_voigt']
-  character(len=law_length), parameter :: frictions(2) = joints(2:3)
-  character(len=law_length), parameter :: contacts(2) = joints(4:5)
+  character(len=law_length), parameter :: springs(3) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
+    'spring:pendulum']
+  character(len=law_length), parameter :: frictions(5) = [character(len=law_length) :: 'friction:coulomb', &
+    'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic']
+  character(len=law_length), parameter :: contacts(2) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt']
+  character(len=law_length), parameter :: joints(10) = [springs, frictions, contacts]
+  !> Contacts with the laws of one body, which keep their parameters.
+  type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
+  type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
+                                                                          contact_parameters%law /= 'kelvin_voigt')
   character(len=law_length), parameter :: drives(2) = [character(len=law_length) :: 'drive:force', 'drive:motion']
   character(len=1), parameter :: drive_unit(2) = ['N', 'm']
+  character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
+  character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
 
-  type(law_row_t), parameter, public :: part_laws(10) = [ &
-    law_row_t('body', 'structure', 'several bodies, [body.NAME] each, with springs, joints and drives between them', &
+  type(law_row_t), parameter, public :: part_laws(31) = [ &
+    law_row_t('body', 'structure', 'several bodies and structures, with springs, joints and drives between them', &
               'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
     law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
     law_row_t('part', bodies(2), 'any other body', ''), &
-    law_row_t('part', joints(1), 'spring k and damper c between two bodies, or one and the ground', ''), &
-    law_row_t('part', joints(2), 'dry friction between two bodies, or of one on the ground or a belt', ''), &
-    law_row_t('part', joints(3), 'spring and slider in series (Jenkins)', 'Gastaldi, Berruti, Appl. Sci. (2018)'), &
-    law_row_t('part', joints(4), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
+    law_row_t('part', structures(1), 'linear structure M q'''' + C q'' + K q, of a file or written down row by row', ''), &
+    law_row_t('part', structures(2), 'linear structure by its modes, mass-normalised', ''), &
+    law_row_t('part', points(1), 'the point of a structure that x0, v0 and the results refer to', ''), &
+    law_row_t('part', points(2), 'any other named point of a structure', ''), &
+    law_row_t('part', springs(1), 'spring k and damper c between two bodies, or one and the ground', ''), &
+    law_row_t('part', springs(2), 'k s + k2 s^2 + k3 s^3 and damper c; k < 0, k3 > 0 is a double well', &
+              'Duffing, Erzwungene Schwingungen (1918)'), &
+    law_row_t('part', springs(3), 'moment sin s of an angle s', 'Huygens, Horologium Oscillatorium (1673)'), &
+    law_row_t('part', frictions(1), 'dry friction between two bodies, or of one on the ground or a belt', ''), &
+    law_row_t('part', frictions(2), 'spring and slider in series (Jenkins)', 'Gastaldi, Berruti, Appl. Sci. (2018)'), &
+    law_row_t('part', frictions(3), 'dry friction and b u, u being the sliding speed', ''), &
+    law_row_t('part', frictions(4), 'force + (static_force - force) exp(-|u/v_s|^delta)', &
+              'Armstrong-Helouvry, Automatica 30 (1994)'), &
+    law_row_t('part', frictions(5), 'force + (static_force - force)/(1 + |u|/v_f)', &
+              'Galvanetto, Bishop, Chaos Solitons Fractals 5 (1995)'), &
+    law_row_t('part', contacts(1), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
               'Glocker, Set-Valued Force Laws (2001)'), &
-    law_row_t('part', joints(5), 'stops with spring K and damper D', ''), &
+    law_row_t('part', contacts(2), 'stops with spring K and damper D', ''), &
+    (law_row_t('part', 'contact:'//other_contacts(i)%name, other_contacts(i)%meaning, other_contacts(i)%source), i=1, 12), &
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
     law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', '')]
 
-  !> The ends of a part are numbers of bodies, in the order of the file, 0 the ground; of a drive, one body.
-  type(parameter_row_t), parameter, public :: part_parameters(49) = [ &
+  !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
+  !> drive, one place.
+  type(parameter_row_t), parameter, public :: part_parameters(184) = [ &
     parameter_row_t('body', 'structure', 'in_sequence', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other'), &
     (parameter_row_t('part', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
@@ -45,24 +68,64 @@ module part_rows
                     'position at the start'), &
     parameter_row_t('part', bodies(2), 'v0', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
                     'velocity at the start'), &
-    (parameter_row_t('part', joints(i), 'first', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the first body between'), i=1, 5), &
-    (parameter_row_t('part', joints(i), 'second', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the second body between'), i=1, 5), &
-    parameter_row_t('part', joints(1), 'stiffness', 'N/m', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'k; may be negative'), &
-    parameter_row_t('part', joints(1), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'c'), &
-    parameter_row_t('part', joints(1), 'free_length', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'second minus first where the spring is without force'), &
+    parameter_row_t('part', structures(1), 'mass', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'M row by row, or the name of a Matrix Market file'), &
+    parameter_row_t('part', structures(1), 'stiffness', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'K, likewise'), &
+    parameter_row_t('part', structures(2), 'frequency', 'rad/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
+                    'angular frequencies of the undamped modes; 0: rigid'), &
+    parameter_row_t('part', structures(2), 'damping_ratios', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .true., &
+                    'of each mode; 1 and more: overdamped'), &
+    (parameter_row_t('part', structures(i), 'damping', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'C row by row, of any form, in the coordinates of the law'), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'damping_ratio', '1', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
+                     'of every mode, in the place of any other damping; -1: none is given'), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'x0', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'coordinates at the start, before the watched point is moved'), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'v0', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'their rates at the start'), i=1, 2), &
+    (parameter_row_t('part', points(i), 'structure', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the structure'), i=1, 2), &
+    (parameter_row_t('part', points(i), 'row', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
+                     'its displacement for one of each coordinate'), i=1, 2), &
+    (parameter_row_t('part', joints(i), 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the first body between'), i=1, 10), &
+    (parameter_row_t('part', joints(i), 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'number of the second body between'), i=1, 10), &
+    (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
+                     .false., 'number of the first body between'), i=1, 12), &
+    (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
+                     .false., 'number of the second body between'), i=1, 12), &
+    (parameter_row_t('part', 'contact:'//kept(i)%law, kept(i)%name, kept(i)%unit, kept(i)%lower, kept(i)%upper, &
+                     kept(i)%lower_open, kept(i)%optional, kept(i)%default, kept(i)%list, kept(i)%meaning), i=1, 64), &
+    (parameter_row_t('part', springs(i), 'stiffness', 'N/m', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                     'k; may be negative'), i=1, 2), &
+    parameter_row_t('part', springs(2), 'quadratic', 'N/m^2', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'k2'), &
+    parameter_row_t('part', springs(2), 'cubic', 'N/m^3', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                    'k3'), &
+    parameter_row_t('part', springs(3), 'moment', 'N m', none_below, none_above, .false., .false., 0.0_wp, .false., &
+                    'weight times distance of the centre of mass; negative for an inverted pendulum'), &
+    (parameter_row_t('part', springs(i), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                     'c'), i=1, 3), &
+    (parameter_row_t('part', springs(i), 'free_length', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
+                     'second minus first where the spring is without force'), i=1, 3), &
     (parameter_row_t('part', frictions(i), 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                     'friction while sliding'), i=1, 2), &
+                     'friction while sliding; at high speed where it depends on the speed'), i=1, 5), &
     (parameter_row_t('part', frictions(i), 'static_force', 'N', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
-                     'friction at break-away; that of sliding if absent, never below it'), i=1, 2), &
+                     'friction at break-away; that of sliding if absent, never below it'), i=1, 5), &
     (parameter_row_t('part', frictions(i), 'velocity', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'velocity of the surface of the first body or the ground: a belt'), i=1, 2), &
+                     'velocity of the surface of the first body or the ground: a belt'), i=1, 5), &
     parameter_row_t('part', frictions(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'of the spring'), &
+    parameter_row_t('part', frictions(3), 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'b'), &
+    parameter_row_t('part', frictions(4), 'stribeck_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'v_s'), &
+    parameter_row_t('part', frictions(4), 'stribeck_exponent', '1', 0.0_wp, none_above, .true., .true., 1.0_wp, .false., &
+                    'delta'), &
+    parameter_row_t('part', frictions(5), 'fading_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'v_f'), &
     parameter_row_t('part', contacts(1), 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
                     'e'), &
     parameter_row_t('part', contacts(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &

@@ -5,11 +5,11 @@
 !> motion is given, merges parallel friction, and checks the whole. Messages of errors begin with the key.
 module assembly
   use constants, only: two_pi
-  use contact_law, only: contact_kelvin_voigt
   use eigen, only: symmetric_eigen, undamped_modes
   use errors, only: error_t, fail
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, most_degrees, &
-    most_joints, name_length, wave_t
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, most_degrees, most_joints, &
+    name_length, wave_t
+  use jointed_state, only: is_curved
   use kinds, only: wp
   use status, only: exit_bad_case
   implicit none
@@ -182,9 +182,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: squares(:), shapes(:, :)
     integer :: k
+    if (.not. allocated(machine%start_shape)) then
+      allocate (machine%start_shape(machine%n, 2), source=0.0_wp)
+      machine%start_shape(machine%watched, :) = 1
+    end if
     do k = 1, size(machine%given)
       call take_out(machine, trim(machine%given_names(k)), machine%given(k), error)
       if (allocated(error)) return
+    end do
+    do k = 1, size(machine%joints)
+      call take_viscous(machine, k)
     end do
     call merge_friction(machine)
     call check(machine, error)
@@ -250,7 +257,11 @@ contains
         joint%row = joint%row(rest)
       end associate
     end do
-    if (machine%watched == at) machine%watched = 1
+    if (machine%watched == at) then
+      machine%watched = 1
+      machine%start_shape(:, :) = 0
+      machine%start_shape(rest(1), :) = 1
+    end if
     if (machine%watched > at) machine%watched = machine%watched - 1
     machine%mass = machine%mass(rest, rest)
     machine%damping = machine%damping(rest, rest)
@@ -259,6 +270,7 @@ contains
     machine%force = machine%force(rest, :)
     machine%names = machine%names(rest)
     machine%start = machine%start(:, rest)
+    machine%start_shape = machine%start_shape(rest, :)
     machine%n = size(rest)
   end subroutine take_out
 
@@ -328,22 +340,33 @@ contains
                     'given, allowed at least one that is free to move')
           return
         end if
-        ! What is viscous belongs to the structure.
-        if (joint%kind == joint_friction .and. joint%friction%damping > 0 .and. .not. abs(joint%offset%rate) > 0 .and. &
-            .not. allocated(joint%offset%harmonic)) then
-          call add_link(machine, joint%row, 0.0_wp, joint%friction%damping, 0.0_wp)
-          joint%friction%damping = 0
-        end if
-        if (joint%kind == joint_spring) machine%linear = .false.
-        if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
-          if (joint%friction%excess > 0 .or. joint%fading_speed > 0 .or. joint%friction%damping > 0) machine%linear = .false.
-        end if
-        if (joint%kind == joint_soft .and. joint%contact%stiffness > 0) then
-          if (joint%contact%kind /= contact_kelvin_voigt) machine%linear = .false.
-        end if
+        if (is_curved(joint, 1)) machine%linear = .false.
       end associate
     end do
   end subroutine check
+
+  !> What is viscous of friction belongs to the structure, the velocity of the surface being a force on it: where friction
+  !> sticks it has no part.
+  pure subroutine take_viscous(machine, j)
+    type(jointed_t), intent(inout) :: machine
+    integer, intent(in) :: j
+    type(joint_t) :: joint
+    integer :: m
+    joint = machine%joints(j)
+    associate (damping => joint%friction%damping)
+      if (joint%kind /= joint_friction .or. .not. damping > 0) return
+      call add_link(machine, joint%row, 0.0_wp, damping, 0.0_wp)
+      machine%load = machine%load - damping*joint%offset%rate*joint%row
+      if (allocated(joint%offset%harmonic)) then
+        call widen_force(machine, size(joint%offset%harmonic))
+        do m = 1, size(joint%offset%harmonic)
+          machine%force(:, m) = machine%force(:, m) &
+            - damping*cmplx(0.0_wp, m*machine%frequency, wp)*joint%offset%harmonic(m)*joint%row
+        end do
+      end if
+    end associate
+    machine%joints(j)%friction%damping = 0
+  end subroutine take_viscous
 
   !> Sizes of forces, speeds and lengths for rounding.
   pure subroutine set_sizes(machine)

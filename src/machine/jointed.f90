@@ -25,7 +25,7 @@ module jointed
   !> How the speeds after an impact of several contacts at once are found.
   integer, parameter, public :: together_newton = 0, together_sequence = 1
 
-  integer, parameter, public :: name_length = 32
+  integer, parameter, public :: name_length = 48
 
   !> mean + rate t + Re sum over m of harmonic(m) exp(i m Omega t), t being time since the section.
   type, public :: wave_t
@@ -47,7 +47,7 @@ module jointed
     type(contact_t) :: contact
     !> Stops of a contact [m], huge means none.
     real(wp) :: upper = huge(1.0_wp), lower = -huge(1.0_wp)
-    !> Spring of elastic friction [N/m]; spring that is not linear: -c1 s - c2 s^2 - c3 s^3 - moment sin s.
+    !> Spring of elastic friction [N/m]; what is not linear of a spring: -c2 s^2 - c3 s^3 - moment sin s.
     real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0
   end type joint_t
 
@@ -72,11 +72,13 @@ module jointed
     integer :: watched = 1
     !> Position and velocity at the start.
     real(wp), allocatable :: start(:, :)
+    !> Displacements and velocities (columns) of all coordinates at the start for one of the watched coordinate.
+    real(wp), allocatable :: start_shape(:, :)
     !> Inverse of the mass matrix.
     real(wp), allocatable :: mobility(:, :)
     !> Sizes for rounding: of forces [N], of speeds that are none [m/s], of lengths [m].
     real(wp) :: force_scale = 0, negligible_speed = 0, length_scale = 0
-    !> The motion between events is linear.
+    !> The motion is linear in every mode.
     logical :: linear = .true.
   end type jointed_t
 

@@ -3,16 +3,16 @@
 
 !> State of a jointed structure and of each of its joints, and the forces of the joints that the state tells.
 module jointed_state
-  use contact_law, only: contact_at_speed, contact_force, contact_t
+  use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
-  use friction_law, only: sliding_friction
+  use friction_law, only: sliding_friction, sliding_slope
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
     most_degrees, most_joints, wave_value
   use kinds, only: wp
   implicit none
   private
 
-  public :: turning_at, joint_motion, joint_force, free_force, key_of, is_held, acts_as_spring
+  public :: turning_at, joint_motion, joint_force, joint_energy, free_force, key_of, is_held, acts_as_spring, is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2).
@@ -69,8 +69,36 @@ contains
   pure logical function acts_as_spring(joint, phase)
     type(joint_t), intent(in) :: joint
     integer, intent(in) :: phase
-    acts_as_spring = (joint%kind == joint_elastic .and. phase == 0) .or. (joint%kind == joint_soft .and. abs(phase) == 1)
+    acts_as_spring = (joint%kind == joint_elastic .and. phase == 0) .or. &
+      (joint%kind == joint_soft .and. abs(phase) == 1 .and. joint%contact%kind == contact_kelvin_voigt)
   end function acts_as_spring
+
+  !> Whether the force of a joint is not linear in its coordinate and speed.
+  pure logical function is_curved(joint, phase)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    is_curved = .false.
+    select case (joint%kind)
+    case (joint_friction)
+      is_curved = phase /= 0 .and. (joint%friction%excess > 0 .or. joint%fading_speed > 0)
+    case (joint_soft)
+      is_curved = abs(phase) == 1 .and. joint%contact%kind /= contact_kelvin_voigt
+    case (joint_spring)
+      is_curved = .true.
+    end select
+  end function is_curved
+
+  !> Whether a mode has a joint whose force is not linear.
+  pure logical function is_marched(machine, phase)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: phase(:)
+    integer :: j
+    is_marched = .false.
+    if (machine%linear) return
+    do j = 1, size(machine%joints)
+      if (is_curved(machine%joints(j), phase(j))) is_marched = .true.
+    end do
+  end function is_marched
 
   !> One bit for each joint that is a constraint or a spring.
   pure integer function key_of(machine, phase)
@@ -90,8 +118,7 @@ contains
     real(wp), intent(in) :: slider, touch_speed, s, u
     real(wp), intent(out) :: force
     real(wp), intent(out), optional :: by_place, by_speed
-    type(contact_t) :: law
-    real(wp) :: direction, p, rate, step, sine, cosine
+    real(wp) :: direction, p, rate, sine, cosine
     force = 0
     if (present(by_place)) by_place = 0
     if (present(by_speed)) by_speed = 0
@@ -115,17 +142,31 @@ contains
       direction = phase
       p = merge(s - joint%upper, joint%lower - s, phase > 0)
       rate = direction*u
-      law = contact_at_speed(joint%contact, touch_speed)
-      force = -direction*contact_force(law, p, rate)
-      step = 1e-6_wp*max(abs(p), tiny(p))
-      if (present(by_place)) by_place = -(contact_force(law, p + step, rate) - contact_force(law, p - step, rate))/(2*step)
-      if (present(by_speed)) by_speed = -(contact_force(law, p, rate + 1) - contact_force(law, p, rate))
+      if (joint%contact%by_impact) then
+        call press(contact_at_speed(joint%contact, touch_speed), direction, p, rate, force, by_place, by_speed)
+      else
+        call press(joint%contact, direction, p, rate, force, by_place, by_speed)
+      end if
     case (joint_spring)
       call sine_cosine(s, sine, cosine)
-      force = -s*(joint%stiffness + s*(joint%quadratic + s*joint%cubic)) - joint%moment*sine
-      if (present(by_place)) by_place = -joint%stiffness - s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
+      force = -s**2*(joint%quadratic + s*joint%cubic) - joint%moment*sine
+      if (present(by_place)) by_place = -s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
     end select
   end subroutine joint_force
+
+  !> Force of a pressed contact and its derivatives.
+  pure subroutine press(law, direction, p, rate, force, by_place, by_speed)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: direction, p, rate
+    real(wp), intent(out) :: force
+    real(wp), intent(out), optional :: by_place, by_speed
+    real(wp) :: slopes(2)
+    force = -direction*contact_force(law, p, rate)
+    if (.not. (present(by_place) .and. present(by_speed))) return
+    slopes = contact_force_slopes(law, p, rate)
+    by_place = -slopes(1)
+    by_speed = -slopes(2)
+  end subroutine press
 
   !> Force of sliding in a direction, continued smoothly to the other one.
   pure real(wp) function sliding(joint, u, direction)
@@ -139,15 +180,34 @@ contains
     end if
   end function sliding
 
+  !> Derivative of the force of sliding by the speed.
   pure real(wp) function slope_of_sliding(joint, u, direction) result(slope)
     type(joint_t), intent(in) :: joint
     real(wp), intent(in) :: u, direction
-    real(wp) :: step
-    slope = -joint%friction%damping
-    if (.not. (joint%friction%excess > 0 .or. joint%fading_speed > 0)) return
-    step = 1e-6_wp*(abs(u) + merge(joint%fading_speed, joint%friction%stribeck_velocity, joint%fading_speed > 0))
-    slope = (sliding(joint, u + step, direction) - sliding(joint, u - step, direction))/(2*step)
+    slope = sliding_slope(joint%friction, u, direction)
+    if (joint%fading_speed > 0) slope = slope + (joint%friction%break_away - joint%friction%kinetic)/ &
+      (joint%fading_speed*(1 + max(direction*u, -joint%fading_speed/2)/joint%fading_speed)**2)
   end function slope_of_sliding
+
+  !> Energy that a joint holds as a spring [J]: that of elastic friction and of soft contacts, too.
+  pure real(wp) function joint_energy(joint, phase, slider, s) result(energy)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    real(wp), intent(in) :: slider, s
+    real(wp) :: sine, cosine
+    energy = 0
+    select case (joint%kind)
+    case (joint_elastic)
+      ! While it slides the spring is stretched by the friction.
+      if (phase == 0) energy = 0.5_wp*joint%stiffness*(s - slider)**2
+      if (phase /= 0) energy = 0.5_wp*joint%friction%kinetic**2/joint%stiffness
+    case (joint_soft)
+      if (abs(phase) == 1) energy = contact_energy(joint%contact, merge(s - joint%upper, joint%lower - s, phase > 0))
+    case (joint_spring)
+      call sine_cosine(s/2, sine, cosine)
+      energy = s**3*(joint%quadratic/3 + s*joint%cubic/4) + 2*joint%moment*sine**2
+    end select
+  end function joint_energy
 
   !> All forces on the coordinates but those of constraints [N]; with `rate` their rates of change for the accelerations
   !> `a` [N/s].

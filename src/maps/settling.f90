@@ -10,7 +10,7 @@ module settling
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, features_over, scales_of, section_point, strobe_t
+  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, scales_of, section_point, strobe_t
   implicit none
   private
 
@@ -21,8 +21,8 @@ module settling
   real(wp), parameter :: at_rounding = 1e-10_wp, near = 0.02_wp
   !> Below this distance a period may be a multiple of that of the cycle: which, will show.
   real(wp), parameter :: undecided = 1e-6_wp
-  !> Returns shrink if they do by this factor within some rounds.
-  real(wp), parameter :: shrinking = 0.99_wp
+  !> Returns shrink if they do by this factor within some rounds, far from a cycle within one: those of chaos do now and then.
+  real(wp), parameter :: shrinking = 0.99_wp, approaching = 0.9_wp
   integer, parameter :: rounds_to_shrink = 4
   !> Most drive periods that a motion is followed, shrink though its returns may.
   integer, parameter :: most_periods = 65536
@@ -70,8 +70,11 @@ contains
       miss = minval(misses)
       rounds_left = rounds_left - 1
       settled%near_cycle = miss <= near
-      if (settled%near_cycle .and. miss <= shrinking*least) rounds_left = rounds_to_shrink
-      if (.not. settled%near_cycle) rounds_left = 0
+      if (miss <= merge(shrinking, approaching, settled%near_cycle)*least) then
+        rounds_left = rounds_to_shrink
+      else if (.not. settled%near_cycle) then
+        rounds_left = 0
+      end if
       least = min(least, miss)
       if (rounds_left <= 0 .and. periods >= patience) exit
     end do
@@ -80,6 +83,8 @@ contains
       if (settled%reason == 0) call run_periods(moving, settled%period, tally, settled)
       if (settled%reason /= 0) settled%period = 0
       settled%features = features_over(moving, tally, real(max(1, settled%period), wp))
+      settled%features%word = 0
+      if (settled%period > 0) settled%features%word = cycle_word(moving, settled%state, settled%period)
     else
       settled%features = features_over(moving, tally, real(size(points, 2), wp))
       settled%features%word = 0

@@ -38,8 +38,9 @@ module sweep
 contains
 
   !> Holds parameter `path` at `value` for at least the duration, starting from `state` with the crank at `crank_angle`;
-  !> features are over the window. The reason is `time_over` unless the hold had to be given up. A cycle of at most `longest`
-  !> drive periods is looked for in what would follow; 0 = none is.
+  !> features are over the window; where a cycle was found, regime, impacts and rotation are its own. The reason is `time_over`
+  !> unless the hold had to be given up. A cycle of at most `longest` drive periods is looked for in what would follow; 0 =
+  !> none is.
   subroutine hold_parameter(grid, span, path, value, state, crank_angle, samples, longest, held, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
@@ -80,6 +81,13 @@ contains
     if (longest == 0) return
     call settle(moving, held%state, longest, 0, held%settled)
     held%features%word = held%settled%features%word
+    if (held%settled%period == 0) return
+    associate (seen => held%features, cycle => held%settled%features)
+      seen%regime = cycle%regime
+      seen%impacts_per_period = cycle%impacts_per_period
+      seen%mean_impact_speed = cycle%mean_impact_speed
+      seen%rotation = cycle%rotation
+    end associate
   end subroutine hold_parameter
 
   !> Features of a hold without an end: not numbers.

@@ -12,7 +12,7 @@ module sweep_limits
   use motion, only: motion_t
   use settling, only: settle, settled_t
   use status, only: reason_time_over
-  use strobe, only: resume_strobe, strobe_at, strobe_t
+  use strobe, only: coordinates_of, resume_strobe, strobe_at, strobe_t
   use sweep, only: hold_parameter, hold_t
   use trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -211,7 +211,7 @@ contains
     call machine_with(grid, path, value, moving, error)
     if (allocated(error)) return
     start = resume_strobe(moving, from%state, 0.0_wp)
-    if (present(ahead) .and. .not. allocated(moving%pair)) then
+    if (present(ahead) .and. .not. allocated(moving%pair) .and. coordinates_of(moving) == 2) then
       if (before%period == from%period) then
         here = [from%state%state%x, from%state%state%v]
         behind = point_near([before%state%state%x, before%state%state%v], here, moving%machine%turn)

@@ -113,6 +113,8 @@ contains
     do k = 1, size(catalogue)
       associate (a => catalogue(k))
         if (a%rests .or. a%any_place) cycle
+        if (a%coordinates > 2) batch%complete = 0
+        if (a%coordinates > 2) cycle
         do i = 1, a%period
           call add_region(batch, k, a%points(:2, i), a%scale(:2), a%metric(:3, i), a%capture_radius**2)
         end do

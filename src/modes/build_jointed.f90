@@ -3,20 +3,22 @@
 
 !> From the parts of a case to a jointed structure.
 module build_jointed
-  use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, index_of, move_surface, row_between
-  use contact_law, only: contact_kelvin_voigt
+  use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
+  use contact_law, only: contact_of
   use elementary, only: sine_cosine
   use errors, only: error_t, fail
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, together_newton, &
-    together_sequence, wave_t
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+    together_newton, together_sequence, wave_t
   use kinds, only: real64, wp
-  use law_table, only: effect_family, law_choice_t, list_of, part_family, path_of, value_of
+  use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
+    path_of, set_value, value_of
+  use matrices, only: solve
+  use places, only: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of
   use status, only: exit_bad_case
-  use text, only: to_text
   implicit none
   private
 
-  public :: is_jointed, jointed_of, watched_body
+  public :: is_jointed, jointed_of
 
 contains
 
@@ -30,23 +32,14 @@ contains
     end do
   end function is_jointed
 
-  !> Name of the body that the start and the results refer to; '' if there is none.
-  pure function watched_body(choices) result(name)
-    type(law_choice_t), intent(in) :: choices(:)
-    character(len=:), allocatable :: name
-    integer :: i
-    name = ''
-    do i = 1, size(choices)
-      if (choices(i)%name == 'body:watched') name = trim(choices(i)%label)
-    end do
-  end function watched_body
-
   !> The machine of the parts. Messages begin with the key.
   pure subroutine jointed_of(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(jointed_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(wave_t) :: wave
+    real(wp), allocatable :: rows(:, :)
+    integer, allocatable :: coordinate(:)
     integer :: i
     call refuse_others(choices, error)
     if (allocated(error)) return
@@ -55,56 +48,33 @@ contains
                                                                  value_of(choices(i), 'in_sequence') > 0.5_wp)
     end do
     call add_bodies(choices, machine)
-    call set_frequency(choices, machine, error)
+    call add_structures(choices, machine, rows, error)
+    if (.not. allocated(error)) call set_frequency(choices, machine, error)
+    if (.not. allocated(error)) call name_coordinates(choices, machine, rows, coordinate, error)
     if (allocated(error)) return
     do i = 1, size(choices)
       select case (choices(i)%name)
       case ('spring:linear')
-        call add_link(machine, row_of(machine, choices(i)), value_of(choices(i), 'stiffness'), value_of(choices(i), 'damping'), &
+        call add_link(machine, row_of(rows, choices(i)), value_of(choices(i), 'stiffness'), value_of(choices(i), 'damping'), &
                       value_of(choices(i), 'free_length'))
-      case ('friction:coulomb', 'friction:elastic_coulomb')
-        call add_friction(machine, choices(i), error)
-      case ('contact:newton', 'contact:kelvin_voigt')
-        call add_contact(machine, choices(i), error)
+      case ('spring:polynomial', 'spring:pendulum')
+        call add_spring(machine, choices(i), row_of(rows, choices(i)))
       case ('drive:force')
         wave = wave_of(choices(i))
-        call add_force(machine, unit_row(machine, choices(i)), wave%mean, wave%harmonic)
+        call add_force(machine, rows(:, place_of(choices(i))), wave%mean, wave%harmonic)
+      case default
+        if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
+        if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices(i), row_of(rows, choices(i)), &
+                                                                      given_of(choices, coordinate), error)
       end select
       if (allocated(error)) return
     end do
     do i = 1, size(choices)
       if (choices(i)%name /= 'drive:motion') cycle
-      if (.not. machine%frequency > 0) then
-        call fail(error, exit_bad_case, path_of(choices(i))//'.frequency: missing, allowed more than 0 rad/s')
-        return
-      end if
-      call check_given(choices, i, machine, error)
-      if (allocated(error)) return
-      call give_motion(machine, trim(machine%names(nint(value_of(choices(i), 'body')))), wave_of(choices(i)))
+      call give_motion(machine, trim(machine%names(coordinate(place_of(choices(i))))), wave_of(choices(i)))
     end do
     call finish(machine, error)
   end subroutine jointed_of
-
-  !> A body whose motion is given is not the watched one, and has one motion.
-  pure subroutine check_given(choices, i, machine, error)
-    type(law_choice_t), intent(in) :: choices(:)
-    integer, intent(in) :: i
-    type(jointed_t), intent(in) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    integer :: body, k
-    body = nint(value_of(choices(i), 'body'))
-    if (body == machine%watched) then
-      call fail(error, exit_bad_case, path_of(choices(i))//'.body: found the watched body, allowed one that is not: name '// &
-                'another in watch.body')
-      return
-    end if
-    do k = 1, i - 1
-      if (choices(k)%name /= 'drive:motion') cycle
-      if (nint(value_of(choices(k), 'body')) /= body) cycle
-      call fail(error, exit_bad_case, path_of(choices(i))//'.body: found a body whose motion '//path_of(choices(k))// &
-                ' gives, allowed one motion each')
-    end do
-  end subroutine check_given
 
   !> Laws of machines of one or two bodies, and effects, have no place here.
   pure subroutine refuse_others(choices, error)
@@ -121,9 +91,10 @@ contains
                   'allowed in tables with a name: [spring.NAME], [friction.NAME], [contact.NAME], [drive.NAME]')
         return
       end if
-      if (index(choices(i)%name, 'body:') == 1) bodies = bodies + 1
+      if (is_place(choices(i))) bodies = bodies + 1
     end do
-    if (bodies == 0) call fail(error, exit_bad_case, 'body: found no table [body.NAME], allowed one or more')
+    if (bodies == 0) call fail(error, exit_bad_case, 'body: found no [body.NAME] and no point of a [structure.NAME], allowed '// &
+                               'one or more')
   end subroutine refuse_others
 
   pure subroutine add_bodies(choices, machine)
@@ -140,21 +111,6 @@ contains
       end if
     end do
   end subroutine add_bodies
-
-  !> Its label, or its number where the labels are not known.
-  pure function body_name(choice, number) result(name)
-    type(law_choice_t), intent(in) :: choice
-    integer, intent(in) :: number
-    character(len=:), allocatable :: name
-    name = trim(choice%label)
-    if (len(name) == 0) name = 'body '//to_text(number)
-  end function body_name
-
-  pure function number(value) result(text)
-    real(wp), intent(in) :: value
-    character(len=:), allocatable :: text
-    text = to_text(real(value, real64))
-  end function number
 
   !> The frequency of the drives: one for all.
   pure subroutine set_frequency(choices, machine, error)
@@ -208,36 +164,40 @@ contains
     wave%harmonic(1) = wave%harmonic(1) + value_of(choice, 'amplitude')*cmplx(cosine, sine, wp)
   end function wave_of
 
-  pure function row_of(machine, choice) result(row)
-    type(jointed_t), intent(in) :: machine
-    type(law_choice_t), intent(in) :: choice
-    real(wp) :: row(machine%n)
-    integer :: first, second
-    row = 0
-    first = nint(value_of(choice, 'first'))
-    second = nint(value_of(choice, 'second'))
-    if (first > 0) row(first) = row(first) - 1
-    if (second > 0) row(second) = row(second) + 1
-  end function row_of
-
-  pure function unit_row(machine, choice) result(row)
-    type(jointed_t), intent(in) :: machine
-    type(law_choice_t), intent(in) :: choice
-    real(wp) :: row(machine%n)
-    row = 0
-    row(nint(value_of(choice, 'body'))) = 1
-  end function unit_row
-
-  pure subroutine add_friction(machine, choice, error)
+  !> A spring whose force is not linear: its linear part belongs to the structure.
+  pure subroutine add_spring(machine, choice, row)
     type(jointed_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: row(:)
+    type(joint_t) :: joint
+    real(wp) :: stiffness
+    stiffness = 0
+    joint%name = path_of(choice)
+    joint%kind = joint_spring
+    joint%row = row
+    joint%offset%mean = -value_of(choice, 'free_length')
+    if (choice%name == 'spring:pendulum') then
+      joint%moment = value_of(choice, 'moment')
+    else
+      stiffness = value_of(choice, 'stiffness')
+      joint%quadratic = value_of(choice, 'quadratic')
+      joint%cubic = value_of(choice, 'cubic')
+    end if
+    call add_link(machine, joint%row, stiffness, value_of(choice, 'damping'), value_of(choice, 'free_length'))
+    if (abs(joint%moment) + abs(joint%quadratic) + abs(joint%cubic) > 0) call add_joint(machine, joint)
+  end subroutine add_spring
+
+  pure subroutine add_friction(machine, choice, row, error)
+    type(jointed_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: row(:)
     type(error_t), allocatable, intent(out) :: error
     type(joint_t) :: joint
     type(wave_t) :: belt
     real(wp) :: static
     joint%name = path_of(choice)
     joint%kind = joint_friction
-    joint%row = row_of(machine, choice)
+    joint%row = row
     joint%friction%kinetic = value_of(choice, 'force')
     static = value_of(choice, 'static_force')
     if (static < 0) static = joint%friction%kinetic
@@ -247,22 +207,33 @@ contains
       return
     end if
     joint%friction%break_away = static
-    if (choice%name == 'friction:elastic_coulomb') then
+    select case (choice%name)
+    case ('friction:elastic_coulomb')
       joint%kind = joint_elastic
       joint%stiffness = value_of(choice, 'stiffness')
-    end if
+    case ('friction:coulomb_viscous')
+      joint%friction%damping = value_of(choice, 'damping')
+    case ('friction:coulomb_stribeck')
+      joint%friction%excess = static - joint%friction%kinetic
+      joint%friction%stribeck_velocity = value_of(choice, 'stribeck_velocity')
+      joint%friction%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+    case ('friction:coulomb_hyperbolic')
+      if (static > joint%friction%kinetic) joint%fading_speed = value_of(choice, 'fading_velocity')
+    end select
     belt%mean = value_of(choice, 'velocity')
     call move_surface(joint, machine%frequency, belt)
     call add_joint(machine, joint)
   end subroutine add_friction
 
-  pure subroutine add_contact(machine, choice, error)
+  pure subroutine add_contact(machine, choice, row, given, error)
     type(jointed_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: row(:)
+    integer, intent(in) :: given(:)
     type(error_t), allocatable, intent(out) :: error
     type(joint_t) :: joint
     joint%name = path_of(choice)
-    joint%row = row_of(machine, choice)
+    joint%row = row
     ! None is the largest double, which other kinds exceed.
     if (value_of(choice, 'upper') < huge(1.0_real64)) joint%upper = value_of(choice, 'upper')
     if (value_of(choice, 'lower') > -huge(1.0_real64)) joint%lower = value_of(choice, 'lower')
@@ -274,18 +245,48 @@ contains
                 number(joint%upper)//' m')
       return
     end if
-    if (choice%name == 'contact:newton') then
-      joint%kind = joint_contact
-      joint%contact%restitution = value_of(choice, 'restitution')
-    else
-      joint%kind = joint_soft
-      joint%contact%soft = .true.
-      joint%contact%kind = contact_kelvin_voigt
-      joint%contact%stiffness = value_of(choice, 'stiffness')
-      joint%contact%damping = value_of(choice, 'damping')
-      joint%contact%tension = value_of(choice, 'tension') > 0.5_wp
-    end if
+    joint%contact = contact_of(law_of_one(choice), felt_mass(machine%mass, given, row))
+    joint%kind = merge(joint_soft, joint_contact, joint%contact%soft)
     call add_joint(machine, joint)
   end subroutine add_contact
+
+  !> The law of a contact without its ends.
+  pure function law_of_one(choice) result(plain)
+    type(law_choice_t), intent(in) :: choice
+    type(law_choice_t) :: plain
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    plain = law_choice('contact', part_law(choice%name))
+    rows = parameters_of(plain%family, plain%name)
+    do i = 1, size(rows)
+      call set_value(plain, trim(rows(i)%name), [value_of(choice, trim(rows(i)%name))])
+    end do
+  end function law_of_one
+
+  !> Coordinates whose motion is given.
+  pure function given_of(choices, coordinate) result(given)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: coordinate(:)
+    integer, allocatable :: given(:)
+    integer :: i
+    given = [integer ::]
+    do i = 1, size(choices)
+      if (choices(i)%name == 'drive:motion') given = [given, coordinate(place_of(choices(i)))]
+    end do
+  end function given_of
+
+  !> Mass that a joint feels [kg]; coordinates whose motion is given have no end of it.
+  pure real(wp) function felt_mass(mass, given, row)
+    real(wp), intent(in) :: mass(:, :), row(:)
+    integer, intent(in) :: given(:)
+    integer, allocatable :: free(:)
+    real(wp), allocatable :: push(:)
+    integer :: i
+    logical :: ok
+    free = pack([(i, i=1, size(row))], [(all(given /= i), i=1, size(row))])
+    allocate (push(size(free)))
+    call solve(mass(free, free), row(free), push, ok)
+    felt_mass = 1/max(sum(row(free)*push), tiny(felt_mass))
+  end function felt_mass
 
 end module build_jointed

@@ -3,10 +3,11 @@
 
 !> What is written down of the motion of a jointed structure when asked: samples, events, and where the energy went.
 module jointed_log
+  use contact_law, only: contact_at_speed, contact_force, contact_t
   use eigen, only: modulus
   use flight_path, only: path_at, path_t
-  use jointed, only: joint_elastic, joint_soft, jointed_t, most_joints, wave_value
-  use jointed_state, only: acts_as_spring, free_force, is_held, joint_force, joint_motion, jointed_state_t, turning_at
+  use jointed, only: joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
+  use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, record_event, record_sample, &
@@ -29,24 +30,15 @@ contains
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
     complex(wp) :: turning(harmonics_of(machine))
-    real(wp) :: s, u, zero
+    real(wp) :: s, u
     integer :: j
     turning = turning_at(machine%frequency, state%time, size(turning))
     associate (q => state%q(:machine%n), v => state%v(:machine%n))
       energy = 0.5_wp*sum(v*matmul(machine%mass, v)) + 0.5_wp*sum(q*matmul(machine%stiffness, q)) - sum(machine%load*q)
     end associate
     do j = 1, size(machine%joints)
-      associate (joint => machine%joints(j))
-        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        if (joint%kind == joint_elastic) then
-          ! While it slides the spring is stretched by the friction.
-          zero = state%slider(j)
-          if (state%phase(j) /= 0) zero = s - state%phase(j)*joint%friction%kinetic/joint%stiffness
-          energy = energy + 0.5_wp*joint%stiffness*(s - zero)**2
-        else if (joint%kind == joint_soft .and. acts_as_spring(joint, state%phase(j))) then
-          energy = energy + 0.5_wp*joint%contact%stiffness*(s - merge(joint%upper, joint%lower, state%phase(j) > 0))**2
-        end if
-      end associate
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      energy = energy + joint_energy(machine%joints(j), state%phase(j), state%slider(j), s)
     end do
   end function energy_of_jointed
 
@@ -76,7 +68,8 @@ contains
     real(wp) :: before, next
     state = start
     before = 0
-    do while (sample_due(log, path%start + duration))
+    do while (log%sample_interval > 0)
+      if (.not. sample_due(log, path%start + duration)) exit
       next = max(before, sample_time(log) - path%start)
       call book_flight(machine, flow, path, start, before, next, log)
       call path_at(machine, flow, path, next, state%q, state%v)
@@ -110,7 +103,10 @@ contains
     integer :: panels, i, k
     if (.not. last > first) return
     fastest = machine%frequency*max(1, size(path%turning))
-    if (flow%modal) then
+    if (path%length > 0) then
+      ! A step of a marched flight is a polynomial.
+      fastest = 0
+    else if (flow%modal) then
       fastest = max(fastest, maxval([0.0_wp, modulus(flow%exponent)]))
     else
       fastest = max(fastest, flow%rate)
@@ -171,13 +167,25 @@ contains
         call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r)
         work = work - r*rate
         if (joint%kind == joint_soft) then
-          if (abs(state%phase(j)) == 1) contact = contact + joint%contact%damping*u**2
-        else if (state%phase(j) /= 0) then
+          if (abs(state%phase(j)) == 1) contact = contact + damping_of_contact(joint, state%phase(j), state%touch_speed(j), s, u)
+        else if (state%phase(j) /= 0 .and. joint%kind /= joint_spring) then
           friction = friction - r*u
         end if
       end associate
     end do
   end subroutine powers
+
+  !> Power lost in a pressed contact [W].
+  pure real(wp) function damping_of_contact(joint, phase, touch_speed, s, u) result(power)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    real(wp), intent(in) :: touch_speed, s, u
+    type(contact_t) :: law
+    real(wp) :: p
+    law = contact_at_speed(joint%contact, touch_speed)
+    p = merge(s - joint%upper, joint%lower - s, phase > 0)
+    power = (contact_force(law, p, phase*u) - contact_force(law, p, 0.0_wp))*phase*u
+  end function damping_of_contact
 
   !> What a transition took from the energy: of contacts, but for sliders that let go.
   pure subroutine book_change(machine, before, after, log)

@@ -5,20 +5,20 @@
 module jointed_motion
   use blow, only: strike
   use constants, only: two_pi
-  use flight_path, only: path_t
   use guards, only: force_ends, force_returns, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, &
     slide_ends, slides_down, slides_up
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, most_joints
   use jointed_state, only: free_force, is_held, joint_motion, jointed_state_t, key_of, turning_at
-  use jointed_log, only: book_change, log_event, log_flight
+  use jointed_flight, only: fly
+  use jointed_log, only: book_change, log_event
   use kinds, only: wp
-  use linear_flight, only: fly_linear, watch_t
+  use linear_flight, only: watch_t
   use mode_choice, only: accelerations_of, choose_mode, project
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: append_word, event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
-    event_turning_point, log_t, options_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
-    word_stick, word_upper
+    event_turning_point, flight_adaptive, log_t, options_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, &
+    word_period, word_stick, word_upper
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed
   implicit none
   private
@@ -54,21 +54,25 @@ contains
     moving%options = options
     moving%harmonics = harmonics_of(machine)
     joints = size(machine%joints)
-    if (.not. machine%linear) then
-      allocate (moving%flows(0))
-    else if (joints <= few_joints) then
+    if (joints <= few_joints) then
       allocate (moving%flows(2**joints))
       do key = 0, 2**joints - 1
-        call build_flow(machine, key, .false., moving%flows(key + 1))
+        call build_flow(machine, key, with_matrix(moving), moving%flows(key + 1))
       end do
     else
       allocate (moving%flows(joints + 1))
-      call build_flow(machine, 0, .false., moving%flows(1))
+      call build_flow(machine, 0, with_matrix(moving), moving%flows(1))
       do i = 1, joints
-        call build_flow(machine, ibset(0, i - 1), .false., moving%flows(i + 1))
+        call build_flow(machine, ibset(0, i - 1), with_matrix(moving), moving%flows(i + 1))
       end do
     end if
   end subroutine prepare_jointed
+
+  !> Whether a flight may be marched: it needs the rows of the exponential series.
+  pure logical function with_matrix(moving)
+    type(jointed_motion_t), intent(in) :: moving
+    with_matrix = moving%options%flight == flight_adaptive .or. .not. moving%machine%linear
+  end function with_matrix
 
   !> State with the coordinates `q` and speeds `v` and the drive at `angle` [rad]. A contact beyond its stop starts at it.
   pure subroutine start_jointed(moving, q, v, angle, state, ok)
@@ -165,7 +169,6 @@ contains
     type(jointed_state_t) :: start
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
-    type(path_t) :: path
     type(watch_t) :: watch
     real(wp) :: before
     integer :: count_guards, stalls, holds, burst, key
@@ -186,17 +189,14 @@ contains
         before = state%time
         key = key_of(machine, state%phase)
         call note_slip(moving, state, key, tally)
-        start = state
         if (ready(moving, key) > 0) then
-          call fly_linear(machine, moving%flows(ready(moving, key)), state, time_end, list, count_guards, fallen, path, watch)
-          if (present(log)) call log_flight(machine, moving%flows(ready(moving, key)), path, start, state%time - before, log)
+          call fly(machine, moving%flows(ready(moving, key)), moving%options, state, time_end, list, count_guards, fallen, watch, &
+                   tally%steps, reason, log)
         else
-          if (spare%key /= key) call build_flow(machine, key, .false., spare)
-          call fly_linear(machine, spare, state, time_end, list, count_guards, fallen, path, watch)
-          if (present(log)) call log_flight(machine, spare, path, start, state%time - before, log)
+          if (spare%key /= key) call build_flow(machine, key, with_matrix(moving), spare)
+          call fly(machine, spare, moving%options, state, time_end, list, count_guards, fallen, watch, tally%steps, reason, log)
         end if
-        tally%steps = tally%steps + watch%evaluations
-        watch%evaluations = 0
+        if (reason /= 0) exit
         if (state%time > before) state%left = 0
         stalls = merge(0, stalls + 1, state%time > before)
         burst = merge(burst, 0, state%time - before < burst_gap*machine%period)

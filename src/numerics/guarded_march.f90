@@ -14,7 +14,7 @@ module guarded_march
 
   public :: begin_march, take_step
 
-  integer, parameter, public :: most_equations = 8
+  integer, parameter, public :: most_equations = 32
   !> How a step ended, where no guard fell; guards count from 1.
   integer, parameter, public :: march_goes_on = 0, march_time_over = -1, march_failed = -2
 
@@ -56,11 +56,17 @@ module guarded_march
     real(wp) :: coefficients(most_equations) = 0
     !> Number of a margin of the system that is the guard instead; 0 = none.
     integer :: margin = 0
+    !> It is zero when the march begins, and rises from there; what is no more than `noise`, or over a time `noise_rate` times
+    !> it, is rounding.
+    logical :: from_zero = .false.
+    real(wp) :: noise = 0, noise_rate = 0
   end type guard_t
 
   type, public :: march_t
     !> Number of equations.
     integer :: n = 0
+    !> No step has been taken.
+    logical :: begins = .true.
     !> Now, and the state now.
     real(wp) :: time = 0, y(most_equations) = 0
     !> The step behind: its start, length, the fraction of the length that was gone, and the state over the fraction of
@@ -129,6 +135,7 @@ contains
     call extend(march, system, h, next)
     march%length = h
     call find_fall(march, system, guards, fallen)
+    march%begins = .false.
     if (fallen == march_goes_on) then
       march%time = merge(time_end, march%from + h, last)
       march%slopes(:, 1) = march%slopes(:, 13)
@@ -179,7 +186,7 @@ contains
     class(system_t), intent(in) :: system
     type(guard_t), intent(in) :: guards(:)
     integer, intent(out) :: fallen
-    real(wp) :: p(0:degree), t, first
+    real(wp) :: p(0:degree), t, first, noise
     integer :: i
     fallen = march_goes_on
     first = 1
@@ -190,7 +197,11 @@ contains
         p = matmul(march%path(:, :march%n), guards(i)%coefficients(:march%n))
         p(0) = p(0) + guards(i)%constant
       end if
+      if (guards(i)%from_zero .and. march%begins) p(0) = 0
+      noise = guards(i)%noise + guards(i)%noise_rate*march%length
+      if (noise > 0 .and. all(abs(p) <= noise)) cycle
       t = first_fall(p)
+      if (guards(i)%from_zero .and. march%begins .and. p(1) < -noise) t = 0
       if (t < first .or. (fallen == march_goes_on .and. t <= first)) then
         first = t
         fallen = i

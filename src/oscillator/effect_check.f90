@@ -32,6 +32,12 @@ contains
         problem = ripple_problem(choices, choices(i))
       case ('dahl')
         problem = dahl_problem(choices)
+      case ('friction_curve')
+        problem = table_problem(choices(i), 'speed', 'upwards')
+        if (len(problem) == 0) problem = table_problem(choices(i), 'speed', 'downwards')
+        if (has_effect(choices, 'dahl')) problem = ': found with effect.dahl, allowed one of them'
+      case ('friction_place_curve')
+        problem = table_problem(choices(i), 'place', 'change')
       case ('asymmetric_friction')
         problem = asymmetry_problem(choices, choices(i))
       case default
@@ -53,9 +59,7 @@ contains
     select case (effect%name)
     case ('restitution_slope', 'restitution_curve')
       if (effect%name == 'restitution_curve') then
-        problem = knots_problem(list_of(effect, 'speed'), size(list_of(effect, 'change')))
-        if (len(problem) > 0) problem = '.speed: found '//to_text(size(list_of(effect, 'speed')))//' knots and '// &
-                                        to_text(size(list_of(effect, 'change')))//' values of change, '//problem
+        problem = table_problem(effect, 'speed', 'change')
         if (has_effect(choices, 'restitution_slope')) problem = ': found with effect.restitution_slope, allowed one of them'
       end if
       if (law /= 'newton') problem = ': found with contact.law = "'//law//'", allowed with "newton"'
@@ -80,6 +84,16 @@ contains
       end if
     end select
   end function contact_problem
+
+  !> What is wrong with a table of an effect, '' if nothing.
+  pure function table_problem(effect, knots, values) result(problem)
+    type(law_choice_t), intent(in) :: effect
+    character(len=*), intent(in) :: knots, values
+    character(len=:), allocatable :: problem
+    problem = knots_problem(list_of(effect, knots), size(list_of(effect, values)))
+    if (len(problem) > 0) problem = '.'//knots//': found '//to_text(size(list_of(effect, knots)))//' knots and '// &
+                                    to_text(size(list_of(effect, values)))//' values of '//values//', '//problem
+  end function table_problem
 
   pure function ripple_problem(choices, effect) result(problem)
     type(law_choice_t), intent(in) :: choices(:), effect

@@ -152,7 +152,8 @@ contains
     real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
     barriers = barrier_positions(machine%contact)
     turn = 0
-    if (abs(machine%effects%cubic) > 0 .or. abs(machine%effects%friction_slope) > 0) return
+    if (abs(machine%effects%cubic) > 0 .or. abs(machine%effects%friction_slope) > 0 .or. &
+        machine%effects%over_place%count > 0) return
     if (barriers(1) >= unreachable .and. barriers(2) <= -unreachable) turn = machine%restoring%turn
   end function turn_of
 
@@ -176,7 +177,8 @@ contains
       if (.not. machine%restoring%is_linear) machine%force_scale = machine%force_scale + machine%restoring%stiffness
       if (machine%drive%interval > 0) machine%force_scale = machine%force_scale + maxval(abs(machine%drive%force))
       if (effects%present) machine%force_scale = machine%force_scale + abs(effects%offset) + abs(effects%asymmetric_coulomb) &
-                                                 + effects%dahl_sliding + abs(effects%cubic)*length**3
+                                                 + effects%dahl_sliding + abs(effects%cubic)*length**3 &
+                                                 + maxval(abs([effects%upwards%value, effects%downwards%value]))
     end associate
   end subroutine set_bounds
 

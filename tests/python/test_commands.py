@@ -212,8 +212,10 @@ def test_laws(separatrix, tmp_path):
     }
     assert expected <= names
     for law in laws:
-        assert law["law"] in text
-        assert law["source"] or law["law"] == "none"
+        kind, _, name = law["law"].rpartition(":")
+        assert (f"[{kind}.NAME]" if kind else name) in text
+        assert law["meaning"] in text
+        assert law["source"] or law["law"] == "none" or kind
         for parameter in law["parameters"]:
             assert parameter["unit"]
             assert parameter["meaning"]

@@ -102,9 +102,10 @@ def test_samples_stay_around_events_and_where_a_kink_shows():
     assert np.median(rows.size[np.abs(rows.t - KINK) > 0.1]) >= 256
 
 
-def test_slow_motions_of_few_samples_are_left_alone():
-    assert stride(400) == 1
-    assert stride(1340) > 1
+def test_motions_of_few_samples_and_short_records_are_left_alone():
+    assert stride(400, 100_000) == 1
+    assert stride(1340, 6210) == 1
+    assert stride(1340, 100_000) > 1
 
 
 def test_gaps_stay_gaps():

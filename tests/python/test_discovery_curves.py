@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Effects that are functions: a restitution of another shape than the built-in one is found as a table."""
+"""Effects that are functions: laws of another shape than the built-in ones are found as tables."""
 
 import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
-from separatrix.discovery.fitting.curves import closed_forms, speeds_at
+from separatrix.discovery.fitting.curves import MEMBERS, knots_at
+from separatrix.discovery.fitting.shapes import closed_forms, through
 from separatrix.discovery.measured.records import make_record
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
@@ -89,42 +90,79 @@ def test_a_table_that_is_none_is_refused(speeds, changes):
 
 
 def test_knots_follow_the_impacts_and_need_enough_of_them():
+    member = MEMBERS[0]
     speeds = np.sort(np.random.default_rng(1).uniform(0.2, 3, 60))
-    knots = speeds_at(speeds, 5)
-    assert knots[0] == speeds[0]
-    assert np.all(np.diff(knots) > 0.02)
-    assert speeds_at(speeds[:14], 5) is None
-    assert speeds_at(np.full(60, 1.0), 5) is None
+    knots = knots_at(member, speeds, 5)
+    assert knots[[0, -1]] == pytest.approx(speeds[[0, -1]])
+    assert np.all(np.diff(knots) > 0.2)
+    assert knots_at(member, speeds[:14], 5) is None
+    assert knots_at(member, np.full(60, 1.0), 5) is None
+
+
+def test_the_curve_that_is_drawn_is_that_of_the_law():
+    base = Model.from_text(CASE.format(contact=NEWTON))
+    speeds, wanted = np.array([0.3, 0.7, 1.5, 2.5, 3.5]), np.array([0.1, -0.1, 0.05, -0.2, -0.15])
+    before, after = bounces(curve(base, speeds, wanted))
+    inside = (before > 0.3) & (before < 3.5)
+    assert np.allclose((after / before)[inside], 0.62 + through(speeds, wanted)(before[inside]), atol=1e-9)
 
 
 def test_closed_forms_are_told_apart_by_the_values():
     at = np.linspace(0.3, 4, 8)
     covariance = np.diag(np.full(8, 1e-8))
-    power = closed_forms(at, 0.5 * at**-0.25, covariance)
+
+    def fitting(effect, value):
+        return [name for name, one in closed_forms(effect, at, value, covariance).items() if one["fits"]]
+
+    power = closed_forms("restitution_curve", at, 0.5 * at**-0.25, covariance)
     assert [name for name, one in power.items() if one["fits"]] == ["power"]
     assert power["power"]["parameters"] == pytest.approx([0.5, 0.25], rel=1e-3)
-    line = closed_forms(at, 0.6 - 0.03 * at, covariance)
-    assert line["linear"]["fits"]
-    assert not line["power"]["fits"]
-    assert not any(one["fits"] for one in closed_forms(at, 0.5 + 0.1 * (at > 2), covariance).values())
+    assert fitting("restitution_curve", 0.6 - 0.03 * at) == ["linear"]
+    assert fitting("restitution_curve", 0.5 + 0.1 * (at > 2)) == []
+    assert "stribeck" in fitting("friction_curve", 1 + 0.5 * np.exp(-((at / 1.5) ** 2)))
+    assert fitting("friction_curve", 1 + 0.2 * at) == ["linear", "quadratic", "power"]
 
 
-def test_a_restitution_that_is_a_power_of_the_speed_is_named_as_a_function():
-    true = Model.from_text(CASE.format(contact=POWER))
+def records_of(true: Model, seconds: float = 15.0, rate: float = 100.0) -> list:
+    """Three records, the last to be held out."""
     records = []
     for seed, ratio in enumerate((0.82, 0.88, 0.85)):
-        t = np.arange(2400) / 160
+        t = np.arange(int(seconds * rate)) / rate
         start = np.array([(0.4, 0.5, 0.4)])
         motion = true.segments(["drive.ratio"], np.array([ratio]), start, [0, t.size], t, derivatives=False)
         x = motion.x + SIGMA * np.random.default_rng(seed).standard_normal(t.size)
         header = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "sensor_noise_sigma_m": SIGMA}
         records.append(make_record(f"r{seed}", {"t": t, "x": x}, header))
-    options = Options(quick=True, most_effects=1, candidates=("restitution_slope", "quadratic_drag"))
+    return records
+
+
+def test_a_restitution_that_is_a_power_of_the_speed_is_named_as_a_function():
+    records = records_of(Model.from_text(CASE.format(contact=POWER)))
+    options = Options(quick=True, most_effects=1, candidates=("restitution_slope",))
     verdict = discover(Model.from_text(CASE.format(contact=NEWTON)), records[:2], records[2:], options)
     assert (verdict["outcome"], verdict["effects"]) == ("named", ["restitution_curve"])
     assert verdict["families"] == ["restitution over impact speed"]
-    found = verdict["function"]
+    found = verdict["function"]["parts"][0]
     at, value = np.array(found["at"]), np.array(found["value"])
     inside = at > 0.3
     assert np.allclose(value[inside], 0.5 * at[inside] ** -0.25, rtol=0.03)
     assert min(one["closed"] for one in verdict["remains"]) > 0.98
+
+
+def test_friction_that_falls_with_the_speed_otherwise_than_any_built_in_shape_is_named_as_a_function():
+    """Friction 0.49 + 0.6/(1 + (v/0.4)^2) N, which no effect of the catalogue says; its size comes out."""
+    base = Model.from_text(CASE.format(contact=NEWTON))
+    speeds = np.concatenate([np.linspace(0, 1.2, 12), [1.8, 2.5, 3.5, 5.0]])
+    wanted = 0.6 / (1 + (speeds / 0.4) ** 2)
+    table = {f"speed[{i}]": one for i, one in enumerate(speeds, start=1)}
+    for key in ("upwards", "downwards"):
+        table |= {f"{key}[{i}]": one for i, one in enumerate(wanted, start=1)}
+    records = records_of(base.with_effect("friction_curve", table))
+    options = Options(quick=True, most_effects=1, candidates=("viscous", "quadratic_drag"))
+    verdict = discover(base, records[:2], records[2:], options)
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["friction_curve"])
+    assert verdict["families"] == ["friction over speed"]
+    part = verdict["function"]["parts"][0]
+    at, value = np.array(part["at"]), np.array(part["value"])
+    inside = (at > 0.1) & (at < 2.5)
+    assert np.allclose(value[inside], 0.4905 + 0.6 / (1 + (at[inside] / 0.4) ** 2), atol=0.05)

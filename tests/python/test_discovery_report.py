@@ -6,6 +6,8 @@ import base64
 import io
 import json
 import re
+import sys
+import zlib
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -296,9 +298,58 @@ def test_nothing_is_loaded_from_elsewhere(report: tuple) -> None:
     assert all(source.startswith("data:image/png;base64,") for source in report[1].sources)
 
 
-def test_the_pdf_has_text_and_every_figure(report: tuple) -> None:
-    assert len(re.findall(rb"/Type /Page\b", report[2])) > 3
-    assert len(re.findall(rb"/Subtype /Image\b", report[2])) >= len(FIGURES)
+def test_the_pdf_is_the_page_printed(report: tuple) -> None:
+    """Its text, every figure, and the verdict on the first page by itself."""
+    assert len([one for one in streams(report[2]) if b"BT" in one]) > 3
+    assert len(re.findall(rb"/Subtype ?/Image\b", report[2])) >= len(FIGURES)
+
+
+def streams(pdf: bytes) -> list[bytes]:
+    """What is drawn, unpacked."""
+    found = []
+    for part in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.S):
+        try:
+            found.append(zlib.decompress(part))
+        except zlib.error:
+            found.append(part)
+    return found
+
+
+def test_without_the_engine_there_is_a_page_and_no_pdf(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    make(tmp_path, "none")
+    said = []
+    html, pdf = write_report(
+        tmp_path, tmp_path / "base.toml", Options(quick=True, progress=lambda *one: said.append(one[0]))
+    )
+    assert html.is_file()
+    assert not pdf.exists()
+    assert any("separatrix[report]" in one for one in said)
+
+
+def test_a_function_is_drawn_on_the_first_page_with_its_band(tmp_path: Path) -> None:
+    told = make(tmp_path, "named")
+    at = np.array([0.0, 1.0, 2.0])
+    told["function"] = {
+        "effect": "friction_curve", "variable": "speed", "unit": "m/s", "quantity": "friction (N)",
+        "text": "friction (N) 1 at 0 m/s to 2 at 2 m/s",
+        "parts": [
+            {
+                "direction": name, "at": list(at), "value": list(1 + at),
+                "band_95": [list(0.9 + at), list(1.1 + at)],
+            }
+            for name in ("upwards", "downwards")
+        ],
+        "closed_forms": {"linear": {"fits": True, "at": list(at), "curve": list(1 + at)}},
+    }  # fmt: skip
+    (tmp_path / "verdict.json").write_text(json.dumps(told))
+    html, _ = write_report(tmp_path, tmp_path / "base.toml", Options(quick=True))
+    text = html.read_text()
+    first = text[: text.index('<section id="compared">')]
+    assert [name for name, _ in Page(first).pictures] == ["gap", "function"]
+    assert "friction (N) 1 at 0 m/s to 2 at 2 m/s" in first
 
 
 def test_a_record_without_impacts_says_so(tmp_path: Path) -> None:

@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a figure is asked to look like: ranges, slices, units, colours, marks, shading, films."""
 
+import importlib.machinery
 import itertools
+import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +19,8 @@ from sample_files import write_basin, write_sweep
 from separatrix import cli, style
 from separatrix.errors import SeparatrixError
 from separatrix.figures import basin, section, sweep
-from separatrix.figures.animation import animate
+from separatrix.figures.animation import animate, ffmpeg
+from separatrix.figures.difference import differing
 from separatrix.figures.look import Look
 from separatrix.open import open_result
 
@@ -245,3 +249,53 @@ def test_a_style_file_and_svg_are_taken(tmp_path: Path) -> None:
     options = ["--style", str(sheet), "--formats", "svg", "--field", "regime"]
     assert cli.main([str(path), "-o", str(tmp_path), *options]) == 0
     assert "#12ab34" in (tmp_path / "b_regime.svg").read_text()
+
+
+def test_impacts_are_seen_at_their_phase(library: Path, source_dir: Path) -> None:
+    """A cycle of three impacts in three periods: three points, of the speeds of the events."""
+    case = sx.load(source_dir / "docs" / "gallery" / "petals.toml").with_({"start.crank_angle": 0.5})
+    motion = sx.trajectory(case, -0.28, 0.087, 0.5, duration=400.0, samples=4)
+    assert int(motion.attrs["period"]) in (1, 3)
+    figure = motion.separatrix.plot("impacts")
+    phase, speed = (np.asarray(values) for values in figure.axes[0].lines[0].get_data())
+    late = motion.event_time.values >= 200.0
+    struck = late & (motion.event_kind.values == 1)
+    assert speed == pytest.approx(motion.event_v_before.values[struck])
+    period = float(motion.attrs["drive_period"])
+    assert phase == pytest.approx(
+        np.degrees(0.5 + 2 * np.pi * motion.event_time.values[struck] / period) % 360
+    )
+    # settled: as many points as the cycle has impacts
+    assert len(np.unique(phase.round(3))) == int(motion.attrs["period"])
+
+
+def test_a_film_is_written_by_the_package_where_there_is_no_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    package = types.ModuleType("imageio_ffmpeg")
+    package.get_ffmpeg_exe = lambda: "/there/ffmpeg"
+    package.__spec__ = importlib.machinery.ModuleSpec("imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
+    assert ffmpeg() == "/there/ffmpeg"
+
+
+def test_two_maps_are_compared_point_by_point(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Black is where the motion differs, whatever the numbers of the attractors; other points are refused."""
+    attractor = np.where(np.arange(X0.size)[:, None] < X0.size // 2, 1, 2) * np.ones((1, V0.size), int)
+    changed = attractor.copy()
+    changed[0, :] = 2
+    one = write_basin(tmp_path / "one.h5", {"x0": X0, "v0": V0}, attractor)
+    renumbered = write_basin(tmp_path / "two.h5", {"x0": X0, "v0": V0}, 3 - changed, regime_of=(0, 2, 1))
+    with open_result(one) as first, open_result(renumbered) as second:
+        mask = differing(first, second)
+        assert mask.values[0].all()
+        assert not mask.values[1:].any()
+        figure = first.separatrix.difference(second)
+        assert colour_at(figure, X0[0], V0[1]) == (0.0, 0.0, 0.0)
+        assert colour_at(figure, X0[1], V0[1]) == pytest.approx(to_rgb(style.ATTRACTORS[0]), abs=0.02)
+        assert legend_texts(figure)[-1] == f"another motion ({100 / X0.size:.3g} %)"
+        with pytest.raises(SeparatrixError, match="the same points along x0"):
+            first.separatrix.difference(second.isel(x0=slice(1, None)))
+    assert cli.main([str(one), str(renumbered), "--difference", "--formats", "png", "--dpi", "60"]) == 0
+    assert (tmp_path / "one_difference.png").is_file()
+    assert cli.main([str(one), "--difference", "--formats", "png", "--dpi", "60"]) == 64
+    assert "found 1 files, allowed 2" in capsys.readouterr().err

@@ -9,7 +9,6 @@ both runs over the values of a parameter, and many starts at each value (`sweep`
     agrees      same cycle, period and impacts per period; or no cycle for both
     not known   no label, or one of a motion that the program calls neither periodic nor chaotic: silence
     rounding    the referee ends on the program's motion too, in extended precision or 1e-12 beside the start
-    window      in a run: the same cycle, its impacts over a window that is no multiple of its period
     unfounded   a cycle that the referee never finds, while its own answer hangs on the last digits
     wrong       anything else
 """
@@ -31,8 +30,8 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 import referee  # noqa: E402
+from comparison_report import disagreements, summary_table, wrong_in  # noqa: E402
 from referee import Effort, Machine, Outcome  # noqa: E402
-from report import disagreements, summary_table, wrong_in  # noqa: E402
 
 __all__ = ["Court", "compare", "disagreements", "kept_report", "summary_table", "wrong_in"]
 
@@ -44,6 +43,7 @@ BESIDE = 1e-12  # how far beside a start the referee is asked again
 CHAOTIC = 3  # the kind of an entry of the catalogue
 COUNT = 1e-4  # impacts per drive period that differ by less are the same
 PERIODS = 40  # of `points`
+PATIENT = Effort(most=40000)  # where a motion had come to nothing
 
 
 class Verdicts:
@@ -126,13 +126,16 @@ class Court:
     ) -> str:
         """Hold a claim against the referee's outcome; `points` are the cycle that the program means."""
         verdict = judged(machine, found, claim, points)
+        if verdict == "wrong" and found.kind == "slow":
+            (found,) = referee.outcomes(self.double, machine, start[None], PATIENT)
+            verdict = judged(machine, found, claim, points)
         if verdict != "wrong":
             return verdict
         others = self.beside(machine, start)
         if all(same_motion(machine, found, other) for other in others):
             return "wrong"
         met = any(judged(machine, other, claim, points) == "agrees" for other in others)
-        return "rounding" if met or claim.period == 0 else "unfounded"
+        return "rounding" if met else "unfounded"
 
 
 def judged(machine: Machine, found: Outcome, claim: Claim, points: np.ndarray | None = None) -> str:
@@ -233,26 +236,11 @@ def compare_sweep(court: Court, path: Path, case: dict, kinds: Counter) -> tuple
         ]
         for i, (outcome, claim) in enumerate(zip(outcomes, claims, strict=True)):
             verdict = court.judge(machine, begun[i], outcome, claim)
-            if verdict == "wrong" and i < 2 and over_window(court, machine, case["run"], outcome, claim):
-                verdict = "window"
             where = {"run": ("up", "down")[i]} if i < 2 else {"start": begun[i].tolist()}
             group = runs if i < 2 else many
             group.add(verdict, value=value, **where, ours=str(claim), referee=told(outcome))
             kinds[outcome.kind] += 1
     return runs, many
-
-
-def over_window(court: Court, machine: Machine, run: dict, found: Outcome, claim: Claim) -> bool:
-    """Whether impacts are those of the cycle over a window of whole drive periods, not of whole cycles."""
-    if claim.period == 0 or found.period != claim.period:
-        return False
-    periods = round(run.get("window", run["duration"] / 4) / machine.period)
-    for length in (periods, periods + 1):
-        flown = referee.strobes(court.double, machine, *found.cycle[0], found.period + length)
-        counts = flown[length:, 2] - flown[:-length, 2]
-        if np.min(np.abs(counts / length - claim.impacts)) < 1e-9:
-            return True
-    return False
 
 
 def compare_points(court: Court, path: Path, case: dict) -> tuple[Verdicts, float]:

@@ -233,7 +233,9 @@ static body started(const machine *m, double x, double v) {
   body b = {.law = m, .x = x, .v = v, .slowest = INFINITY, .margin = INFINITY};
   b.tangent[0][0] = b.tangent[1][1] = 1;
   if (m->wall_stiffness > 0)
-    b.pressed = x > m->upper ? 1 : x < m->lower ? -1 : 0;
+    b.pressed = x > m->upper || (x == m->upper && v > 0)   ? 1
+                : x < m->lower || (x == m->lower && v < 0) ? -1
+                                                           : 0;
   if (m->kinetic != 0 || m->static_friction != 0) {
     b.sign = v > 0 ? 1 : v < 0 ? -1 : 0;
     if (v == 0)

@@ -10,11 +10,11 @@ module jointed_machines
   use jointed_motion, only: advance_jointed, jointed_motion_t, prepare_jointed, start_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
-  use motion_state, only: options_t, tally_t
+  use motion_state, only: flight_adaptive, flight_auto, options_t, tally_t
   implicit none
   private
 
-  public :: body, spring, barrier, soft_barrier, rub, elastic_rub, push, ready, go_on, set_off
+  public :: body, spring, barrier, soft_barrier, rub, elastic_rub, fit, push, ready, go_on, set_off
 
 contains
 
@@ -118,6 +118,17 @@ contains
     call add_joint(machine, joint)
   end subroutine elastic_rub
 
+  !> Any joint between two bodies.
+  subroutine fit(machine, first, second, joint)
+    type(jointed_t), intent(inout) :: machine
+    character(len=*), intent(in) :: first, second
+    type(joint_t), intent(in) :: joint
+    type(joint_t) :: fitted
+    fitted = joint
+    fitted%row = row(machine, first, second)
+    call add_joint(machine, fitted)
+  end subroutine fit
+
   !> A force: mean, and cosine and sine of the drive.
   subroutine push(machine, name, mean, cosine, sine)
     type(jointed_t), intent(inout) :: machine
@@ -126,16 +137,20 @@ contains
     call add_force(machine, row(machine, 'ground', name), mean, [cmplx(cosine, -sine, wp)])
   end subroutine push
 
-  !> The machine ready to move.
-  function ready(machine) result(moving)
+  !> The machine ready to move, `adaptive` by marching alone.
+  function ready(machine, adaptive) result(moving)
     type(jointed_t), intent(in) :: machine
+    logical, intent(in), optional :: adaptive
     type(jointed_motion_t) :: moving
     type(jointed_t) :: whole
+    type(options_t) :: options
     type(error_t), allocatable :: error
     whole = machine
     call finish(whole, error)
     if (allocated(error)) error stop 'a machine of a test is refused'
-    call prepare_jointed(whole, options_t(), moving)
+    options%step_budget = 10000000
+    if (present(adaptive)) options%flight = merge(flight_adaptive, flight_auto, adaptive)
+    call prepare_jointed(whole, options, moving)
   end function ready
 
   !> A state; the drive begins at its phase 0.

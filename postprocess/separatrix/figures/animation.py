@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A map moving through one of its parameters, as a GIF or an MP4."""
 
+import importlib.util
 import io
 import shutil
 import subprocess
@@ -40,8 +41,12 @@ def animate(
     """
     if path.suffix not in FORMATS:
         raise SeparatrixError(f"{path}: allowed are {' and '.join(FORMATS)}", USAGE)
-    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
-        raise SeparatrixError(f"{path}: needs ffmpeg, which was not found; .gif needs nothing", USAGE)
+    if path.suffix == ".mp4" and ffmpeg() is None:
+        raise SeparatrixError(
+            f"{path}: needs ffmpeg, which was not found; `pip install imageio-ffmpeg` brings it;"
+            " .gif needs nothing",
+            USAGE,
+        )
     if field not in CLASS_FIELDS:
         allowed = ", ".join(CLASS_FIELDS)
         raise SeparatrixError(f"animation: found the field '{field}', allowed {allowed}", USAGE)
@@ -95,11 +100,19 @@ def _on_page(image: Image.Image, size: tuple[int, int]) -> Image.Image:
     return page
 
 
+def ffmpeg() -> str | None:
+    """Return the program that writes films: that of the system, or of the package imageio-ffmpeg."""
+    found = shutil.which("ffmpeg")
+    if found is None and importlib.util.find_spec("imageio_ffmpeg"):
+        found = importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+    return found
+
+
 def _film(frames: list[Image.Image], path: Path, frames_per_second: float) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for number, frame in enumerate(frames):
             frame.save(Path(folder) / f"{number:06d}.png")
-        command = ["ffmpeg", "-y", "-loglevel", "error", "-framerate", str(frames_per_second)]
+        command = [str(ffmpeg()), "-y", "-loglevel", "error", "-framerate", str(frames_per_second)]
         command += ["-i", str(Path(folder) / "%06d.png"), "-pix_fmt", "yuv420p", str(path)]
         ended = subprocess.run(command, capture_output=True, text=True)
         if ended.returncode:

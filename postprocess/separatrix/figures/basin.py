@@ -70,10 +70,12 @@ def basin_map(
     title: str,
     look: Look = DEFAULT,
     totals: dict[int, int] | None = None,
+    over: str | None = None,
 ) -> Figure:
     """Return the map of one field over the initial conditions, one panel per value of the other axes.
 
-    `totals`: the points of each class in the legend, where it is to be that of more than is drawn.
+    `totals`: the points of each class in the legend, where it is to be that of more than is drawn. `over`: a
+    variable of 0 and 1, black where it is 1.
     """
     whole, result = result, look.selected(result)
     path = path if look.whole else None
@@ -98,6 +100,9 @@ def basin_map(
         handles = [marks.on_legend(handle, marked) for handle in handles]
         caption += ["markers: points of the attractors on the section"] if marked else []
     caption += _count_caption(result, field, panels, len(places), look)
+    if over is not None:
+        marked_panels = _read_panels(None, result, over, (down, across), others, chosen)
+        handles.append(_draw_over(grid, result, (down, across), marked_panels))
     compose(figure, title, shown([*caption, plain(version_text(result))], look), handles)
     return figure
 
@@ -156,7 +161,7 @@ def _read_panels(
                 value_label(result[name], float(result[name].values[k]))
                 for name, k in zip(others, place, strict=True)
             )
-            if field in CLASS_FIELDS:
+            if field in (*CLASS_FIELDS, "differs"):
                 data = majority_plane(dataset, plane, place)
             else:
                 data = scalar_plane(dataset, plane, place, smallest=field == "grazing_margin")
@@ -244,6 +249,14 @@ def _draw_classes(
     _label(grid, result, axes)
     shares = share_texts(class_counts(entries, totals))
     return [_patch(entry, share) for entry, share in zip(entries, shares, strict=True)]
+
+
+def _draw_over(grid: list[Axes], result: xr.Dataset, axes: tuple, panels: list[_Panel]) -> Patch:
+    for ax, panel in zip(grid, panels, strict=True):
+        image = _draw_image(ax, result, axes, panel, np.ma.masked_equal(panel.plane.image, 0))
+        image.set_cmap(ListedColormap(["black"]))
+    counts = [sum(panel.plane.counts.get(code, 0) for panel in panels) for code in (0, 1)]
+    return Patch(facecolor="black", label=f"another motion ({100 * counts[1] / sum(counts):.3g} %)")
 
 
 def _short_shares(shares: list[str]) -> str:

@@ -244,6 +244,8 @@ def version_text(result: xr.Dataset) -> str:
 def _axes(result: xr.Dataset, case: dict) -> set[str]:
     """Names of what varies in a file."""
     axes = {str(name) for name in result.dims}
+    if result.attrs.get("kind") == "branches":
+        axes.add(str(result.attrs.get("parameter", "")).replace(".", "_"))
     if "ratio" in result and np.ptp(result["ratio"].values) > 0:
         axes.add("drive_ratio")
     friction = case.get("friction")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
-from separatrix.figures import contact, energy, pair
+from separatrix.figures import contact, energy, impacts, pair
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, flag_text, plain, unit
@@ -40,6 +40,9 @@ def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, F
     seen = pair.relative_to_stop(result)
     if "contact_force" in result:
         made["contact"] = contact.loops(seen, title)
+    struck = impacts.section(seen, title, look)
+    if struck is not None:
+        made["impacts"] = struck
     return {**made, "phase": phase_portrait(seen, title, look)}
 
 

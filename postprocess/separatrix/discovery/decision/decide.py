@@ -68,7 +68,8 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     found = first
     if not _detected(best):
         return _without_name(bench, decision)
-    if not (best.gates["adequate"] or bench.options.quick):
+    shaped = None if best.gates["adequate"] else _shaped(bench, first)
+    if shaped is None and not (best.gates["adequate"] or bench.options.quick):
         # the linear screen may have passed over the effect that closes the gap
         whole = run_round(bench, first.base, first.foretold, 0.75, 0.8, first, everything=True)
         whole = _renewing(bench, whole, 0.8, everything=True)
@@ -81,7 +82,8 @@ def decide(bench: Bench, base: Fitted) -> Decision:
             return _without_name(bench, decision)
     if best.gates["adequate"]:
         return _conclude(bench, decision, best, rivals)
-    shaped = _shaped(bench, found)
+    if shaped is None and found is not first:
+        shaped = _shaped(bench, found)
     if shaped is not None:
         return _conclude(bench, decision, *shaped)
     return _with_more(bench, decision, best)
@@ -89,7 +91,8 @@ def decide(bench: Bench, base: Fitted) -> Decision:
 
 def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
     """A family whose built-in shapes are wrong and that closes the gap as a function."""
-    member = flexible_member(bench, found)
+    base = ceiling(found.base.problem, found.base.fit, bench.scales.mass)
+    member = flexible_member(bench, found, base)
     if member is None:
         return None
     one, rivals = member

@@ -1,51 +1,87 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where no closed form closes a gap: the member of a family that is a function, on as many knots as pay."""
+"""Where no closed form closes a gap: the members of families that are functions, on as many knots as pay."""
 
-from separatrix.discovery.decision.judge import Judged, lead, margin
+from collections.abc import Iterator
+
+from separatrix.discovery.decision.judge import Judged, admissible, lead, margin
 from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import (
     KNOTS,
-    RESTITUTION,
-    change_of,
-    impact_speeds,
-    restitution_curve,
-    speeds_at,
+    MEMBERS,
+    Member,
+    fit_member,
+    fits_machine,
+    knots_at,
+    seen_values,
 )
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.library import effects
 
+# share of the best evidence, or of what free forces explain, from which on a family is tried
+_PROMISING = 0.3
 
-def flexible_member(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
-    """The restitution as a function of the impact speed, and its rivals of other families; or None."""
-    wanted = bench.options.candidates
-    family = effects()[RESTITUTION].family
-    allowed = wanted is None or any(
-        name == RESTITUTION or effects()[name].family == family for name in wanted
-    )
-    if not allowed or "contact.restitution" not in found.base.model.parameters:
+
+def flexible_member(bench: Bench, found: Round, ceiling: Ceiling) -> tuple[Judged, list[Judged]] | None:
+    """The best family as a function, and its rivals of other families; or None."""
+    fitted = [one for member in _promising(bench, found, ceiling) for one in _best(bench, found, member)]
+    if not fitted:
         return None
-    known = _begun(found, family)
-    best = None
-    speeds = impact_speeds(bench.training)
-    for count in KNOTS:
-        knots = speeds_at(speeds, count)
-        fitted = None if knots is None else restitution_curve(bench.training, known, change_of(known), knots)
-        if fitted is None:
-            break
-        bench.options.progress(f"fitting {RESTITUTION} on {count} speeds", 0.8)
-        known = fitted
-        if not fitted.fit.converged:
-            # more knots than these impacts can tell apart
-            continue
-        one = found.judge(fitted, bench.foretell(fitted, found.foretold))
-        if best is not None and one.evidence < best.evidence + margin(best, one, bench.options):
-            break
-        best = one
-    if best is None:
-        return None
-    others = [one for one in found.judged if effects()[one.name].family != family]
+    able = [one for one in fitted if admissible(one, found.base, bench.options)[0]]
+    best = max(able or fitted, key=lambda one: one.evidence)
+    family = effects()[best.name].family
+    others = [one for one in [*found.judged, *fitted] if effects()[one.name].family != family]
     return best, [one for one in others if lead(best, one) < margin(best, one, bench.options)]
+
+
+def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
+    """Members of the families that explain much of the gap, in closed form or as a free force."""
+    wanted = bench.options.candidates
+    free = {one.name: max(0.0, one.gain - one.rank) for one in ceiling.families if one.name != "pieces"}
+    most = max([1e-300, *free.values()])
+    highest = max([1e-300, *(one.evidence for one in found.judged)])
+    shares = {}
+    for member in MEMBERS:
+        allowed = wanted is None or any(
+            name == member.effect or effects()[name].family == member.family for name in wanted
+        )
+        if not allowed or not fits_machine(member, found.base.model):
+            continue
+        closed = [one.evidence for one in found.judged if effects()[one.name].family == member.family]
+        share = max([free.get(member.explains, 0.0) / most, *(one / highest for one in closed)])
+        if share > _PROMISING:
+            shares[member] = share
+    return sorted(shares, key=lambda member: -shares[member])
+
+
+def _best(bench: Bench, found: Round, member: Member) -> Iterator[Judged]:
+    """The table of a family on as many knots as the evidence pays for; nothing where none converges."""
+    known = _begun(found, member.family)
+    best = None
+    seen = seen_values(member, known)
+    for alike in (True, False) if len(member.values) > 1 else (False,):
+        for count in KNOTS:
+            knots = knots_at(member, seen, count)
+            made = (
+                None if knots is None else fit_member(bench.training, found.base, member, known, knots, alike)
+            )
+            if made is None:
+                break
+            bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
+            if not made.fit.converged:
+                # more knots than these records can tell apart
+                continue
+            known = made
+            one = found.judge(made, bench.foretell(made, found.foretold))
+            if best is not None and one.evidence < best.evidence + margin(best, one, bench.options):
+                best.fitted.finer = made
+                break
+            best = one
+        if best is not None:
+            known = best.fitted
+    if best is not None:
+        yield best
 
 
 def _begun(found: Round, family: str) -> Fitted:

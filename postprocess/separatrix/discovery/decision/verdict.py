@@ -96,19 +96,30 @@ def _function(fitted: Fitted) -> dict | None:
     found = function_of(fitted)
     if found is None:
         return None
-    band = 1.96 * found.error
+    member = found.member
     fitting = [name for name, one in found.forms.items() if one["fits"]]
     shape = f"as {' or '.join(fitting)}" if fitting else "as no closed form that is known"
     return {
-        "effect": found.effect,
-        "variable": found.variable,
-        "unit": found.unit,
-        "at": found.at,
-        "value": found.value,
-        "band_95": [found.value - band, found.value + band],
+        "effect": member.effect,
+        "variable": member.variable,
+        "unit": member.unit,
+        "quantity": member.quantity,
+        "parts": [
+            {
+                "direction": one.name,
+                "at": one.at,
+                "value": one.value,
+                "band_95": [one.value - 1.96 * one.error, one.value + 1.96 * one.error],
+            }
+            for one in found.parts
+        ],
         "closed_forms": found.forms,
-        "text": f"restitution {found.value[0]:.4g} at {found.at[0]:.3g} m/s to {found.value[-1]:.4g} at "
-        f"{found.at[-1]:.3g} m/s, {shape}",
+        "text": "; ".join(
+            f"{member.quantity}{f' {one.name}' if one.name else ''} {one.value[0]:.4g} at {one.at[0]:.3g} "
+            f"{member.unit} to {one.value[-1]:.4g} at {one.at[-1]:.3g} {member.unit}"
+            for one in found.parts
+        )
+        + f", {shape}",
     }
 
 
@@ -210,13 +221,14 @@ def _parameters(fitted: Fitted) -> dict:
         parameter = fitted.model.parameters.get(one.path)
         known = error > 0 and not held
         ends = [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)]
-        found[one.path] = {
+        told = {
             "value": one.physical(value),
             "standard_error": one.slope(value) * float(error) if known else None,
             "interval_95": ends if known else None,
             "note": "" if known else "at its bound" if held else "these records say nothing about it",
             "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
         }
+        found |= {path: dict(told) for path in one.paths}
     return found
 
 

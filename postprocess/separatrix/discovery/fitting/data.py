@@ -112,7 +112,7 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
     """Smooth a record; one sampled far faster than it moves is seen at fewer samples, and condensed."""
     record = one.record
     period = min(one.period_samples or np.inf, _natural_samples(one), swing)
-    every = stride(period)
+    every = stride(period, record.t.size)
     if every == 1:
         return smooth(record.t, record.x, one.sigma, one.period_samples)
     at = np.concatenate([np.arange(first, last, every) for first, last in record.pieces])

@@ -156,7 +156,7 @@ def _fit_own(
 
 def _with(model, known: list[tuple[Free, float]]):
     """The machine with values written in; None where they make no case."""
-    chosen = {one.path: one.physical(value) for one, value in known if not one.is_nuisance}
+    chosen = {path: one.physical(value) for one, value in known if not one.is_nuisance for path in one.paths}
     for one, value in known:
         if one.path == "nuisance:drive_scale":
             chosen |= {path: value * amplitude for path, amplitude in drive_amplitudes(model).items()}

@@ -43,6 +43,13 @@ class Free:
     varies: bool = False
     # standard error of a nuisance about 0 that a measurement of its own leaves
     error: float | None = None
+    # another path of the machine that has the same value
+    also: str | None = None
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """All paths that have this value."""
+        return (self.path,) if self.also is None else (self.path, self.also)
 
     def physical(self, value: float) -> float:
         """The number itself, from what is fitted."""
@@ -77,7 +84,7 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
 def _is_fitted(path: str, measured_force: bool) -> bool:
     if path == "body.mass":
         return measured_force
-    if ".speed[" in path:
+    if ".speed[" in path or ".place[" in path:
         # knots of a table
         return False
     if path.startswith((*_AMPLITUDES, "drive.force")) or path in _FIXED or path.endswith(_FIXED_ENDS):

@@ -124,8 +124,13 @@ class Problem:
             "force": _force_argument(record, fitted.place[first]),
         }
 
-    def evaluate(self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True) -> Evaluation:
-        """Simulate all segments from `starts` (segments, 2) of x and v."""
+    def evaluate(
+        self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True, by_start_alone: bool = False
+    ) -> Evaluation:
+        """Simulate all segments from `starts` (segments, 2) of x and v.
+
+        With `by_start_alone` derivatives by the parameters of the machine are 0, which is much quicker.
+        """
         shape = self.segments.inside.shape
         count, length = shape
         measured = self._known_nuisances()
@@ -147,7 +152,7 @@ class Problem:
         for number, part in enumerate(self._parts):
             if part["rows"].size:
                 try:
-                    self._evaluate_record(number, part, values, starts, derivatives, out)
+                    self._evaluate_record(number, part, values, starts, (derivatives, by_start_alone), out)
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
@@ -191,11 +196,14 @@ class Problem:
         part: dict,
         values: np.ndarray,
         starts: np.ndarray,
-        derivatives: bool,
+        wanted: tuple[bool, bool],
         out: Evaluation,
     ) -> None:
         prepared = self.prepared[number]
+        derivatives, by_start_alone = wanted
         active, given, moves, directions = self._active(number, values, derivatives)
+        if derivatives and by_start_alone:
+            moves, directions = np.zeros_like(moves), directions[:0]
         start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
         result = self._simulate(part, active, given, start, directions)
         rows, inside = part["rows"], part["inside"]
@@ -250,9 +258,10 @@ class Problem:
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
         chosen = {
-            one.path: one.physical(value)
+            path: one.physical(value)
             for one, value in zip(self.free, values, strict=True)
             if not one.is_nuisance
+            for path in one.paths
         }
         prepared = self.prepared[number]
         scale = self._nuisance("nuisance:drive_scale", number, values, None)
@@ -299,7 +308,8 @@ class Problem:
             elif one.path == SENSOR_ZERO and one.record == number:
                 chain[active.index(SENSOR_BIAS), j] = 1.0
             elif not one.is_nuisance:
-                chain[active.index(one.path), j] = one.slope(values[j])
+                for path in one.paths:
+                    chain[active.index(path), j] = one.slope(values[j])
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):

@@ -40,6 +40,8 @@ class Fitted:
     fit: Fit
     added: tuple[int, ...]
     tries: int = 1
+    # the same function on more knots, where one was fitted
+    finer: "Fitted | None" = None
 
     @property
     def unseen(self) -> np.ndarray:

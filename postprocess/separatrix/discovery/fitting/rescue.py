@@ -86,7 +86,7 @@ def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tu
         if not active.size:
             break
         part = problem.of_segments(active)
-        current = part.evaluate(values, starts[active])
+        current = part.evaluate(values, starts[active], by_start_alone=True)
         tried = starts[active] + _steps(current, damping[active])
         ended = part.evaluate(values, tried, derivatives=False)
         reached, before = _cost(ended), cost[active]

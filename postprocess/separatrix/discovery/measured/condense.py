@@ -25,6 +25,8 @@ from separatrix.errors import SeparatrixError
 
 # samples per period of the motion from which a record is condensed, and as many as are smoothed then
 _MANY, _ENOUGH = 450.0, 200.0
+# samples of a record that are fitted as they are, however slow the motion
+_FEW = 10_000
 # values in place of a stretch, its shortest and, as a share of the period, longest length
 NODES = 4
 _SHORTEST = 16
@@ -115,9 +117,9 @@ def whole(record: Record) -> Samples:
     )
 
 
-def stride(period: float) -> int:
-    """Every how many samples are enough to see a motion of `period` samples."""
-    return 1 if period < _MANY else max(1, round(period / _ENOUGH))
+def stride(period: float, samples: int) -> int:
+    """Every how many samples are enough to see a motion of `period` samples in a record of so many."""
+    return 1 if period < _MANY or samples <= _FEW else max(1, round(period / _ENOUGH))
 
 
 @cache

@@ -12,7 +12,7 @@ from separatrix import style
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import figures, where_figures
 from separatrix.discovery.report.comparison import compare
-from separatrix.discovery.report.pages import Picture, Section, write_html, write_pdf
+from separatrix.discovery.report.pages import Beside, Picture, Section, page_of, write_pdf
 from separatrix.discovery.report.story import names, sections
 from separatrix.open import reading
 
@@ -20,7 +20,7 @@ from separatrix.open import reading
 def write_report(folder: Path, base: Path, options: Options | None = None) -> tuple[Path, Path]:
     """Write both files from what separatrix-discover left in `folder`; `base` is the case that was compared.
 
-    Quick options run no maps.
+    Quick options run no maps. Where no PDF can be written there is none, and the progress says why.
     """
     options = options or Options()
     options.progress("writing the report", 0.9)
@@ -37,8 +37,11 @@ def write_report(folder: Path, base: Path, options: Options | None = None) -> tu
         story = [motion if section.key == "motion" else section for section in story]
         title = f"Missing physics: {_title(verdict)}"
         made = folder / "report.html", folder / "report.pdf"
-        write_html(made[0], title, story)
-        write_pdf(made[1], title, story)
+        page = page_of(title, story)
+        made[0].write_text(page, encoding="utf-8")
+        lacking = write_pdf(made[1], page)
+        if lacking:
+            options.progress(lacking, 1.0)
         return made
 
 
@@ -56,14 +59,7 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
     story = sections(verdict)
     by_key = {section.key: section for section in story}
     visible = Options().visible
-    _show(
-        by_key["gap"],
-        "gap",
-        figures.gap(verdict),
-        "Reduced chi^2 of the base machine, all its uncertain numbers refitted, and of the machine of the "
-        "verdict; at the "
-        "dotted line nothing but noise is left.",
-    )
+    _first_page(by_key["verdict"], verdict)
     _show(
         by_key["where"],
         "where-lines",
@@ -122,6 +118,28 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "deviations of the noise; grey: 95 % of noise.",
     )
     return story
+
+
+def _first_page(section: Section, verdict: dict) -> None:
+    """The gap before and after, and the function that the effect is, below what the verdict says."""
+    shown = [
+        Picture(
+            "gap",
+            figures.gap(verdict),
+            "Reduced chi^2 of the base machine, all its uncertain numbers refitted, and of the machine of "
+            "the verdict; at the dotted line nothing but noise is left.",
+        )
+    ]
+    if verdict["function"]:
+        shown.append(
+            Picture(
+                "function",
+                figures.function(verdict["function"]),
+                "The effect as it was found: values at the knots, the curve of the law through them, their "
+                "95 % band, and the closed forms that fit.",
+            )
+        )
+    section.body.insert(1, Beside(shown))
 
 
 def _show(section: Section, name: str, figure: Figure | None, caption: str, otherwise: str = "") -> None:

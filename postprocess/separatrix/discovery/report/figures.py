@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from separatrix import style
+from separatrix.discovery.fitting.shapes import through
 from separatrix.discovery.options import Options
 from separatrix.discovery.wording import number, words
 
@@ -60,6 +61,30 @@ def gap(verdict: dict) -> Figure:
         Line2D([], [], linestyle=":", color="black", label="noise"),
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    return figure
+
+
+def function(found: dict) -> Figure:
+    """The function that an effect is, with its band and the closed forms that fit it."""
+    figure = style.new_figure(style.SINGLE_COLUMN, 52.0)
+    figure.set_layout_engine("constrained")
+    ax = figure.add_subplot()
+    for part, colour in zip(found["parts"], (AFTER, BEFORE), strict=False):
+        at, value = np.array(part["at"]), np.array(part["value"])
+        low, high = (np.array(one) for one in part["band_95"])
+        fine = np.linspace(at[0], at[-1], 200)
+        ax.fill_between(
+            fine, through(at, low)(fine), through(at, high)(fine), color=colour, alpha=0.25, linewidth=0
+        )
+        ax.plot(fine, through(at, value)(fine), color=colour, linewidth=1.2)
+        ax.plot(at, value, "o", color=colour, markersize=3, label=part["direction"] or None)
+    fitting = [(name, one) for name, one in found["closed_forms"].items() if one["fits"]]
+    for (name, one), colour in zip(fitting[:3], style.OKABE_ITO[2:], strict=False):
+        ax.plot(one["at"], one["curve"], "--", color=colour, linewidth=0.9, label=name)
+    if ax.get_legend_handles_labels()[1]:
+        ax.legend(loc="best", fontsize=6)
+    ax.set_xlabel(f"{found['variable']} ({found['unit']})")
+    ax.set_ylabel(found["quantity"])
     return figure
 
 

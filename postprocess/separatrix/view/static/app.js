@@ -293,7 +293,7 @@ class Viewer {
     if (variable.name === "attractor") fill(this.legend);
     else if (variable.classes) {
       const values = map.tiles.classesSeen();
-      const names = variable.name === "period" ? Object.fromEntries(values.map((v) => [v, v ? `period ${v}` : "not periodic"])) : this.names;
+      const names = variable.name === "period" ? Object.fromEntries(values.map((v) => [v, v ? `period ${v}` : "no known period"])) : this.names;
       fill(this.legend, classLegend({ values, names, offset, hidden: this.hiddenNow, toggle: (value, alone) => this.toggle(value, alone, values) }));
     } else if (overview.length) fill(this.legend, scaleLegend(map.painter, words(variable.name), variable.unit));
     map.draw();

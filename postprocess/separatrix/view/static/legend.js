@@ -10,7 +10,7 @@ import { swatch } from "./tiles.js";
 /** An attractor in words. */
 export function describeAttractor(one, regimes) {
   const regime = words(regimes[one.regime] || one.regime);
-  return one.period === 0 ? `${regime}, not periodic` : `${regime}, period ${one.period}`;
+  return one.period === 0 ? `${regime}, no known period` : `${regime}, period ${one.period}`;
 }
 
 /** The table of a slice's attractors. `entries` have label, regime, period, ..., count; `toggle(label, alone)`. */

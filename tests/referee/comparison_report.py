@@ -10,7 +10,6 @@ EXPLAINED: dict[tuple[str, str], str] = {}
 CAUSES = {
     "not known": "silence: the program does not say what it is",
     "rounding": "the referee agrees in extended precision or 1e-12 beside the start",
-    "window": "the same cycle; impacts over the window of the hold, which is no multiple of its period",
     "unfounded": "a cycle closed by rounding: the motion is unstable for too long between two chatters",
     "wrong": "**not explained**",
 }

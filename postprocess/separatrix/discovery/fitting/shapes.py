@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Closed forms of the families of effects, held against a function that was found as a table."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator, CubicHermiteSpline
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+# probability, or largest deviation over the largest value, from which on a closed form fits
+_LIKELY, _CLOSE = 0.01, 2e-3
+# share of the knots' square root of the largest variance that is added to each: tables are no exact functions
+_ROUGH = 1e-9
+
+
+@dataclass(frozen=True)
+class Form:
+    """A closed form of some parameters, and what to start them from, given the arguments."""
+
+    value: Callable
+    start: Callable
+
+
+def _line(x: np.ndarray) -> list[list[float]]:
+    return [[0.5, 0.0]]
+
+
+_CONSTANT = Form(lambda x, a: a + 0 * x, lambda x: [[0.5]])
+_LINEAR = Form(lambda x, a, b: a + b * x, _line)
+_SQUARE = Form(lambda x, a, b, c: a + b * x + c * x**2, lambda x: [[0.5, 0.0, 0.0]])
+
+FORMS: dict[str, dict[str, Form]] = {
+    "restitution_curve": {
+        "constant": _CONSTANT,
+        "linear": _LINEAR,
+        "power": Form(lambda v, a, b: a * v**-b, _line),
+        "exponential": Form(lambda v, a, b: a * np.exp(-b * v), _line),
+        "viscoelastic": Form(lambda v, a, b: 1 - a * v**0.2 + b * v**0.4, lambda x: [[0.3, 0.0]]),
+    },
+    "friction_curve": {
+        "constant": _CONSTANT,
+        "linear": _LINEAR,
+        "quadratic": _SQUARE,
+        "power": Form(
+            lambda v, a, b, c: a + b * np.abs(v) ** np.clip(c, 0.1, 8), lambda x: [[0.5, 0.1, 1.5]]
+        ),
+        "stribeck": Form(
+            lambda v, a, b, c: a + b * np.exp(-((v / c) ** 2)),
+            lambda x: [[0.5, 0.2, share * x[-1]] for share in (0.1, 0.3, 0.6)],
+        ),
+    },
+}
+"""By effect: the function over its variable."""
+
+
+def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
+    """The curve of the law through a table: slopes are those of the polynomial through up to five knots."""
+    slopes = []
+    for i in range(at.size):
+        first = max(0, min(i - 2, at.size - 5))
+        part = slice(first, min(at.size, first + 5))
+        slopes.append(float(BarycentricInterpolator(at[part], value[part]).derivative(at[i])))
+    return CubicHermiteSpline(at, value, slopes)
+
+
+def closed_forms(effect: str, at: np.ndarray, value: np.ndarray, covariance: np.ndarray) -> dict[str, dict]:
+    """Closed forms held against values: parameters, probability, largest relative deviation, fit or not."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-24))
+    root = np.linalg.cholesky(covariance / np.outer(scale, scale) + _ROUGH * np.eye(at.size))
+    found = {}
+    for name, form in FORMS[effect].items():
+        starts = form.start(at)
+        if len(starts[0]) >= at.size:
+            continue
+
+        def off(parameters: np.ndarray, form: Form = form) -> np.ndarray:
+            return np.nan_to_num(
+                np.linalg.solve(root, (value - form.value(at, *parameters)) / scale), nan=1e9
+            )
+
+        fits = [least_squares(off, start, x_scale="jac", max_nfev=400) for start in starts]
+        fit = min(fits, key=lambda one: one.cost)
+        p = float(chi2.sf(2 * fit.cost, at.size - len(starts[0])))
+        deviation = float(np.max(np.abs(form.value(at, *fit.x) - value)) / np.max(np.abs(value)))
+        fine = np.linspace(at[0], at[-1], 60)
+        found[name] = {
+            "parameters": [float(one) for one in fit.x],
+            "p": p,
+            "deviation": deviation,
+            "fits": p > _LIKELY or deviation < _CLOSE,
+            "at": fine,
+            "curve": form.value(fine, *fit.x),
+        }
+    return found

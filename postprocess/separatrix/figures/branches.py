@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Branches of periodic orbits over a parameter: stable full, unstable broken, with their bifurcations."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from separatrix import style
+from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.labels import axis_label, plain, unit
+from separatrix.layout import compose
+from separatrix.open import decode_flags
+
+# Label in the file, marker, and text of the legend.
+_MARKS = {
+    "SN": ("o", "fold (SN)"),
+    "PD": ("s", "period doubling (PD)"),
+    "NS": ("*", "Neimark-Sacker (NS)"),
+    "BP": ("P", "branch point (BP)"),
+    "GR": ("^", "graze (GR)"),
+    "GR-fold": ("v", "graze with a fold (GR-fold)"),
+    "stick_onset": ("D", "stick onset"),
+    "chatter_onset": ("X", "chatter onset"),
+    "stiction_end": ("h", "stiction end"),
+    "release": ("<", "release"),
+    "not_known": ("x", "end not known"),
+    "too_long": ("|", "events too many to go on"),
+}
+
+
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+    """Return the figure of a file of branches by name."""
+    look.require("file of branches")
+    return {"branches": diagram(result, title, look)}
+
+
+def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the amplitude of every orbit over the parameter."""
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
+    ax = figure.add_subplot()
+    handles = draw(ax, result)
+    across = result["parameter"].copy()
+    across.name = str(result.attrs["parameter"]).replace(".", "_")
+    ax.set_xlabel(axis_label(across))
+    ax.set_ylabel(rf"amplitude $(x_\mathrm{{max}} - x_\mathrm{{min}})/2$ ({unit(result['x_max'])})")
+    count = int(result["branch"].max())
+    caption = [
+        *caption_pieces(result, look, describe_case(result)),
+        f"{count} branches from {int(result.attrs['seeds'])} seeds; there may be others",
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), handles, columns=4)
+    return figure
+
+
+def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
+    """Draw the branches and their labelled points; return what the legend needs."""
+    across = result["parameter"].values
+    up = (result["x_max"].values - result["x_min"].values) / 2
+    stable, branch = result["stable"].values == 1, result["branch"].values
+    labels = decode_flags(result["label"]).values
+    for chosen, look in ((stable, "-"), (~stable, "--")):
+        # A piece between two points is stable where both are.
+        joined = (branch[1:] == branch[:-1]) & (
+            stable[1:] & stable[:-1] if look == "-" else ~(stable[1:] & stable[:-1])
+        )
+        x = np.where(joined, across[:-1], np.nan), np.where(joined, across[1:], np.nan)
+        y = np.where(joined, up[:-1], np.nan), np.where(joined, up[1:], np.nan)
+        gap = np.full(joined.size, np.nan)
+        if chosen.any():
+            ax.plot(
+                np.column_stack([*x, gap]).ravel(),
+                np.column_stack([*y, gap]).ravel(),
+                look,
+                color="black" if look == "-" else "0.45",
+                linewidth=1.2 if look == "-" else 0.9,
+            )
+    handles = [
+        Line2D([], [], color="black", linestyle="-", label="stable"),
+        Line2D([], [], color="0.45", linestyle="--", label="unstable"),
+    ]
+    for number, (name, (marker, text)) in enumerate(_MARKS.items()):
+        chosen = labels == name
+        if not chosen.any():
+            continue
+        colour = f"C{number % 10}"
+        ax.plot(across[chosen], up[chosen], marker, color=colour, markersize=4, linestyle="none")
+        handles.append(
+            Line2D([], [], marker=marker, color=colour, linestyle="none", markersize=4, label=text)
+        )
+    return handles

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A structure as matrices or as modes, with the names of its coordinates and of its points."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import sparse
+
+from separatrix.errors import SeparatrixError
+
+# Directions of a node as tools number them.
+_DIRECTIONS = {"x": "1", "y": "2", "z": "3", "rx": "4", "ry": "5", "rz": "6"}
+_NAME = re.compile(r"[A-Za-z0-9_-]*[A-Za-z_-][A-Za-z0-9_-]*")
+
+Row = np.ndarray
+
+
+@dataclass
+class Matrices:
+    """M q'' + C q' + K q; `labels` name the coordinates as the tool does, "NODE:DIRECTION" or numbers."""
+
+    mass: sparse.csr_array
+    stiffness: sparse.csr_array
+    damping: sparse.csr_array | None = None
+    labels: list[str] = field(default_factory=list)
+    points: dict[str, Row] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Sparse, square, of one size, symmetric."""
+        self.mass, self.stiffness = sparse.csr_array(self.mass), sparse.csr_array(self.stiffness)
+        if self.damping is not None:
+            self.damping = sparse.csr_array(self.damping)
+        size = self.mass.shape[0]
+        for name in ("mass", "stiffness", "damping"):
+            matrix = getattr(self, name)
+            if matrix is None:
+                continue
+            if matrix.shape != (size, size):
+                raise SeparatrixError(
+                    f"{name}: found a matrix of {matrix.shape[0]} x {matrix.shape[1]}, "
+                    f"allowed {size} x {size} like the mass matrix"
+                )
+            if not np.isfinite(matrix.data).all():
+                raise SeparatrixError(f"{name}: found a number that is not finite")
+            largest = abs(matrix).max() if matrix.nnz else 0.0
+            if name != "damping" and abs(matrix - matrix.T).max() > 1e-10 * largest:
+                raise SeparatrixError(f"{name}: found a matrix that is not symmetric")
+        if not self.labels:
+            self.labels = [str(number + 1) for number in range(size)]
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return self.mass.shape[0]
+
+    def row_of(self, place: str) -> Row:
+        """Return the row of a place: a coordinate, or a weighted sum "0.5*12:y+0.5*13:y"."""
+        return _row(place, {label: number for number, label in enumerate(self.labels)}, np.eye, self.size)
+
+
+@dataclass
+class Modes:
+    """Mass-normalised modes: frequencies [Hz], damping ratios, displacements of places in each mode."""
+
+    frequency: np.ndarray
+    damping_ratio: np.ndarray | None = None
+    damping: np.ndarray | None = None
+    shapes: dict[str, Row] = field(default_factory=dict)
+    points: dict[str, Row] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Number of modes."""
+        return len(self.frequency)
+
+    def row_of(self, place: str) -> Row:
+        """Return the displacement of a place in each mode."""
+        names = list(self.shapes)
+        rows = np.array([self.shapes[name] for name in names]).reshape(len(names), self.size)
+        return _row(place, {name: number for number, name in enumerate(names)}, lambda _: rows, self.size)
+
+
+def add_points(structure: Matrices | Modes, places: Mapping[str, str]) -> None:
+    """Name places: `{"tip": "12:y"}`."""
+    for name, place in places.items():
+        if not _NAME.fullmatch(name):
+            raise SeparatrixError(
+                f"--point {name}={place}: found the name '{name}', allowed letters, digits, _ and -,"
+                " with a letter"
+            )
+        structure.points[name] = structure.row_of(place)
+
+
+def _row(place: str, known: Mapping[str, int], rows_of, size: int) -> Row:
+    """Sum the terms of a place."""
+    total, rows = np.zeros(size), None
+    for term in re.findall(r"[+-]?[^+-]+(?:[eE][+-]\d+[^+-]*)?", place.replace(" ", "")):
+        factor, star, label = term.rpartition("*")
+        sign = -1.0 if not star and label.startswith("-") else 1.0
+        label = _in_numbers(label.lstrip("+-"))
+        try:
+            weight = float(factor) if star else sign
+        except ValueError:
+            raise SeparatrixError(f"'{place}': '{factor}' is not a number") from None
+        if label not in known:
+            near = ", ".join(list(known)[:6]) + (", ..." if len(known) > 6 else "")
+            raise SeparatrixError(f"'{place}': there is no coordinate '{label}', allowed {near}")
+        rows = rows_of(size) if rows is None else rows
+        total += weight * rows[known[label]]
+    if not np.any(total):
+        raise SeparatrixError(f"'{place}': a place that no coordinate moves")
+    return total
+
+
+def _in_numbers(label: str) -> str:
+    """Return "12:2" for "12:y"."""
+    node, colon, direction = label.partition(":")
+    return node + colon + _DIRECTIONS.get(direction.lower(), direction)

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fewer coordinates: coordinates without mass condensed, modes, Craig and Bampton's substructures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from separatrix.errors import SeparatrixError
+from separatrix.structures.content import Matrices, Modes
+
+# Above it only the wanted modes are computed, by shift and invert.
+_DENSE = 1500
+# A squared frequency below this share of the largest, and a mass below it, are none.
+_NONE = 1e-12
+
+
+@dataclass
+class Check:
+    """Static flexibility of a point [m/N] after and before a reduction; NaN where the structure floats."""
+
+    name: str
+    kept: float
+    full: float
+
+
+def hold(structure: Matrices, places: list[str]) -> Matrices:
+    """Hold coordinates at zero."""
+    held = set()
+    for place in places:
+        held |= set(np.flatnonzero(structure.row_of(place)))
+    free = np.array([number for number in range(structure.size) if number not in held], dtype=int)
+    if not len(free):
+        raise SeparatrixError("--hold: nothing is left that moves")
+    return _chosen(structure, free)
+
+
+def _chosen(structure: Matrices, free: np.ndarray) -> Matrices:
+    damping = None if structure.damping is None else structure.damping[free][:, free]
+    return Matrices(
+        structure.mass[free][:, free],
+        structure.stiffness[free][:, free],
+        damping,
+        [structure.labels[number] for number in free],
+        {name: row[free] for name, row in structure.points.items()},
+    )
+
+
+def condense(structure: Matrices) -> Matrices:
+    """Take out coordinates without mass: they follow the others at rest (exact but for their dampers)."""
+    largest = abs(structure.mass).max()
+    light = np.array(abs(structure.mass).sum(axis=1)).ravel() <= _NONE * largest
+    if not light.any():
+        return structure
+    if light.all():
+        raise SeparatrixError("mass: found no coordinate with mass")
+    masters, slaves = np.flatnonzero(~light), np.flatnonzero(light)
+    try:
+        block = structure.stiffness[slaves][:, slaves].toarray()
+        follow = -linalg.solve(block, structure.stiffness[slaves][:, masters].toarray(), assume_a="sym")
+    except linalg.LinAlgError:
+        names = ", ".join(structure.labels[number] for number in slaves[:6])
+        raise SeparatrixError(
+            f"mass: found coordinates with neither mass nor stiffness of their own: {names}"
+        ) from None
+    change = np.zeros((structure.size, len(masters)))
+    change[masters, np.arange(len(masters))] = 1
+    change[slaves] = follow
+    return _changed(structure, change, [structure.labels[number] for number in masters])
+
+
+def _changed(structure: Matrices, change: np.ndarray, labels: list[str]) -> Matrices:
+    """Return the structure in other coordinates, q = change y."""
+
+    def turned(matrix: sparse.csr_array) -> np.ndarray:
+        result = change.T @ (matrix @ change)
+        return (result + result.T) / 2
+
+    return Matrices(
+        sparse.csr_array(turned(structure.mass)),
+        sparse.csr_array(turned(structure.stiffness)),
+        None if structure.damping is None else sparse.csr_array(change.T @ (structure.damping @ change)),
+        labels,
+        {name: row @ change for name, row in structure.points.items()},
+    )
+
+
+def undamped_modes(structure: Matrices, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the squared angular frequencies, ascending, and mass-normalised shapes (columns)."""
+    size = structure.size
+    count = size if count is None else min(count, size)
+    try:
+        if size <= _DENSE or count > size // 2:
+            squares, shapes = linalg.eigh(
+                structure.stiffness.toarray(), structure.mass.toarray(), subset_by_index=(0, count - 1)
+            )
+        else:
+            # a small negative shift: a structure that floats has a singular stiffness
+            shift = -1e-6 * abs(structure.stiffness.diagonal()).max() / abs(structure.mass.diagonal()).max()
+            squares, shapes = sparse_linalg.eigsh(
+                sparse.csc_array(structure.stiffness), count, sparse.csc_array(structure.mass), sigma=shift
+            )
+            order = np.argsort(squares)
+            squares, shapes = squares[order], shapes[:, order]
+    except (linalg.LinAlgError, RuntimeError) as error:
+        raise SeparatrixError(f"mass: found a singular or indefinite matrix: {error}") from None
+    squares = np.where(np.abs(squares) <= 1e-9 * np.abs(squares).max(), 0.0, squares)
+    if squares[0] < 0:
+        raise SeparatrixError("stiffness: found an indefinite matrix, allowed a positive semidefinite one")
+    # the sign of a shape is free: largest entry positive, so that two runs give one file
+    signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
+    return squares, shapes * np.where(signs == 0, 1, signs)
+
+
+def modal(structure: Matrices, count: int) -> Modes:
+    """Keep the `count` lowest modes."""
+    structure = condense(structure)
+    squares, shapes = undamped_modes(structure, count)
+    damping = None if structure.damping is None else shapes.T @ (structure.damping @ shapes)
+    return Modes(
+        np.sqrt(squares) / (2 * np.pi),
+        None,
+        damping,
+        {},
+        {name: row @ shapes for name, row in structure.points.items()},
+    )
+
+
+def craig_bampton(structure: Matrices, count: int) -> Matrices:
+    """Keep the coordinates of the points and the `count` lowest modes of the rest with those held.
+
+    Craig, Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968). Its static flexibility
+    at the points is exact, which modes alone lack.
+    """
+    structure = condense(structure)
+    boundary = sorted({int(number) for row in structure.points.values() for number in np.flatnonzero(row)})
+    if not boundary:
+        raise SeparatrixError("--reduce craig-bampton: give the points of joints: --point NAME=PLACE")
+    inner = np.array([number for number in range(structure.size) if number not in set(boundary)], dtype=int)
+    change = np.zeros((structure.size, len(boundary) + min(count, len(inner))))
+    change[boundary, np.arange(len(boundary))] = 1
+    if len(inner):
+        try:
+            factor = sparse_linalg.splu(sparse.csc_array(structure.stiffness[inner][:, inner]))
+            follow = -factor.solve(structure.stiffness[inner][:, boundary].toarray())
+        except RuntimeError:
+            raise SeparatrixError(
+                "--reduce craig-bampton: the structure moves freely with its points held; give more points"
+            ) from None
+        change[inner, : len(boundary)] = follow
+        rest = _chosen(Matrices(structure.mass, structure.stiffness, None, structure.labels), inner)
+        change[inner, len(boundary) :] = undamped_modes(rest, count)[1][:, : min(count, len(inner))]
+    labels = [structure.labels[number] for number in boundary]
+    labels += [f"mode{number + 1}" for number in range(change.shape[1] - len(boundary))]
+    return _changed(structure, change, labels)
+
+
+def flexibility(structure: Matrices | Modes) -> dict[str, float]:
+    """Static displacement of each point for one newton there [m/N]; NaN of a structure that floats."""
+    if isinstance(structure, Modes):
+        squares = (2 * np.pi * structure.frequency) ** 2
+        if np.any(squares <= 0):
+            return dict.fromkeys(structure.points, np.nan)
+        return {name: float(np.sum(row**2 / squares)) for name, row in structure.points.items()}
+    try:
+        factor = sparse_linalg.splu(sparse.csc_array(structure.stiffness))
+        return {name: float(row @ factor.solve(row)) for name, row in structure.points.items()}
+    except RuntimeError:
+        return dict.fromkeys(structure.points, np.nan)
+
+
+def checks(full: Matrices, reduced: Matrices | Modes) -> list[Check]:
+    """Compare the static flexibility of the points."""
+    before, after = flexibility(full), flexibility(reduced)
+    return [Check(name, after[name], before[name]) for name in reduced.points]

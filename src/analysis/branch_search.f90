@@ -1,0 +1,253 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The branches of periodic orbits over a range of a parameter: orbits are searched at several values, each that lies on no branch
+!> yet is followed, and so is what bifurcates where a period doubles. What is found depends on the seeds; nothing says that it is
+!> all.
+module branch_search
+  use body_family, only: body_neighbourhood, family_t
+  use branch, only: branch_t, label_pd, plan_t, point_t, set_sizes, trace_branch
+  use errors, only: error_t
+  use kinds, only: wp
+  use one_body, only: one_body_t
+  use orbit_search, only: find_orbits, found_t
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_sequence, &
+    section_points, states
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: prepare_search, search_value, follow_seeds
+
+  !> How far along the critical direction the doubled orbit is looked for, in natural sizes; largest number of drive periods of an
+  !> orbit that is followed after a doubling.
+  real(wp), parameter :: doubled_at = 3e-3_wp
+
+  type, public :: search_t
+    type(family_t) :: family
+    type(plan_t) :: plan
+    !> Values at which orbits are searched, and those found at each that are on a branch or a seed.
+    real(wp), allocatable :: values(:)
+    type(found_t), allocatable :: found(:)
+    !> Starts of the searches (columns x, v), longest period looked for, and the longest that is followed.
+    real(wp), allocatable :: starts(:, :)
+    integer :: longest = 4, longest_followed = 4
+    !> Branches that are followed at most.
+    integer :: most_branches = 60
+    integer :: seeds = 0
+    type(branch_t), allocatable :: branches(:)
+  end type search_t
+
+contains
+
+  !> Sets the values and sizes of a search. Code 65 if a machine of the range cannot be built or has no variations.
+  subroutine prepare_search(search, values, error)
+    type(search_t), intent(inout) :: search
+    integer, intent(in) :: values
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    call set_sizes(search%plan, search%family, error)
+    if (allocated(error)) return
+    associate (low => search%plan%lowest, high => search%plan%highest)
+      search%values = [(low + (high - low)*(i - 0.5_wp)/values, i=1, values)]
+    end associate
+    allocate (search%found(values), search%branches(0))
+  end subroutine prepare_search
+
+  !> Searches orbits at the value number `i`.
+  subroutine search_value(search, i)
+    type(search_t), intent(inout) :: search
+    integer, intent(in) :: i
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    allocate (search%found(i)%orbits(0))
+    call body_neighbourhood(search%family, search%values(i), machines, error)
+    if (allocated(error)) return
+    call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i))
+  end subroutine search_value
+
+  !> Follows every seed that is on no branch yet, value by value, and the doubled orbits of what is found.
+  subroutine follow_seeds(search)
+    type(search_t), intent(inout) :: search
+    type(found_t), allocatable :: seeds(:)
+    integer :: i, k
+    seeds = search%found
+    do i = 1, size(seeds)
+      search%seeds = search%seeds + size(seeds(i)%orbits)
+      deallocate (search%found(i)%orbits)
+      allocate (search%found(i)%orbits(0))
+    end do
+    do i = 1, size(seeds)
+      do k = 1, size(seeds(i)%orbits)
+        if (size(search%branches) >= search%most_branches) return
+        if (.not. is_known(search, i, seeds(i)%orbits(k))) call follow(search, seeds(i)%orbits(k))
+      end do
+    end do
+  end subroutine follow_seeds
+
+  !> Whether an orbit at the value number `i` is on a branch.
+  logical function is_known(search, i, orbit) result(known)
+    type(search_t), intent(inout) :: search
+    integer, intent(in) :: i
+    type(orbit_t), intent(in) :: orbit
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    real(wp) :: points(states, orbit%periods)
+    integer :: j, k
+    known = .false.
+    call body_neighbourhood(search%family, search%values(i), machines, error)
+    if (allocated(error)) return
+    points = section_points(machines, orbit)
+    select type (body => machines%centre)
+    type is (one_body_t)
+      do j = 1, size(search%found(i)%orbits)
+        if (search%found(i)%orbits(j)%periods /= orbit%periods) cycle
+        do k = 1, orbit%periods
+          known = known .or. norm2((points(:, k) - search%found(i)%orbits(j)%y)/body%size_of) < 1e-6_wp
+        end do
+      end do
+    end select
+  end function is_known
+
+  !> Follows one orbit, notes where its branch passes the values of the search, and follows what doubles.
+  !> `parent` is the orbit at whose doubling it begins.
+  recursive subroutine follow(search, seed, parent)
+    type(search_t), intent(inout) :: search
+    type(orbit_t), intent(in) :: seed
+    type(orbit_t), intent(in), optional :: parent
+    type(branch_t) :: found
+    type(orbit_t) :: doubled
+    integer :: i
+    logical :: ok
+    call trace_branch(search%family, search%plan, seed, found)
+    if (present(parent)) call end_at(parent, search%family%parameter_size, found)
+    search%branches = [search%branches, found]
+    call note_passages(search, found)
+    do i = 1, size(found%points)
+      if (found%points(i)%label /= label_pd) cycle
+      if (2*seed%periods > search%longest_followed .or. size(search%branches) >= search%most_branches) cycle
+      ! The end of a branch in the doubling that it came from has a multiplier +1.
+      if (minval(abs(found%points(i)%orbit%multipliers + 1)) > 1e-3_wp) cycle
+      call double(search, found%points(i)%orbit, doubled, ok)
+      if (ok) ok = .not. on_branch(search, doubled)
+      if (ok) call follow(search, doubled, found%points(i)%orbit)
+    end do
+  end subroutine follow
+
+  !> Puts the ends of a branch that are in the doubling of `parent` where that is: the equations are singular there.
+  pure subroutine end_at(parent, parameter_size, found)
+    type(orbit_t), intent(in) :: parent
+    real(wp), intent(in) :: parameter_size
+    type(branch_t), intent(inout) :: found
+    integer :: i, k
+    do k = 1, 2
+      if (found%ending(k) /= label_pd) cycle
+      i = merge(1, size(found%points), k == 1)
+      if (abs(found%points(i)%orbit%parameter - parent%parameter) > 1e-2_wp*parameter_size) cycle
+      found%points(i)%orbit%parameter = parent%parameter
+      found%points(i)%orbit%y = parent%y
+    end do
+  end subroutine end_at
+
+  !> The orbits at which a branch passes the values of the search.
+  subroutine note_passages(search, found)
+    type(search_t), intent(inout) :: search
+    type(branch_t), intent(in) :: found
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    type(orbit_t) :: orbit
+    integer :: i, k
+    logical :: ok
+    do k = 1, size(search%values)
+      do i = 1, size(found%points) - 1
+        associate (one => found%points(i)%orbit, next => found%points(i + 1)%orbit, value => search%values(k))
+          if (.not. (one%parameter - value)*(next%parameter - value) <= 0) cycle
+          if (.not. same_sequence(one, next)) cycle
+          orbit = one
+          if (abs(next%parameter - value) < abs(one%parameter - value)) orbit = next
+          orbit%parameter = value
+          call body_neighbourhood(search%family, value, machines, error)
+          if (allocated(error)) cycle
+          call correct_orbit(search%family, machines, orbit, direct(orbit, 1), ok)
+          if (ok) search%found(k)%orbits = [search%found(k)%orbits, orbit]
+        end associate
+      end do
+    end do
+  end subroutine note_passages
+
+  !> Whether a branch passes through an orbit: compared at the points of the branches of its period that are next in the
+  !> parameter.
+  logical function on_branch(search, orbit) result(known)
+    type(search_t), intent(in) :: search
+    type(orbit_t), intent(in) :: orbit
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    type(orbit_t) :: there
+    real(wp) :: points(states, orbit%periods)
+    integer :: b, i, k
+    logical :: ok
+    known = .false.
+    call body_neighbourhood(search%family, orbit%parameter, machines, error)
+    if (allocated(error)) return
+    points = section_points(machines, orbit)
+    do b = 1, size(search%branches)
+      associate (line => search%branches(b)%points)
+        if (line(1)%orbit%periods /= orbit%periods) cycle
+        do i = 1, size(line) - 1
+          if (.not. (line(i)%orbit%parameter - orbit%parameter)*(line(i + 1)%orbit%parameter - orbit%parameter) <= 0) cycle
+          if (.not. same_sequence(line(i)%orbit, line(i + 1)%orbit)) cycle
+          there = line(i)%orbit
+          there%parameter = orbit%parameter
+          call correct_orbit(search%family, machines, there, direct(there, 1), ok)
+          if (.not. ok) cycle
+          select type (body => machines%centre)
+          type is (one_body_t)
+            do k = 1, orbit%periods
+              known = known .or. norm2((points(:, k) - there%y)/body%size_of) < 1e-6_wp
+            end do
+          end select
+          if (known) return
+        end do
+      end associate
+    end do
+  end function on_branch
+
+  !> The orbit of twice the period beside a doubling, corrected across the direction of the multiplier -1.
+  subroutine double(search, orbit, doubled, ok)
+    type(search_t), intent(in) :: search
+    type(orbit_t), intent(in) :: orbit
+    type(orbit_t), intent(out) :: doubled
+    logical, intent(out) :: ok
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    real(wp) :: along(states), sizes(states)
+    real(wp), allocatable :: direction(:)
+    integer :: side
+    ok = .false.
+    call body_neighbourhood(search%family, orbit%parameter, machines, error)
+    if (allocated(error)) return
+    select type (body => machines%centre)
+    type is (one_body_t)
+      sizes = body%size_of
+    end select
+    ! (M + 1) e = 0: e is across the larger row of M + 1.
+    associate (m => orbit%matrix)
+      along = [-m(1, 2), m(1, 1) + 1]
+      if (abs(m(2, 2) + 1) + abs(m(2, 1)) > abs(m(1, 1) + 1) + abs(m(1, 2))) along = [m(2, 2) + 1, -m(2, 1)]
+    end associate
+    along = along/sizes
+    along = along/norm2(along)
+    do side = 1, -1, -2
+      call orbit_of_motion(machines, orbit%parameter, orbit%y + side*doubled_at*along*sizes, 2*orbit%periods, doubled, ok)
+      if (.not. ok) cycle
+      allocate (direction(states + size(doubled%events) + 1), source=0.0_wp)
+      direction(:states) = along
+      call correct_orbit(search%family, machines, doubled, direction, ok)
+      deallocate (direction)
+      if (ok) ok = is_admissible(machines, doubled)
+      if (ok) ok = abs(doubled%parameter - orbit%parameter) < 0.1_wp*search%family%parameter_size
+      if (ok) return
+    end do
+  end subroutine double
+
+end module branch_search

@@ -1,0 +1,229 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Lyapunov exponents of a motion of one body, with standard errors and their exact sum as a check, and the 0-1 test.
+module exponents
+  use body_family, only: vary_period
+  use constants, only: pi
+  use elementary, only: logarithm
+  use hybrid_machine, only: event_t
+  use kinds, only: int64, wp
+  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
+    event_turning_point, log_t, open_log, state_t
+  use one_body, only: one_body_t
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: lyapunov_exponents, zero_one_test, type_of_motion
+
+  integer, parameter :: batches = 32
+  !> Frequencies of the 0-1 test.
+  integer, parameter :: frequencies = 100
+
+  !> What a motion may be.
+  integer, parameter, public :: motion_not_known = 0, motion_contracting = 1, motion_neutral = 2, motion_chaotic = 3, &
+    motion_transient = 4
+  character(len=*), parameter, public :: motion_names(0:4) = [character(len=14) :: 'not_known', 'periodic', 'quasi_periodic', &
+    'chaotic', 'transient']
+
+  type, public :: spectrum_t
+    !> Exponents [1/s], the larger first, -huge for a direction that is lost (sticking, completed chatter); standard errors by
+    !> batch means.
+    real(wp) :: exponents(2) = 0, errors(2) = 0
+    !> Sum of the exponents, and what it must be from damping, impacts and turning points alone; `has_sum` tells whether the
+    !> machine has such a formula.
+    real(wp) :: sum_found = 0, sum_exact = 0
+    logical :: has_sum = .false.
+    !> Largest exponent of the first and of the second half.
+    real(wp) :: halves(2) = 0
+    integer(int64) :: impacts = 0
+    !> Drive periods that were used; `known` is false if the motion was given up or met an event tangentially.
+    integer :: periods = 0
+    logical :: known = .false.
+  end type spectrum_t
+
+contains
+
+  !> Exponents of the motion that starts at `state`, after `transient` drive periods, over `periods` (at least 32). `section` has
+  !> the positions on the section.
+  subroutine lyapunov_exponents(machines, state, transient, periods, spectrum, section)
+    type(neighbourhood_t), intent(in) :: machines
+    type(state_t), intent(inout) :: state
+    integer, intent(in) :: transient, periods
+    type(spectrum_t), intent(out) :: spectrum
+    real(wp), intent(out) :: section(:)
+    type(log_t) :: log
+    type(event_t), allocatable :: events(:)
+    real(wp) :: by_start(2, 2), direction(2), growth, batch(batches), lost(batches), determinant, duration
+    integer :: i, part
+    logical :: singular, dead
+    section = 0
+    direction = [0.6_wp, 0.8_wp]
+    batch = 0
+    lost = 0
+    singular = .false.
+    dead = .false.
+    select type (body => machines%centre)
+    type is (one_body_t)
+      call open_log(log, 0.0_wp)
+      log%book%kept = .false.
+      spectrum%has_sum = has_exact_sum(body)
+      do i = 1 - transient, periods
+        call vary_period(machines, body, state, log, events, by_start, spectrum%known)
+        if (.not. spectrum%known) return
+        ! In units in which both coordinates are alike.
+        by_start(1, 2) = by_start(1, 2)*body%size_of(2)/body%size_of(1)
+        by_start(2, 1) = by_start(2, 1)*body%size_of(1)/body%size_of(2)
+        direction = matmul(by_start, direction)
+        growth = norm2(direction)
+        if (growth > 0) then
+          direction = direction/growth
+        else
+          direction = [0.6_wp, 0.8_wp]
+        end if
+        if (i < 1) cycle
+        dead = dead .or. .not. growth > 0
+        determinant = abs(by_start(1, 1)*by_start(2, 2) - by_start(1, 2)*by_start(2, 1))
+        singular = singular .or. .not. determinant > 0 .or. any(loses_direction(events%kind))
+        part = 1 + int((int(i - 1, int64)*batches)/periods)
+        if (growth > 0) batch(part) = batch(part) + logarithm(growth)
+        if (determinant > 0) lost(part) = lost(part) + logarithm(determinant)
+        call note_events(body, events, spectrum)
+        if (i <= size(section)) section(i) = state%x
+      end do
+      duration = periods*body%period
+      spectrum%sum_exact = spectrum%sum_exact/duration - body%moving%machine%friction%damping/body%moving%machine%mass
+      call conclude(batch*batches/duration, lost*batches/duration, singular, dead, spectrum)
+    end select
+    spectrum%periods = periods
+  end subroutine lyapunov_exponents
+
+  !> Whether an event leaves less of the start than came to it: sticking one direction, completed chatter none.
+  pure elemental logical function loses_direction(kind)
+    integer, intent(in) :: kind
+    loses_direction = kind == event_stick .or. kind == event_chatter_upper .or. kind == event_chatter_lower
+  end function loses_direction
+
+  !> Means and standard errors of the batches.
+  pure subroutine conclude(largest, both, singular, dead, spectrum)
+    real(wp), intent(in) :: largest(batches), both(batches)
+    logical, intent(in) :: singular, dead
+    type(spectrum_t), intent(inout) :: spectrum
+    spectrum%exponents(1) = sum(largest)/batches
+    spectrum%errors(1) = error_of(largest)
+    spectrum%sum_found = sum(both)/batches
+    spectrum%exponents(2) = spectrum%sum_found - spectrum%exponents(1)
+    spectrum%errors(2) = error_of(both - largest)
+    spectrum%halves = 2*[sum(largest(:batches/2)), sum(largest(batches/2 + 1:))]/batches
+    spectrum%has_sum = spectrum%has_sum .and. .not. singular
+    if (singular) spectrum%exponents(2) = -huge(1.0_wp)
+    if (dead) spectrum%exponents = -huge(1.0_wp)
+  end subroutine conclude
+
+  pure real(wp) function error_of(values)
+    real(wp), intent(in) :: values(batches)
+    error_of = norm2(values - sum(values)/batches)/sqrt(real(batches, wp)*(batches - 1))
+  end function error_of
+
+  !> Whether areas change by a formula: viscous damping, a constant restitution, friction that does not depend on the speed.
+  pure logical function has_exact_sum(body)
+    type(one_body_t), intent(in) :: body
+    associate (machine => body%moving%machine)
+      has_exact_sum = body%moving%exact .and. .not. body%moving%layer > 0 .and. .not. machine%contact%soft .and. &
+                      machine%contact%kind == 0 .and. .not. machine%effects%present
+    end associate
+  end function has_exact_sum
+
+  !> Adds the logarithms by which the events of a period change areas.
+  pure subroutine note_events(body, events, spectrum)
+    type(one_body_t), intent(in) :: body
+    type(event_t), intent(in) :: events(:)
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp) :: before(2), after(2), e
+    integer :: k
+    e = body%moving%machine%contact%restitution
+    do k = 1, size(events)
+      associate (event => events(k))
+        select case (event%kind)
+        case (event_impact_upper, event_impact_lower)
+          spectrum%impacts = spectrum%impacts + 1
+          if (e > 0) spectrum%sum_exact = spectrum%sum_exact + 2*logarithm(e)
+        case (event_turning_point)
+          before = body%slope(event%before, event%time, event%arrival(:2))
+          after = body%slope(event%after, event%time, event%departure(:2))
+          spectrum%sum_exact = spectrum%sum_exact + logarithm(abs(after(2)/before(2)))
+        end select
+      end associate
+    end do
+  end subroutine note_events
+
+  !> The 0-1 test of Gottwald and Melbourne (SIAM J. Appl. Dyn. Syst. 8, 2009), with their correction for the oscillating term:
+  !> median over frequencies of the correlation of the mean square displacement with the time. Near 0 for regular motions,
+  !> near 1 for chaotic ones.
+  pure real(wp) function zero_one_test(series) result(k)
+    real(wp), intent(in) :: series(:)
+    real(wp) :: p(0:size(series)), q(0:size(series)), correlations(frequencies), c, mean, least
+    real(wp), allocatable :: displacement(:)
+    integer :: i, j, n, cut, at
+    real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
+    n = size(series)
+    cut = n/10
+    allocate (displacement(cut))
+    mean = sum(series)/n
+    do i = 1, frequencies
+      ! Away from 0 and pi, where resonances are.
+      c = pi/5 + 3*pi/5*modulo(i*golden, 1.0_wp)
+      p = 0
+      q = 0
+      do j = 1, n
+        p(j) = p(j - 1) + series(j)*cos(j*c)
+        q(j) = q(j - 1) + series(j)*sin(j*c)
+      end do
+      do j = 1, cut
+        displacement(j) = sum((p(1 + j:n - cut + j) - p(1:n - cut))**2 + (q(1 + j:n - cut + j) - q(1:n - cut))**2)/(n - cut) &
+                          - mean**2*(1 - cos(j*c))/(1 - cos(c))
+      end do
+      correlations(i) = correlation(displacement)
+    end do
+    do i = 1, frequencies/2
+      at = i - 1 + minloc(correlations(i:), 1)
+      least = correlations(at)
+      correlations(at) = correlations(i)
+      correlations(i) = least
+    end do
+    k = least
+  end function zero_one_test
+
+  !> Correlation of values with their index.
+  pure real(wp) function correlation(values)
+    real(wp), intent(in) :: values(:)
+    real(wp) :: x(size(values)), y(size(values))
+    integer :: i
+    x = [(real(i, wp), i=1, size(values))]
+    x = x - sum(x)/size(x)
+    y = values - sum(values)/size(values)
+    correlation = 0
+    if (norm2(y) > 0) correlation = sum(x*y)/(norm2(x)*norm2(y))
+  end function correlation
+
+  !> What a motion is, by its largest exponent and the 0-1 test `k`, at three standard errors; not known where they do not agree.
+  pure integer function type_of_motion(spectrum, k) result(motion)
+    type(spectrum_t), intent(in) :: spectrum
+    real(wp), intent(in) :: k
+    motion = motion_not_known
+    if (.not. spectrum%known) return
+    associate (largest => spectrum%exponents(1), error => spectrum%errors(1))
+      if (abs(spectrum%halves(1) - spectrum%halves(2)) > 6*sqrt(2.0_wp)*error + 1e-9_wp*abs(largest) .and. error > 0) then
+        motion = motion_transient
+      else if (largest > 3*error .and. k > 0.8_wp) then
+        motion = motion_chaotic
+      else if (largest < -3*error .and. largest < 0 .and. k < 0.2_wp) then
+        motion = motion_contracting
+      else if (abs(largest) <= 3*error .and. k < 0.2_wp) then
+        motion = motion_neutral
+      end if
+    end associate
+  end function type_of_motion
+
+end module exponents

@@ -1,0 +1,249 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> How far a periodic orbit is from having another sequence of events: margins that are positive as long as the motion really
+!> has its events and no others, and pass through zero where it grazes a barrier, begins or ends to stick, or is released no more.
+module orbit_margins
+  use hybrid_machine, only: event_t, hybrid_t
+  use kinds, only: wp
+  use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
+    event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point
+  use one_body, only: direction_in, one_body_t, rests_on_barrier, slips_in, turns_smoothly
+  use periodic_orbit, only: orbit_t, states
+  implicit none
+  private
+
+  public :: margins_of, is_impact
+
+  !> What a margin is of: the speed of an impact or of a touch; the distance to a barrier that is missed; the excess of the
+  !> force at a turning point over what would hold the body; the reserve of friction at the beginning of a stick; the rate at
+  !> which the force reaches break-away; the speed in a slip; the time between two events.
+  integer, parameter, public :: of_impact = 1, of_gap = 2, of_turning = 3, of_stick = 4, of_release = 5, of_slip = 6, &
+    of_order = 7
+  !> Looks along a flight, per period of the section.
+  integer, parameter :: looks = 96
+  integer, parameter :: most_halvings = 60
+
+  type, public :: margin_t
+    real(wp) :: value = huge(1.0_wp)
+    integer :: kind = 0
+    !> Which event, or after which one; the side of a gap, or the direction of a slip.
+    integer :: event = 0, side = 0
+    !> Instant [s].
+    real(wp) :: time = 0
+  end type margin_t
+
+  !> The margins of an orbit: one per event and kind, then the smallest gaps above and below and the slowest slip. Extremes of x.
+  type, public :: margins_t
+    type(margin_t), allocatable :: list(:)
+    real(wp) :: x_max = -huge(1.0_wp), x_min = huge(1.0_wp)
+  end type margins_t
+
+contains
+
+  pure elemental logical function is_impact(kind)
+    integer, intent(in) :: kind
+    is_impact = kind == event_impact_upper .or. kind == event_impact_lower
+  end function is_impact
+
+  !> The margins of an orbit whose events have their states; all in natural units.
+  pure function margins_of(machine, orbit) result(margins)
+    class(hybrid_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    type(margins_t) :: margins
+    type(margin_t) :: gaps(-1:1), slowest
+    real(wp) :: y(states), t, until
+    integer :: k, m, mode
+    m = size(orbit%events)
+    allocate (margins%list(0))
+    gaps = margin_t(kind=of_gap)
+    gaps%side = [-1, 0, 1]
+    slowest = margin_t(kind=of_slip)
+    select type (machine)
+    type is (one_body_t)
+      y = orbit%y
+      t = 0
+      mode = orbit%mode
+      do k = 0, m
+        if (k > 0) then
+          associate (event => orbit%events(k))
+            call add_event(machine, orbit, k, margins%list)
+            if (event%kind == event_turning_point) call note_gap(machine, event%arrival(1), k, -event%side, event%time, .true., &
+                                                                 gaps)
+            y = event%departure(:states)
+            t = event%time
+            mode = event%after
+          end associate
+        end if
+        margins%x_max = max(margins%x_max, y(1))
+        margins%x_min = min(margins%x_min, y(1))
+        until = orbit%periods*machine%period
+        if (k < m) until = orbit%events(k + 1)%time
+        if (slips_in(mode) .and. until > t) call look_along(machine, mode, t, y, until, k, gaps, slowest, margins)
+      end do
+    end select
+    margins%list = [margins%list, gaps(-1), gaps(1), slowest]
+  end function margins_of
+
+  !> The margins of the event `k`.
+  pure subroutine add_event(machine, orbit, k, list)
+    type(one_body_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    integer, intent(in) :: k
+    type(margin_t), allocatable, intent(inout) :: list(:)
+    type(margin_t) :: margin
+    type(event_t) :: probe
+    real(wp) :: value, other, rate, by_state(states), force
+    associate (event => orbit%events(k), size_of => machine%size_of, scale => machine%moving%machine%force_scale)
+      margin = margin_t(event=k, side=event%side, time=event%time)
+      force = max(scale, tiny(scale))
+      probe = event
+      probe%kind = event_release
+      select case (event%kind)
+      case (event_impact_upper, event_impact_lower, event_touch_upper, event_touch_lower, event_chatter_upper, event_chatter_lower)
+        margin%kind = of_impact
+        margin%value = event%side*event%arrival(2)/size_of(2)
+      case (event_separation)
+        margin%kind = of_impact
+        margin%value = -event%side*event%arrival(2)/size_of(2)
+      case (event_turning_point)
+        margin%kind = of_turning
+        call machine%guard(probe, event%time, event%arrival(:states), value, by_state, rate)
+        margin%value = -value/force
+      case (event_stick)
+        margin%kind = of_stick
+        if (.not. rests_on_barrier(event%after)) then
+          call machine%guard(probe, event%time, event%arrival(:states), value, by_state, rate)
+          probe%side = -probe%side
+          call machine%guard(probe, event%time, event%arrival(:states), other, by_state, rate)
+          margin%value = min(value, other)/force
+        end if
+      case (event_release, event_barrier_release)
+        margin%kind = of_release
+        call machine%guard(probe, event%time, event%arrival(:states), value, by_state, rate)
+        margin%value = -rate*size_of(1)/size_of(2)/force
+      end select
+      list = [list, margin]
+      if (k == 1) return
+      margin = margin_t(event=k, side=event%side, time=event%time, kind=of_order, &
+                        value=(event%time - orbit%events(k - 1)%time)/machine%period)
+      list = [list, margin]
+    end associate
+  end subroutine add_event
+
+  !> Where the velocity passes zero within a flight the body turns short of a barrier; where its size has a least value, a slip
+  !> in which friction acts may stop.
+  pure subroutine look_along(machine, mode, from, start, until, k, gaps, slowest, margins)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: mode, k
+    real(wp), intent(in) :: from, start(states), until
+    type(margin_t), intent(inout) :: gaps(-1:1), slowest
+    type(margins_t), intent(inout) :: margins
+    real(wp) :: y(states), a, last(states), last_a, t, last_t, slope(states)
+    integer :: i, count, direction
+    logical :: smooth
+    smooth = turns_smoothly(machine)
+    direction = direction_in(mode)
+    count = max(6, ceiling(looks*(until - from)/machine%period))
+    last = start
+    last_t = from
+    slope = machine%slope(mode, from, start)
+    last_a = slope(2)
+    do i = 1, count
+      t = from + (until - from)*i/count
+      call state_in(machine, mode, from, start, t, y)
+      slope = machine%slope(mode, t, y)
+      a = slope(2)
+      margins%x_max = max(margins%x_max, y(1))
+      margins%x_min = min(margins%x_min, y(1))
+      if (smooth .and. last(2)*y(2) < 0) then
+        call note_turning(machine, mode, from, start, last_t, t, merge(1, -1, last(2) > 0), k, gaps, margins)
+      else if (.not. smooth .and. direction*last_a < 0 .and. direction*a > 0) then
+        call note_slowest(machine, mode, from, start, last_t, t, direction, k, slowest)
+      end if
+      last = y
+      last_a = a
+      last_t = t
+    end do
+  end subroutine look_along
+
+  pure subroutine state_in(machine, mode, from, start, t, y)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: from, start(states), t
+    real(wp), intent(out) :: y(states)
+    real(wp) :: unused(states, states)
+    call machine%fly(mode, from, start, t, y, unused)
+  end subroutine state_in
+
+  !> The extreme of x between two looks, by halving.
+  pure subroutine note_turning(machine, mode, from, start, low, high, side, k, gaps, margins)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: mode, side, k
+    real(wp), intent(in) :: from, start(states), low, high
+    type(margin_t), intent(inout) :: gaps(-1:1)
+    type(margins_t), intent(inout) :: margins
+    real(wp) :: a, b, t, y(states)
+    integer :: i
+    a = low
+    b = high
+    do i = 1, most_halvings
+      t = a + (b - a)/2
+      call state_in(machine, mode, from, start, t, y)
+      if (side*y(2) > 0) then
+        a = t
+      else
+        b = t
+      end if
+      if (b - a <= spacing(b)) exit
+    end do
+    margins%x_max = max(margins%x_max, y(1))
+    margins%x_min = min(margins%x_min, y(1))
+    call note_gap(machine, y(1), k, side, t, .false., gaps)
+  end subroutine note_turning
+
+  pure subroutine note_slowest(machine, mode, from, start, low, high, direction, k, slowest)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: mode, direction, k
+    real(wp), intent(in) :: from, start(states), low, high
+    type(margin_t), intent(inout) :: slowest
+    real(wp) :: a, b, t, y(states), slope(states)
+    integer :: i
+    a = low
+    b = high
+    do i = 1, most_halvings
+      t = a + (b - a)/2
+      call state_in(machine, mode, from, start, t, y)
+      slope = machine%slope(mode, t, y)
+      if (direction*slope(2) < 0) then
+        a = t
+      else
+        b = t
+      end if
+      if (b - a <= spacing(b)) exit
+    end do
+    if (direction*y(2)/machine%size_of(2) < slowest%value) slowest = &
+      margin_t(direction*y(2)/machine%size_of(2), of_slip, k, direction, t)
+  end subroutine note_slowest
+
+  !> Notes the distance of a turning point at `x` [m] to the barrier on its side; `at_event`: it is the event `k`, else it comes
+  !> after that.
+  pure subroutine note_gap(machine, x, k, side, t, at_event, gaps)
+    type(one_body_t), intent(in) :: machine
+    real(wp), intent(in) :: x, t
+    integer, intent(in) :: k, side
+    logical, intent(in) :: at_event
+    type(margin_t), intent(inout) :: gaps(-1:1)
+    real(wp) :: barrier, value
+    associate (contact => machine%moving%machine%contact)
+      if (contact%soft) barrier = merge(contact%soft_upper, contact%soft_lower, side > 0)
+      if (.not. contact%soft) barrier = merge(contact%upper, contact%lower, side > 0)
+    end associate
+    if (.not. abs(barrier) < huge(barrier)) return
+    value = side*(barrier - x)/machine%size_of(1)
+    ! A soft barrier is pressed.
+    if (machine%moving%machine%contact%soft .and. at_event .and. value < 0) return
+    if (value < gaps(side)%value) gaps(side) = margin_t(value, of_gap, merge(k, -k - 1, at_event), side, t)
+  end subroutine note_gap
+
+end module orbit_margins

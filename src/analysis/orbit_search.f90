@@ -1,0 +1,184 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Periodic orbits at one value of the parameter, stable and unstable: Newton's method on the map with its exact derivative, from
+!> starts as they are, and from where the motions from them have settled.
+module orbit_search
+  use body_family, only: family_t, map_with_variation
+  use circle, only: point_near
+  use kinds, only: wp
+  use matrices, only: solve
+  use motion_state, only: tally_t
+  use one_body, only: one_body_t
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, &
+    section_points, states
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: find_orbits, add_orbit
+
+  integer, parameter :: most_newton = 20, settling = 150
+  !> Relative distance at which a section point counts as a return to an earlier one, and at which two orbits are one.
+  real(wp), parameter :: near_return = 0.1_wp, same_orbit = 1e-7_wp
+  !> An orbit whose map less 1 has a determinant below this is one of a family.
+  real(wp), parameter :: neutral = 1e-8_wp
+
+  !> Orbits found at one value: their section points are in `points`, column by column.
+  type, public :: found_t
+    type(orbit_t), allocatable :: orbits(:)
+    !> Orbits met that are not isolated.
+    integer :: families = 0
+  end type found_t
+
+contains
+
+  !> Adds to `found` the orbits that starts (columns x [m], v [m/s]) lead to: of `longest` drive periods at most where the
+  !> motion settles, of up to two elsewhere.
+  subroutine find_orbits(family, machines, value, starts, longest, found)
+    type(family_t), intent(in) :: family
+    type(neighbourhood_t), intent(inout) :: machines
+    real(wp), intent(in) :: value, starts(:, :)
+    integer, intent(in) :: longest
+    type(found_t), intent(inout) :: found
+    real(wp) :: settled(states)
+    integer :: i, n
+    if (.not. allocated(found%orbits)) allocate (found%orbits(0))
+    do i = 1, size(starts, 2)
+      call settle(machines, starts(:, i), longest, settled, n)
+      if (n > 0) call try_newton(family, machines, value, settled, n, found)
+    end do
+    do i = 1, size(starts, 2)
+      do n = 1, min(2, longest)
+        call try_newton(family, machines, value, starts(:, i), n, found)
+      end do
+    end do
+  end subroutine find_orbits
+
+  !> Where a motion is after many periods, and after how many it is back there (0: it is not).
+  subroutine settle(machines, start, longest, settled, periods)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: start(states)
+    integer, intent(in) :: longest
+    real(wp), intent(out) :: settled(states)
+    integer, intent(out) :: periods
+    real(wp) :: image(states), next(states)
+    logical :: ok
+    integer :: i
+    periods = 0
+    settled = start
+    do i = 1, settling
+      call image_of(machines, settled, next, ok)
+      if (.not. ok) return
+      settled = next
+    end do
+    image = settled
+    do i = 1, longest
+      call image_of(machines, image, next, ok)
+      if (.not. ok) return
+      image = next
+      if (distance(machines, image, settled) > near_return) cycle
+      periods = i
+      return
+    end do
+  end subroutine settle
+
+  !> Image of a section point.
+  subroutine image_of(machines, point, image, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(states)
+    real(wp), intent(out) :: image(states)
+    logical, intent(out) :: ok
+    type(orbit_t) :: motion
+    type(tally_t) :: tally
+    real(wp) :: slopes(states, states)
+    motion%periods = 1
+    call map_with_variation(machines, point, 1, image, slopes, tally, ok)
+    ! The derivative is not needed here.
+    ok = tally%events > 0 .and. all(abs(image) < huge(1.0_wp))
+  end subroutine image_of
+
+  !> Distance of two section points in natural sizes; an angle is on a circle.
+  pure real(wp) function distance(machines, one, other)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: one(states), other(states)
+    distance = huge(distance)
+    select type (body => machines%centre)
+    type is (one_body_t)
+      distance = norm2((point_near(one, other, body%moving%machine%turn) - other)/body%size_of)
+    end select
+  end function distance
+
+  !> Newton's method on the map over `periods`, each step with the events of the motion then; what it comes to is added.
+  subroutine try_newton(family, machines, value, start, periods, found)
+    type(family_t), intent(in) :: family
+    type(neighbourhood_t), intent(inout) :: machines
+    real(wp), intent(in) :: value, start(states)
+    integer, intent(in) :: periods
+    type(found_t), intent(inout) :: found
+    real(wp) :: point(states), image(states), slopes(states, states), step(states), sizes(states)
+    type(tally_t) :: tally
+    logical :: ok
+    integer :: i, k
+    point = start
+    select type (body => machines%centre)
+    type is (one_body_t)
+      sizes = body%size_of
+    end select
+    do i = 1, most_newton
+      call map_with_variation(machines, point, periods, image, slopes, tally, ok)
+      if (.not. ok) return
+      do k = 1, states
+        slopes(k, k) = slopes(k, k) - 1
+      end do
+      call solve(slopes, point - image, step, ok)
+      if (.not. ok) return
+      if (norm2(step/sizes) > 0.3_wp) step = 0.3_wp*step/norm2(step/sizes)
+      point = point + step
+      select type (body => machines%centre)
+      type is (one_body_t)
+        point(1) = max(min(point(1), body%moving%machine%contact%upper), body%moving%machine%contact%lower)
+      end select
+      if (norm2(step/sizes) < 1e-8_wp) exit
+    end do
+    if (norm2(step/sizes) < 1e-6_wp) call add_orbit(family, machines, value, point, periods, found)
+  end subroutine try_newton
+
+  !> Corrects the orbit near a section point and adds it, unless it is known, not real, or of a shorter period.
+  subroutine add_orbit(family, machines, value, point, periods, found, added)
+    type(family_t), intent(in) :: family
+    type(neighbourhood_t), intent(inout) :: machines
+    real(wp), intent(in) :: value, point(states)
+    integer, intent(in) :: periods
+    type(found_t), intent(inout) :: found
+    logical, intent(out), optional :: added
+    type(orbit_t) :: orbit
+    real(wp), allocatable :: points(:, :)
+    logical :: ok
+    integer :: i, k
+    if (present(added)) added = .false.
+    call orbit_of_motion(machines, value, point, periods, orbit, ok)
+    if (ok) call correct_orbit(family, machines, orbit, direct(orbit, 1), ok)
+    if (.not. ok) return
+    associate (m => orbit%matrix)
+      if (abs((m(1, 1) - 1)*(m(2, 2) - 1) - m(1, 2)*m(2, 1)) < neutral) then
+        found%families = found%families + 1
+        return
+      end if
+    end associate
+    if (.not. is_admissible(machines, orbit)) return
+    points = section_points(machines, orbit)
+    do i = 2, periods
+      if (distance(machines, points(:, i), points(:, 1)) < same_orbit) return
+    end do
+    do i = 1, size(found%orbits)
+      if (found%orbits(i)%periods /= periods) cycle
+      do k = 1, periods
+        if (distance(machines, points(:, k), found%orbits(i)%y) < same_orbit) return
+      end do
+    end do
+    found%orbits = [found%orbits, orbit]
+    if (present(added)) added = .true.
+  end subroutine add_orbit
+
+end module orbit_search

@@ -1,0 +1,326 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix branches`: stable and unstable periodic orbits over a parameter.
+module branches_driver
+  use branch, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
+  use branch_search, only: follow_seeds, prepare_search, search_t, search_value
+  use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
+  use case_setup, only: options_of, output_path
+  use case_type, only: case_t
+  use case_values, only: allowed_range, bounds_t
+  use command_line, only: command_t
+  use errors, only: error_t, fail
+  use event_words, only: canonical_word, word_text
+  use hybrid_machine, only: event_t
+  use journal, only: json_number, json_text
+  use kinds, only: int64, wp
+  use map_final, only: write_whole
+  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
+  use motion_state, only: append_word, event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, &
+    event_stick, event_touch_lower, event_touch_upper, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+    word_stick, word_upper
+  use orbit_margins, only: is_impact
+  use periodic_orbit, only: orbit_t
+  use session, only: describe_file, open_session, session_t
+  use status, only: exit_bad_case, exit_done
+  use text, only: join, replace_all, to_text
+  use written_check, only: check_written
+  implicit none
+  private
+
+  public :: run_branches
+
+  !> Starts at each value at which orbits are searched.
+  integer, parameter :: starts = 48
+  !> Powers of 1/p for the root p of p^3 = p + 1 (Roberts 2018).
+  real(wp), parameter :: irrational(2) = [0.7548776662466927_wp, 0.5698402909980532_wp]
+
+contains
+
+  !> Runs the command; ends the program with the exit code on errors.
+  subroutine run_branches(command)
+    type(command_t), intent(in) :: command
+    type(session_t) :: session
+    type(search_t) :: search
+    type(schema_t) :: schema
+    type(bounds_t) :: bounds
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: path
+    integer :: i
+    call open_session(command, session)
+    path = output_path(command%output, command%path, command%name)
+    call set_range(command, session%the_case, search, bounds, error)
+    if (.not. allocated(error)) call prepare_search(search, command%searches, error)
+    call session%stop_if(error)
+    call set_starts(session%the_case, search)
+    if (command%validate .or. command%dry_run) then
+      call session%journal%line('valid', command%path//' is a valid case for branches over '//search%family%path//' from '// &
+                                to_text(search%plan%lowest)//' to '//to_text(search%plan%highest))
+      call session%end_with(exit_done)
+    end if
+    call session%begin(path, tiled=.false.)
+    ! One process is enough: the others wait at its end.
+    if (session%team%is_root()) then
+      call session%journal%begin('values', int(size(search%values), int64), 0_int64)
+      do i = 1, size(search%values)
+        call search_value(search, i)
+        call session%journal%progress(int(i, int64))
+      end do
+      call follow_seeds(search)
+      call report(session, search, trim(bounds%unit))
+    end if
+    if (size(search%branches) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
+      'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
+      to_text(search%plan%highest)//'; nothing is written')
+    call session%stop_if(error)
+    call describe_file(session, 'branches', schema)
+    if (session%team%is_root()) call describe_branches(search, trim(bounds%unit), schema)
+    call session%provenance%finish(schema)
+    if (session%team%is_root()) call write_whole(path, schema, command%force, error)
+    call session%stop_if(error)
+    call check_written(session, path)
+    call session%journal%line('written', 'wrote '//path)
+    call session%end_with(exit_done)
+  end subroutine run_branches
+
+  !> The parameter and its range: as asked, else those of the sweep or the axis of this parameter. Code 65 for what the machine
+  !> does not have.
+  subroutine set_range(command, the_case, search, bounds, error)
+    type(command_t), intent(in) :: command
+    type(case_t), intent(in) :: the_case
+    type(search_t), intent(inout) :: search
+    type(bounds_t), intent(out) :: bounds
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name, problem
+    real(wp) :: range(2)
+    logical :: found, given(2)
+    integer :: i
+    name = canonical_name(command%parameter)
+    call parameter_bounds(the_case%laws, name, bounds, found)
+    if (.not. found .or. is_start(name)) then
+      call fail(error, exit_bad_case, "--parameter: found '"//name//"', allowed "//parameter_names(the_case%laws))
+      return
+    end if
+    given = .false.
+    range = 0
+    if (the_case%sweep%present) then
+      if (the_case%sweep%swept%name == name) call take(the_case%sweep%swept%values)
+    end if
+    do i = 1, size(the_case%axes)
+      if (the_case%axes(i)%name == name) call take(the_case%axes(i)%values)
+    end do
+    if (command%has_from) range(1) = command%from
+    if (command%has_to) range(2) = command%to
+    given = given .or. [command%has_from, command%has_to]
+    if (.not. all(given)) then
+      call fail(error, exit_bad_case, '--from and --to are needed: the case has no sweep or axis of '//name)
+      return
+    end if
+    do i = 1, 2
+      problem = allowed_range(range(i), bounds)
+      if (len(problem) == 0) cycle
+      call fail(error, exit_bad_case, trim(merge('--from', '--to  ', i == 1))//': '//problem)
+      return
+    end do
+    if (.not. range(1) < range(2)) then
+      call fail(error, exit_bad_case, '--from, --to: found '//to_text(range(1))//' and '//to_text(range(2))// &
+                ', allowed is a range that rises')
+      return
+    end if
+    search%plan%lowest = range(1)
+    search%plan%highest = range(2)
+    search%family%laws = the_case%laws
+    search%family%path = name
+    search%family%options = options_of(the_case)
+    search%family%lowest = merge(bounds%lower + merge(tiny(1.0_wp), 0.0_wp, bounds%lower_open), -huge(1.0_wp), &
+                                 bounds%lower > -huge(1.0_wp))
+    search%family%highest = bounds%upper
+
+  contains
+
+    subroutine take(values)
+      real(wp), intent(in) :: values(:)
+      range = [minval(values), maxval(values)]
+      given = .true.
+    end subroutine take
+
+  end subroutine set_range
+
+  !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about.
+  subroutine set_starts(the_case, search)
+    type(case_t), intent(in) :: the_case
+    type(search_t), intent(inout) :: search
+    real(wp) :: low(2), high(2)
+    integer :: i, k
+    character(len=2), parameter :: names(2) = ['x0', 'v0']
+    high = 2*search%family%sizes
+    low = -high
+    do k = 1, 2
+      do i = 1, size(the_case%axes)
+        if (the_case%axes(i)%name /= names(k)) cycle
+        low(k) = minval(the_case%axes(i)%values)
+        high(k) = maxval(the_case%axes(i)%values)
+      end do
+    end do
+    search%starts = reshape([(low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp), i=1, starts)], [2, starts])
+  end subroutine set_starts
+
+  !> Every labelled point, and what was found from how many seeds.
+  subroutine report(session, search, unit)
+    type(session_t), intent(inout) :: session
+    type(search_t), intent(in) :: search
+    character(len=*), intent(in) :: unit
+    integer :: b, i, families
+    do b = 1, size(search%branches)
+      associate (line => search%branches(b))
+        call session%journal%line('branch', 'branch '//to_text(b)//': period '//to_text(line%points(1)%orbit%periods)//', '// &
+                                  to_text(size(line%points))//' points')
+        do i = 1, size(line%points)
+          if (line%points(i)%label /= no_label) call report_point(session, search, line%points(i), b, unit)
+        end do
+      end associate
+    end do
+    families = sum(search%found%families)
+    call session%journal%line('found', to_text(size(search%branches))//' branches from '//to_text(search%seeds)// &
+      ' seeds at '//to_text(size(search%values))//' values of '//search%family%path//'; there may be others')
+    if (families > 0) call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
+                                                to_text(families)//' times; they are not followed')
+  end subroutine report
+
+  subroutine report_point(session, search, point, number, unit)
+    type(session_t), intent(inout) :: session
+    type(search_t), intent(in) :: search
+    type(point_t), intent(in) :: point
+    integer, intent(in) :: number
+    character(len=*), intent(in) :: unit
+    character(len=:), allocatable :: shown
+    associate (orbit => point%orbit, m => point%orbit%multipliers)
+      shown = to_text(orbit%parameter, 13)
+      if (unit /= '1') shown = shown//' '//unit
+      call session%journal%line('point', '  '//replace_all(trim(label_names(point%label)), '_', ' ')//' at '//search%family%path// &
+        ' = '//shown//', '//word_text(word_of(orbit, search))//', multipliers '//complex_text(m(1))//', '//complex_text(m(2)), &
+        '"branch": '//to_text(number)//', "label": '//json_text(trim(label_names(point%label)))//', "parameter": '// &
+        json_number(orbit%parameter)//', "x": '//json_number(orbit%y(1))//', "v": '//json_number(orbit%y(2))//', "word": '// &
+        json_text(word_text(word_of(orbit, search)))//', "multipliers": ['//json_number(real(m(1), wp))//', '// &
+        json_number(aimag(m(1)))//', '//json_number(real(m(2), wp))//', '//json_number(aimag(m(2)))//']')
+    end associate
+  end subroutine report_point
+
+  pure function complex_text(z) result(text)
+    complex(wp), intent(in) :: z
+    character(len=:), allocatable :: text
+    text = to_text(real(z, wp), 9)
+    if (abs(aimag(z)) > 0) text = text//merge('+', '-', aimag(z) > 0)//to_text(abs(aimag(z)), 9)//'i'
+  end function complex_text
+
+  !> The event word of an orbit.
+  pure integer(int64) function word_of(orbit, search) result(word)
+    type(orbit_t), intent(in) :: orbit
+    type(search_t), intent(in) :: search
+    type(tally_t) :: tally
+    integer(int64) :: words(orbit%periods)
+    real(wp) :: period
+    integer :: i, k
+    period = period_at(orbit, search)
+    do i = 1, orbit%periods
+      tally = tally_t()
+      do k = 1, size(orbit%events)
+        associate (event => orbit%events(k))
+          if (event%time < (i - 1)*period .or. (event%time >= i*period .and. i < orbit%periods)) cycle
+          call append_event(event, tally)
+        end associate
+      end do
+      call append_word(tally, word_period)
+      words(i) = tally%word
+    end do
+    word = canonical_word(words)
+  end function word_of
+
+  pure subroutine append_event(event, tally)
+    type(event_t), intent(in) :: event
+    type(tally_t), intent(inout) :: tally
+    select case (event%kind)
+    case (event_impact_upper, event_touch_upper)
+      call append_word(tally, word_upper)
+    case (event_impact_lower, event_touch_lower)
+      call append_word(tally, word_lower)
+    case (event_stick)
+      call append_word(tally, word_stick)
+    case (event_chatter_upper)
+      call append_word(tally, word_chatter_upper)
+    case (event_chatter_lower)
+      call append_word(tally, word_chatter_lower)
+    end select
+  end subroutine append_event
+
+  !> Drive period of the machine of an orbit [s].
+  pure real(wp) function period_at(orbit, search) result(period)
+    use build_motion, only: period_of
+    use law_table, only: change_parameter, law_choice_t
+    type(orbit_t), intent(in) :: orbit
+    type(search_t), intent(in) :: search
+    type(law_choice_t), allocatable :: laws(:)
+    type(error_t), allocatable :: error
+    logical :: known
+    laws = search%family%laws
+    call change_parameter(laws, search%family%path, orbit%parameter, known)
+    call period_of(laws, period, error)
+  end function period_at
+
+  !> The points of all branches, one after the other.
+  subroutine describe_branches(search, unit, schema)
+    type(search_t), intent(in) :: search
+    character(len=*), intent(in) :: unit
+    type(schema_t), intent(inout) :: schema
+    type(point_t), allocatable :: points(:)
+    integer, allocatable :: number(:)
+    character(len=name_length) :: along(1)
+    integer :: b, i, k
+    allocate (points(0), number(0))
+    do b = 1, size(search%branches)
+      points = [points, search%branches(b)%points]
+      number = [number, [(b, i=1, size(search%branches(b)%points))]]
+    end do
+    along = 'point'
+    call schema%add_attribute('', 'parameter', search%family%path)
+    call schema%add_attribute('', 'seeds', search%seeds)
+    call schema%add_dimension('point', size(points, kind=int64))
+    call schema%add_dimension('multiplier', 2_int64)
+    call schema%add_variable('branch', type_int32, along, units='1', long_name='number of the branch', data=real(number, wp))
+    call add('parameter', unit, search%family%path, [(points(i)%orbit%parameter, i=1, size(points))])
+    call add('x', 'm', 'position at crank angle 0', [(points(i)%orbit%y(1), i=1, size(points))])
+    call add('v', 'm/s', 'velocity at crank angle 0', [(points(i)%orbit%y(2), i=1, size(points))])
+    call add('x_max', 'm', 'largest position', points%x_max)
+    call add('x_min', 'm', 'smallest position', points%x_min)
+    call schema%add_variable('period', type_int16, along, units='1', long_name='period in drive periods', &
+                             data=[(real(points(i)%orbit%periods, wp), i=1, size(points))])
+    call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts in a period of the orbit', &
+                             data=[(real(count(is_impact(points(i)%orbit%events%kind)), wp), i=1, size(points))])
+    call schema%add_variable('event_word', type_int64, along, units='1', &
+                             long_name='events of one period of the orbit, three bits each', &
+                             data=[(real(word_of(points(i)%orbit, search), wp), i=1, size(points))])
+    call schema%add_variable('stable', type_int8, along, units='1', long_name='all multipliers within the unit circle', &
+                             flag_values=[0, 1], flag_meanings='unstable stable', &
+                             data=[(merge(1.0_wp, 0.0_wp, is_stable(points(i)%orbit)), i=1, size(points))])
+    call schema%add_variable('label', type_int8, along, units='1', long_name='what the point is', &
+                             flag_values=[(i, i=0, last_label)], flag_meanings=join(label_names, ' '), &
+                             data=real(points%label, wp))
+    call schema%add_variable('multiplier_real', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
+      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, 2), &
+                                                                 i=1, size(points))])
+    call schema%add_variable('multiplier_imag', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
+      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, 2), &
+                                                                      i=1, size(points))])
+
+  contains
+
+    subroutine add(name, units, long_name, values)
+      character(len=*), intent(in) :: name, units, long_name
+      real(wp), intent(in) :: values(:)
+      call schema%add_variable(name, type_float64, along, units=units, long_name=long_name, data=values)
+    end subroutine add
+
+  end subroutine describe_branches
+
+end module branches_driver

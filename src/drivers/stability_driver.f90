@@ -1,0 +1,101 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix stability`: Lyapunov exponents of the motion from [start], and what kind of motion it is.
+module stability_driver
+  use body_family, only: body_neighbourhood, family_t
+  use case_check, only: require_start
+  use case_setup, only: options_of
+  use command_line, only: command_t
+  use errors, only: error_t
+  use exponents, only: lyapunov_exponents, motion_names, spectrum_t, type_of_motion, zero_one_test
+  use journal, only: json_number, json_text
+  use kinds, only: wp
+  use motion, only: start_state
+  use motion_state, only: state_t
+  use one_body, only: one_body_t
+  use session, only: open_session, session_t
+  use status, only: exit_done
+  use text, only: replace_all, to_text
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: run_stability
+
+  !> Section points that the 0-1 test looks at, at most.
+  integer, parameter :: most_points = 5000
+
+contains
+
+  !> Runs the command; ends the program with the exit code on errors.
+  subroutine run_stability(command)
+    type(command_t), intent(in) :: command
+    type(session_t) :: session
+    type(family_t) :: family
+    type(neighbourhood_t) :: machines
+    type(spectrum_t) :: spectrum
+    type(state_t) :: state
+    type(error_t), allocatable :: error
+    real(wp) :: section(min(most_points, command%periods)), k
+    call open_session(command, session)
+    call require_start(session%the_case, error)
+    call session%stop_if(error)
+    family%laws = session%the_case%laws
+    family%options = options_of(session%the_case)
+    call body_neighbourhood(family, 0.0_wp, machines, error)
+    call session%stop_if(error)
+    if (command%validate .or. command%dry_run) then
+      call session%journal%line('valid', command%path//' is a valid case for stability')
+      call session%end_with(exit_done)
+    end if
+    if (session%team%is_root()) then
+      associate (start => session%the_case%start)
+        select type (body => machines%centre)
+        type is (one_body_t)
+          state = start_state(body%moving, start%x0, start%v0, start%crank_angle)
+        end select
+      end associate
+      call lyapunov_exponents(machines, state, command%periods/4, command%periods, spectrum, section)
+      if (spectrum%known) then
+        k = zero_one_test(section)
+        call report(session, spectrum, k)
+      else
+        call session%journal%line('not_known', 'not known: the motion was given up, or met an event tangentially')
+      end if
+    end if
+    call session%end_with(exit_done)
+  end subroutine run_stability
+
+  !> What was found, with errors and the check.
+  subroutine report(session, spectrum, k)
+    type(session_t), intent(inout) :: session
+    type(spectrum_t), intent(in) :: spectrum
+    real(wp), intent(in) :: k
+    character(len=:), allocatable :: name
+    integer :: i
+    do i = 1, 2
+      associate (value => spectrum%exponents(i), error => spectrum%errors(i))
+        if (value < -huge(1.0_wp)/2) then
+          call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': -inf (a direction is lost: sticking or '// &
+                                    'completed chatter)', '"number": '//to_text(i)//', "value": null')
+        else
+          call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': '//to_text(value, 6)//' 1/s, standard '// &
+            'error '//to_text(error, 2), '"number": '//to_text(i)//', "value": '//json_number(value)//', "error": '// &
+            json_number(error))
+        end if
+      end associate
+    end do
+    if (spectrum%has_sum) then
+      call session%journal%line('sum', 'their sum: '//to_text(spectrum%sum_found, 10)//' 1/s; exact, from damping, impacts and '// &
+        'turning points: '//to_text(spectrum%sum_exact, 10)//' 1/s', '"found": '//json_number(spectrum%sum_found)// &
+        ', "exact": '//json_number(spectrum%sum_exact))
+    end if
+    call session%journal%line('zero_one', '0-1 test: '//to_text(k, 3)//' (0 regular, 1 chaotic)', '"value": '//json_number(k))
+    name = trim(motion_names(type_of_motion(spectrum, k)))
+    call session%journal%line('motion', 'the motion is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')// &
+      ', by '//to_text(spectrum%periods)//' drive periods with '//to_text(spectrum%impacts)//' impacts', &
+      '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts))
+  end subroutine report
+
+end module stability_driver

@@ -1,0 +1,365 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One flight of a mode in which the force of a joint is not linear, by high-order steps. What is linear of the mode are
+!> the rows of its exponential series; the unknowns are the displacements since the start and the speeds, so that a brief
+!> contact loses no digits to the size of the coordinates.
+module marched_flight
+  use contact_law, only: contact_t
+  use flight_path, only: begin_series, constant_forces, guard_row, path_t
+  use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step, &
+    watched_system_t
+  use guards, only: guards_of, joint_guard_t, most_guards
+  use jointed, only: joint_soft, joint_t, jointed_t, most_joints
+  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, turning_at
+  use elementary, only: exponential, logarithm, sine_cosine
+  use kinds, only: wp
+  use linear_flight, only: watch_t
+  use mode_flow, only: harmonics_of, mode_flow_t
+  use polynomial, only: degree, maximum_until
+  implicit none
+  private
+
+  public :: begin_flight, step_flight
+
+  !> Rounding of a guard, as a share of the sizes of its terms.
+  real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+
+  !> Displacements and speeds, 1, the time since the start, cosines and sines of the drive are what rows refer to.
+  type, extends(watched_system_t) :: marched_t
+    integer :: n = 0, harmonics = 0, count_joints = 0, count_guards = 0
+    real(wp) :: frequency = 0, start = 0
+    !> Accelerations, one column each; guards.
+    real(wp), allocatable :: acceleration(:, :), guard(:, :)
+    !> Joints whose force is not linear: their coordinates and speeds, what their forces do to accelerations and guards.
+    type(joint_t), allocatable :: joints(:)
+    integer :: phase(most_joints) = 0
+    real(wp) :: touch_speed(most_joints) = 0
+    real(wp), allocatable :: place(:, :), speed(:, :), push(:, :), lean(:, :)
+  contains
+    procedure :: slope => marched_slope
+    procedure :: margin => marched_margin
+  end type marched_t
+
+  !> A flight on its way.
+  type, public :: marched_flight_t
+    type(marched_t) :: system
+    type(march_t) :: march
+    type(guard_t) :: guards(most_guards)
+    type(joint_guard_t) :: list(most_guards)
+    integer :: count_guards = 0
+    !> Sizes of the guards, for their rounding; coordinates at the start [m].
+    real(wp) :: size_of_guard(most_guards) = 0
+    real(wp), allocatable :: origin(:)
+  end type marched_flight_t
+
+contains
+
+  !> Begins a flight from `state`; `tolerance` is relative.
+  pure subroutine begin_flight(machine, flow, state, tolerance, flight)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(in) :: tolerance
+    type(marched_flight_t), intent(out) :: flight
+    type(path_t) :: path
+    real(wp) :: y(2*machine%n), scale(2*machine%n)
+    integer :: n
+    n = machine%n
+    call guards_of(machine, flow, state, flight%list, flight%count_guards)
+    path%start = state%time
+    path%turning = turning_at(machine%frequency, state%time, harmonics_of(machine))
+    call constant_forces(machine, state, path%force(:n), path%force_rate(:n))
+    call begin_series(machine, flow, state, path)
+    flight%origin = state%q(:n)
+    call set_system(machine, flow, state, path, flight%system)
+    call set_guards(machine, flow, state, path, flight)
+    y(:n) = 0
+    y(n + 1:) = state%v(:n)
+    call set_sizes(machine, flight%system, state, y, scale)
+    call begin_march(flight%march, flight%system, tolerance, scale, machine%period, 0.0_wp, y)
+  end subroutine begin_flight
+
+  !> What is integrated.
+  pure subroutine set_system(machine, flow, state, path, system)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(path_t), intent(in) :: path
+    type(marched_t), intent(inout) :: system
+    real(wp) :: s, u
+    integer :: n, one, j, k
+    n = machine%n
+    one = 2*n + 1
+    system%n = n
+    system%harmonics = size(path%turning)
+    system%frequency = machine%frequency
+    system%start = state%time
+    system%acceleration = transpose(path%matrix(n + 1:2*n, :))
+    system%acceleration(one, :) = system%acceleration(one, :) + matmul(path%matrix(n + 1:2*n, :n), state%q(:n))
+    system%count_joints = count([(is_curved(machine%joints(j), state%phase(j)), j=1, size(machine%joints))])
+    allocate (system%joints(system%count_joints), system%push(n, system%count_joints))
+    allocate (system%place(size(path%unknowns), system%count_joints), system%speed(size(path%unknowns), system%count_joints))
+    k = 0
+    do j = 1, size(machine%joints)
+      if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
+      k = k + 1
+      system%joints(k) = machine%joints(j)
+      system%phase(k) = state%phase(j)
+      system%touch_speed(k) = state%touch_speed(j)
+      system%push(:, k) = held_push(machine, flow, machine%joints(j)%row)
+      system%place(:, k) = flow%place_row(:, j)
+      system%speed(:, k) = flow%speed_row(:, j)
+      system%place(one + 1, k) = machine%joints(j)%offset%rate
+      system%speed(one, k) = machine%joints(j)%offset%rate
+      call joint_motion(machine, j, state%q, state%v, state%time, path%turning, s, u)
+      ! A contact that begins is at its stop to the last digit.
+      if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop_of(machine%joints(j), state%phase(j))) &
+          <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop_of(machine%joints(j), &
+                                                                                               state%phase(j))
+      system%place(one, k) = s - sum(flow%place_row(one + 2:, j)*path%unknowns(one + 2:))
+    end do
+  end subroutine set_system
+
+  !> Stop of a contact [m].
+  pure real(wp) function stop_of(joint, phase)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    stop_of = merge(joint%upper, joint%lower, phase > 0)
+  end function stop_of
+
+  !> Accelerations under a force of 1 N along `row`, with the constraints held.
+  pure function held_push(machine, flow, row) result(push)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: row(:)
+    real(wp) :: push(machine%n), free(machine%n)
+    integer :: i
+    free = matmul(machine%mobility, row)
+    push = free
+    do i = 1, size(flow%independent)
+      push = push - flow%carried(:, i)*sum(machine%joints(flow%held(flow%independent(i)))%row*free)
+    end do
+  end function held_push
+
+  !> The guards as margins of the system; those that are zero now rise from there.
+  pure subroutine set_guards(machine, flow, state, path, flight)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(path_t), intent(in) :: path
+    type(marched_flight_t), intent(inout) :: flight
+    real(wp) :: row(size(path%unknowns)), y(2*machine%n), start, rate, accelerations(machine%n)
+    integer :: g, n, one, k, j
+    n = machine%n
+    one = 2*n + 1
+    y(:n) = 0
+    y(n + 1:) = state%v(:n)
+    accelerations = matmul(abs(path%matrix(n + 1:2*n, :)), abs(path%unknowns)) &
+                    + matmul(abs(flight%system%push), abs(forces_at(flight%system, unknowns(flight%system, 0.0_wp, y))))
+    associate (system => flight%system)
+      allocate (system%guard(size(path%unknowns), flight%count_guards), &
+                system%lean(system%count_joints, flight%count_guards), source=0.0_wp)
+      do g = 1, flight%count_guards
+        associate (guard => flight%list(g))
+          row = guard_row(machine, flow, path, guard)
+          flight%size_of_guard(g) = sum(abs(row*path%unknowns)) + guard%blur(0)
+          row(one) = row(one) + sum(row(:n)*state%q(:n))
+          system%guard(:, g) = row
+          k = 0
+          do j = 1, size(machine%joints)
+            if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
+            k = k + 1
+            if (guard%held > 0) system%lean(k, g) = -guard%force*sum(flow%reaction(guard%held, :)*machine%joints(j)%row)
+          end do
+          start = system%margin(g, 0.0_wp, y)
+          flight%guards(g)%margin = g
+          flight%guards(g)%from_zero = guard%from_zero .or. abs(start) <= rounding*flight%size_of_guard(g)
+          if (flight%guards(g)%from_zero) flight%guards(g)%constant = -start
+          flight%guards(g)%noise = 4096*epsilon(1.0_wp)*flight%size_of_guard(g)
+          rate = sum(abs(row(:n)*state%v(:n))) + sum(abs(row(n + 1:2*n))*accelerations)
+          if (guard%held > 0) rate = rate + guard%blur(1)
+          flight%guards(g)%noise_rate = 4096*epsilon(1.0_wp)*rate
+          call take_as_linear(system, g, flight%guards(g))
+        end associate
+      end do
+    end associate
+  end subroutine set_guards
+
+  !> A margin that depends on displacements and speeds alone is a linear guard.
+  pure subroutine take_as_linear(system, g, guard)
+    type(marched_t), intent(in) :: system
+    integer, intent(in) :: g
+    type(guard_t), intent(inout) :: guard
+    associate (one => 2*system%n + 1)
+      if (any(abs(system%guard(one + 1:, g)) > 0) .or. any(abs(system%lean(:, g)) > 0)) return
+      guard%margin = 0
+      guard%constant = guard%constant + system%guard(one, g)
+      guard%coefficients(:one - 1) = system%guard(:one - 1, g)
+    end associate
+  end subroutine take_as_linear
+
+  !> Sizes of displacements and speeds below which errors are absolute: shares of those of the motion, digits that the
+  !> coordinates do not have excepted, or those of the contacts that are pressed.
+  pure subroutine set_sizes(machine, system, state, y, scale)
+    type(jointed_t), intent(in) :: machine
+    type(marched_t), intent(in) :: system
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(in) :: y(:)
+    real(wp), intent(out) :: scale(:)
+    real(wp) :: slope(size(y)), length, mass, force, p, u
+    integer :: k, n
+    n = machine%n
+    slope = system%slope(0.0_wp, y)
+    length = 1e-3_wp*max(machine%length_scale, maxval(abs(y(n + 1:)))/machine%frequency, &
+                         maxval(abs(slope(n + 1:)))/machine%frequency**2, tiny(length))
+    scale(:n) = max(length, abs(state%q(:n)))
+    scale(n + 1:) = length*machine%frequency
+    length = huge(length)
+    do k = 1, system%count_joints
+      if (system%joints(k)%kind /= joint_soft) cycle
+      ! How deep a body of the contact's mass goes at its speed, or rests under its force.
+      associate (law => system%joints(k)%contact, row => system%joints(k)%row)
+        mass = 1/sum(row*matmul(machine%mobility, row))
+        u = abs(sum(row*y(n + 1:)))
+        force = mass*abs(sum(row*slope(n + 1:)))
+        p = max(depth(law, mass*u**2, 1.0_wp), depth(law, force, 0.0_wp), tiny(p))
+        if (.not. p < length) cycle
+        length = p
+        scale(:n) = p
+        scale(n + 1:) = max(u, sqrt(law%stiffness/mass*exponential((law%exponent + 1)*logarithm(p))))
+      end associate
+    end do
+  end subroutine set_sizes
+
+  !> p of K p^(n + more) = amount.
+  pure real(wp) function depth(contact, amount, more)
+    type(contact_t), intent(in) :: contact
+    real(wp), intent(in) :: amount, more
+    depth = 0
+    if (amount > tiny(amount)*contact%stiffness) depth = exponential(logarithm(amount/contact%stiffness)/(contact%exponent + more))
+  end function depth
+
+  !> What rows refer to.
+  pure function unknowns(self, time, y) result(z)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: z(2*self%n + 2 + 2*self%harmonics)
+    integer :: m, c
+    c = 2*self%n + 2
+    z(:c - 2) = y
+    z(c - 1) = 1
+    z(c) = time
+    do m = 1, self%harmonics
+      call sine_cosine(m*self%frequency*(self%start + time), z(c + 2*m), z(c + 2*m - 1))
+    end do
+  end function unknowns
+
+  !> Forces of the joints that are not linear [N].
+  pure function forces_at(self, z) result(force)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: z(:)
+    real(wp) :: force(self%count_joints)
+    integer :: k
+    do k = 1, self%count_joints
+      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), sum(self%place(:, k)*z), &
+                       sum(self%speed(:, k)*z), force(k))
+    end do
+  end function forces_at
+
+  !> Speeds and accelerations.
+  pure function marched_slope(self, time, y) result(slope)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: slope(size(y)), z(2*self%n + 2 + 2*self%harmonics), force(self%count_joints)
+    integer :: i
+    z = unknowns(self, time, y)
+    force = forces_at(self, z)
+    slope(:self%n) = y(self%n + 1:)
+    do i = 1, self%n
+      slope(self%n + i) = sum(self%acceleration(:, i)*z)
+    end do
+    do i = 1, self%count_joints
+      slope(self%n + 1:) = slope(self%n + 1:) + self%push(:, i)*force(i)
+    end do
+  end function marched_slope
+
+  !> Guard `number`.
+  pure real(wp) function marched_margin(self, number, time, y) result(margin)
+    class(marched_t), intent(in) :: self
+    integer, intent(in) :: number
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: z(2*self%n + 2 + 2*self%harmonics)
+    z = unknowns(self, time, y)
+    margin = sum(self%guard(:, number)*z)
+    if (any(abs(self%lean(:, number)) > 0)) margin = margin + sum(self%lean(:, number)*forces_at(self, z))
+  end function marched_margin
+
+  !> One step, until `until` [s after the section] at most. `path` is the step; `fallen` are the guards that fell together at its
+  !> end; `ended` says that the flight is over, `failed` that no step is small enough.
+  pure subroutine step_flight(machine, flight, state, until, path, fallen, ended, failed, watch)
+    type(jointed_t), intent(in) :: machine
+    type(marched_flight_t), intent(inout) :: flight
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(in) :: until
+    type(path_t), intent(inout) :: path
+    logical, intent(out) :: fallen(most_guards), ended, failed
+    type(watch_t), intent(inout) :: watch
+    real(wp) :: before(most_guards), y(2*machine%n)
+    integer :: fell, g, n
+    n = machine%n
+    y = flight%march%y(:2*n)
+    do g = 1, flight%count_guards
+      before(g) = value_of(flight, g, flight%march%time, y)
+    end do
+    call take_step(flight%march, flight%system, flight%guards(:flight%count_guards), until - flight%system%start, fell)
+    watch%evaluations = watch%evaluations + 1
+    fallen = .false.
+    failed = fell == march_failed
+    ended = fell /= march_goes_on
+    y = flight%march%y(:2*n)
+    if (fell > 0) then
+      do g = 1, flight%count_guards
+        if (before(g) > rounding*flight%size_of_guard(g)) fallen(g) = value_of(flight, g, flight%march%time, y) <= &
+                                                                      rounding*flight%size_of_guard(g)
+      end do
+      fallen(fell) = .true.
+    end if
+    path%start = flight%system%start + flight%march%from
+    path%length = 0
+    if (flight%march%fraction > 0) then
+      path%length = flight%march%length
+      if (.not. allocated(path%step)) allocate (path%step(0:degree, 2*n))
+      path%step(:, :) = flight%march%path(:, :2*n)
+      path%step(0, :n) = path%step(0, :n) + flight%origin
+      call look_along(machine, path, flight%march%fraction, watch)
+    end if
+    state%q(:n) = flight%origin + y(:n)
+    state%v(:n) = y(n + 1:)
+    state%time = flight%system%start + flight%march%time
+    if (fell == march_time_over) state%time = until
+  end subroutine step_flight
+
+  !> Value of a guard.
+  pure real(wp) function value_of(flight, g, time, y)
+    type(marched_flight_t), intent(in) :: flight
+    integer, intent(in) :: g
+    real(wp), intent(in) :: time, y(:)
+    value_of = flight%system%margin(g, time, y)
+  end function value_of
+
+  !> Extremes of the watched coordinate on a step up to a fraction of it.
+  pure subroutine look_along(machine, path, fraction, watch)
+    type(jointed_t), intent(in) :: machine
+    type(path_t), intent(in) :: path
+    real(wp), intent(in) :: fraction
+    type(watch_t), intent(inout) :: watch
+    real(wp) :: p(0:degree)
+    p = path%step(:, machine%watched)
+    watch%extremes(2) = max(watch%extremes(2), maximum_until(p, fraction))
+    watch%extremes(1) = min(watch%extremes(1), -maximum_until(-p, fraction))
+    if (.not. watch%wants_speed) return
+    watch%top_speed = max(watch%top_speed, maximum_until(path%step(:, machine%n + machine%watched), fraction))
+  end subroutine look_along
+
+end module marched_flight

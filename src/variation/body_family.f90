@@ -1,0 +1,188 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> One body over a parameter of its laws, and the stroboscopic map of it with derivatives by the start and by the parameter.
+module body_family
+  use body_events, only: events_of_body
+  use build_motion, only: machine_of
+  use errors, only: error_t, fail
+  use hybrid_machine, only: event_t
+  use kinds, only: wp
+  use law_table, only: change_parameter, law_choice_t
+  use motion, only: advance_period, motion_t, start_state
+  use motion_state, only: log_t, open_log, options_t, reset_tally, state_t, tally_t
+  use one_body, only: has_variation, mode_of_body, one_body_of, one_body_t
+  use status, only: exit_bad_case
+  use variations, only: by_difference, neighbourhood_t, stencil_offset, vary
+  implicit none
+  private
+
+  public :: body_neighbourhood, body_of_family, map_with_variation, size_of_motion, vary_period
+
+  !> Distance of the neighbours, as a share of the parameter's size.
+  real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
+  !> The flights lead from event to event to this share of the size of the motion, or the variation is not known.
+  real(wp), parameter :: likeness = 1e-6_wp
+
+  !> A machine whose parameter `path` of the laws may be changed; no path: it has none.
+  type, public :: family_t
+    type(law_choice_t), allocatable :: laws(:)
+    character(len=:), allocatable :: path
+    type(options_t) :: options
+    !> Range of the parameter: its neighbours stay in it.
+    real(wp) :: lowest = -huge(1.0_wp), highest = huge(1.0_wp)
+    !> Size of the parameter below which steps do not shrink.
+    real(wp) :: parameter_size = 1
+    !> Sizes of x and v, the same for all machines; 0: each has its own.
+    real(wp) :: sizes(2) = 0
+  end type family_t
+
+contains
+
+  !> Half range of x [m] that the drive alone brings about, at least a thousandth of the length that the forces stretch the
+  !> spring by: a size for differences, never 0.
+  pure real(wp) function size_of_motion(moving) result(length)
+    type(motion_t), intent(in) :: moving
+    length = 1
+    associate (machine => moving%machine)
+      if (machine%restoring%stiffness > 0) length = machine%force_scale/machine%restoring%stiffness
+      length = max(length, sum(abs(machine%drive%cosine)) + sum(abs(machine%drive%sine)))
+    end associate
+    if (.not. length > 0) length = 1
+  end function size_of_motion
+
+  !> The machine with the parameter at `value`. Code 65 if it cannot be built or its variations are not known.
+  pure subroutine body_of_family(family, value, body, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    type(one_body_t), intent(out) :: body
+    type(error_t), allocatable, intent(out) :: error
+    type(law_choice_t), allocatable :: laws(:)
+    type(motion_t) :: moving
+    logical :: known
+    laws = family%laws
+    if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
+    call machine_of(laws, family%options, moving, error)
+    if (allocated(error)) return
+    if (.not. has_variation(moving)) then
+      call fail(error, exit_bad_case, 'body.law, effect.dahl, drive.law, contact.law: variations are known of one body without '// &
+                'Dahl friction, a measured force, or a damping that each impact sets')
+      return
+    end if
+    body = one_body_of(moving, merge(family%sizes(1), size_of_motion(moving), family%sizes(1) > 0))
+    if (family%sizes(2) > 0) body%size_of(2) = family%sizes(2)
+  end subroutine body_of_family
+
+  !> The machine and its neighbours in the parameter.
+  pure subroutine body_neighbourhood(family, value, machines, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    type(neighbourhood_t), intent(out) :: machines
+    type(error_t), allocatable, intent(out) :: error
+    type(one_body_t) :: centre, near(4)
+    integer :: i, side, sides(3)
+    call body_of_family(family, value, centre, error)
+    if (allocated(error)) return
+    allocate (machines%centre, source=centre)
+    if (.not. allocated(family%path)) return
+    machines%step = share*max(abs(value), family%parameter_size)
+    sides = [0, 1, -1]
+    do side = 1, 3
+      machines%side = sides(side)
+      if (allocated(error)) deallocate (error)
+      do i = 1, 4
+        associate (there => value + stencil_offset(machines%side, i)*machines%step)
+          if (there < family%lowest .or. there > family%highest) then
+            call fail(error, exit_bad_case, 'parameter out of its range')
+          else
+            call body_of_family(family, there, near(i), error)
+          end if
+        end associate
+        if (allocated(error)) exit
+        ! The same difference steps in all.
+        near(i)%size_of = centre%size_of
+        near(i)%step_of = centre%step_of
+      end do
+      if (.not. allocated(error)) exit
+    end do
+    if (allocated(error)) return
+    allocate (machines%near, source=near)
+  end subroutine body_neighbourhood
+
+  !> Image of a section point after `periods` drive periods, its derivatives by the point (and by the parameter), and the
+  !> events on the way. `ok` is false if the trajectory had to be given up or the derivatives are not known.
+  pure subroutine map_with_variation(machines, point, periods, image, by_start, tally, ok, by_parameter)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(2)
+    integer, intent(in) :: periods
+    real(wp), intent(out) :: image(2), by_start(2, 2)
+    type(tally_t), intent(out) :: tally
+    logical, intent(out) :: ok
+    real(wp), intent(out), optional :: by_parameter(2)
+    type(state_t) :: start, state
+    type(event_t), allocatable :: events(:)
+    type(log_t) :: log
+    integer :: i, reason, mode
+    by_start = 0
+    if (present(by_parameter)) by_parameter = 0
+    image = point
+    ok = .false.
+    select type (body => machines%centre)
+    type is (one_body_t)
+      call open_log(log, 0.0_wp)
+      log%book%kept = .false.
+      start = start_state(body%moving, point(1), point(2), 0.0_wp)
+      state = start
+      call reset_tally(tally, state, .false.)
+      do i = 1, periods
+        call advance_period(body%moving, state, tally, reason, log)
+        if (reason /= 0) return
+      end do
+      image = [state%x, state%v]
+      call events_of_body(body, start, log, state, .false., events, mode)
+      call vary(machines, mode_of_body(body, start), point, events, periods*body%period, likeness*body%size_of*max(1, periods), &
+                by_start, ok, by_parameter)
+      ! The section comes when the drive has turned, and that may depend on the parameter.
+      if (present(by_parameter)) by_parameter = by_parameter + periods*period_slope(machines)* &
+        body%slope(mode, periods*body%period, image)
+    end select
+  end subroutine map_with_variation
+
+  !> Moves a body from one section to the next: derivatives of its state there by that before, and the events on the way. `log` is
+  !> the caller's, opened once, and holds them too. `ok` is false if the trajectory had to be given up or the derivatives
+  !> are not known.
+  pure subroutine vary_period(machines, body, state, log, events, by_start, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    type(one_body_t), intent(in) :: body
+    type(state_t), intent(inout) :: state
+    type(log_t), intent(inout) :: log
+    type(event_t), allocatable, intent(out) :: events(:)
+    real(wp), intent(out) :: by_start(2, 2)
+    logical, intent(out) :: ok
+    type(state_t) :: start
+    type(tally_t) :: tally
+    integer :: reason, mode
+    by_start = 0
+    log%events = 0
+    log%origin = 0
+    start = state
+    call advance_period(body%moving, state, tally, reason, log)
+    ok = reason == 0
+    if (.not. ok) return
+    call events_of_body(body, start, log, state, .false., events, mode)
+    call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok)
+  end subroutine vary_period
+
+  !> Derivative of the period by the parameter.
+  pure real(wp) function period_slope(machines) result(slope)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp) :: near(1, 4), value(1)
+    integer :: i
+    do i = 1, 4
+      near(1, i) = machines%near(i)%period
+    end do
+    value = by_difference(machines, [machines%centre%period], near)
+    slope = value(1)
+  end function period_slope
+
+end module body_family

@@ -1,0 +1,158 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> How a motion changes with its start and with a parameter: derivatives of the flights, multiplied by a saltation at every
+!> event. With the guard g, the jump R and the slopes f before and after an event, dt = -(g_y dy + g_p)/(g_y f + g_t) is
+!> how much later it comes, and behind it dy+ = R_y (dy + f dt) + R_t dt + R_p - f+ dt (Aizerman and Gantmakher 1958; di
+!> Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, section 2.5).
+module variations
+  use hybrid_machine, only: event_t, hybrid_t
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: vary, by_difference, stencil_offset
+
+  !> Where the machines next to one are, in steps of the parameter, and what their results weigh in the derivative, times the
+  !> step: central, or one-sided where the parameter can go no further. Of fourth order.
+  real(wp), parameter :: offset_of(4, -1:1) = reshape([-1.0_wp, -2.0_wp, -3.0_wp, -4.0_wp, -2.0_wp, -1.0_wp, 1.0_wp, 2.0_wp, &
+    1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], [4, 3])
+  real(wp), parameter :: weight_of(4, -1:1) = reshape([-48.0_wp, 36.0_wp, -16.0_wp, 3.0_wp, 1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp, &
+    48.0_wp, -36.0_wp, 16.0_wp, -3.0_wp], [4, 3])/12
+  real(wp), parameter :: own_weight(-1:1) = [25.0_wp, 0.0_wp, -25.0_wp]/12
+
+  !> A machine and, for derivatives by a parameter, its four neighbours.
+  type, public :: neighbourhood_t
+    class(hybrid_t), allocatable :: centre, near(:)
+    !> Distance of the neighbours in the parameter; `side` -1, 0 or 1 tells which stencil they make.
+    real(wp) :: step = 1
+    integer :: side = 0
+  end type neighbourhood_t
+
+contains
+
+  !> Offset of the neighbour `i` in steps.
+  pure real(wp) function stencil_offset(side, i)
+    integer, intent(in) :: side, i
+    stencil_offset = offset_of(i, side)
+  end function stencil_offset
+
+  !> The derivative by the parameter of what is `own` of the machine and `near` of its neighbours (columns).
+  pure function by_difference(machines, own, near) result(slope)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: own(:), near(:, :)
+    real(wp) :: slope(size(own))
+    slope = (own_weight(machines%side)*own + matmul(near, weight_of(:, machines%side)))/machines%step
+  end function by_difference
+
+  !> Derivatives of the state at `t_end` [s] of the motion that starts at the section in `mode` with `y` and has `events`:
+  !> by the start in `by_start`, by the parameter in `by_parameter`. `ok` is false if the flights do not lead from event to event
+  !> within `tolerance` (in each coordinate), or where an event is met tangentially.
+  pure subroutine vary(machines, mode, y, events, t_end, tolerance, by_start, ok, by_parameter)
+    type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: y(:), t_end, tolerance(:)
+    type(event_t), intent(in) :: events(:)
+    real(wp), intent(out) :: by_start(:, :)
+    logical, intent(out) :: ok
+    real(wp), intent(out), optional :: by_parameter(:)
+    real(wp), dimension(size(y), size(y) + 1) :: change
+    real(wp), dimension(size(y)) :: state, reached
+    real(wp) :: time
+    integer :: i, n, now
+    logical :: forgets
+    n = size(y)
+    ok = .true.
+    state = y
+    time = 0
+    now = mode
+    change = 0
+    ! What a start at rest may change is what the rest lets it.
+    call machines%centre%fly(now, time, state, time, reached, change(:, :n))
+    do i = 1, size(events) + 1
+      if (i <= size(events)) then
+        call cross_flight(machines, now, state, time, min(events(i)%time, t_end), change, reached, present(by_parameter))
+        call salt(machines, events(i), change, present(by_parameter), forgets, ok)
+        ! What is forgotten need not be followed.
+        ok = ok .and. (forgets .or. all(abs(reached - events(i)%arrival(:n)) <= tolerance))
+        if (.not. ok) return
+        state = events(i)%departure(:n)
+        time = min(events(i)%time, t_end)
+        now = events(i)%after
+      else
+        call cross_flight(machines, now, state, time, t_end, change, reached, present(by_parameter))
+      end if
+    end do
+    by_start = change(:, :n)
+    if (present(by_parameter)) by_parameter = change(:, n + 1)
+    ok = all(abs(change) <= huge(1.0_wp))
+  end subroutine vary
+
+  !> Takes the variations along a flight.
+  pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter)
+    type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: y(:), t0, t1
+    real(wp), intent(inout) :: change(:, :)
+    real(wp), intent(out) :: reached(:)
+    logical, intent(in) :: with_parameter
+    real(wp) :: flight(size(y), size(y)), unused(size(y), size(y)), near(size(y), 4)
+    integer :: i, n
+    n = size(y)
+    call machines%centre%fly(mode, t0, y, t1, reached, flight)
+    change = matmul(flight, change)
+    if (.not. with_parameter) return
+    do i = 1, 4
+      call machines%near(i)%fly(mode, t0, y, t1, near(:, i), unused)
+    end do
+    change(:, n + 1) = change(:, n + 1) + by_difference(machines, reached, near)
+  end subroutine cross_flight
+
+  !> Takes the variations across an event. `forgets`: the state after it is the same whatever came before, and lasts.
+  pure subroutine salt(machines, event, change, with_parameter, forgets, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    type(event_t), intent(in) :: event
+    real(wp), intent(inout) :: change(:, :)
+    logical, intent(in) :: with_parameter
+    logical, intent(out) :: forgets, ok
+    real(wp), dimension(size(change, 1)) :: before, after, jumped, g_y, r_t, unused_y
+    real(wp) :: r_y(size(change, 1), size(change, 1)), later(size(change, 2)), value(1), values(1, 4), g_t, unused_t, rate
+    real(wp) :: jumps(size(change, 1), 4), by_parameter(size(change, 1)), guard_by_parameter(1), unused(size(change, 1), &
+      size(change, 1))
+    integer :: i, k, n
+    n = size(change, 1)
+    by_parameter = 0
+    guard_by_parameter = 0
+    associate (t => event%time, y => event%arrival(:n))
+      before = machines%centre%slope(event%before, t, y)
+      after = machines%centre%slope(event%after, t, event%departure(:n))
+      call machines%centre%guard(event, t, y, value(1), g_y, g_t)
+      call machines%centre%jump(event, t, y, jumped, r_y, r_t)
+      if (with_parameter) then
+        do i = 1, 4
+          call machines%near(i)%guard(event, t, y, values(1, i), unused_y, unused_t)
+          call machines%near(i)%jump(event, t, y, jumps(:, i), unused, unused_y)
+        end do
+        guard_by_parameter = by_difference(machines, value, values)
+        by_parameter = by_difference(machines, jumped, jumps)
+      end if
+    end associate
+    forgets = .not. (any(abs(r_y) > 0) .or. any(abs(after) > 0))
+    if (forgets) then
+      change = 0
+      change(:, n + 1) = by_parameter
+      ok = .true.
+      return
+    end if
+    rate = sum(g_y*before) + g_t
+    ok = abs(rate) > 0
+    if (.not. ok) return
+    later = -matmul(g_y, change)/rate
+    later(n + 1) = later(n + 1) - guard_by_parameter(1)/rate
+    do k = 1, n + 1
+      change(:, k) = matmul(r_y, change(:, k) + before*later(k)) + (r_t - after)*later(k)
+    end do
+    change(:, n + 1) = change(:, n + 1) + by_parameter
+  end subroutine salt
+
+end module variations

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Machines of several bodies with forces that are not linear: events beside those of another simulator."""
+
+import csv
+import sys
+from math import cos, exp, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import succeed
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "referee"))
+from structures import Friction, Rigid, Soft, Structure
+
+TIES = """
+[body.first]
+mass = 1
+[body.second]
+mass = 1.3
+x0 = 0.1
+[start]
+x0 = 0.3
+[drive.force]
+law = "force"
+body = "second"
+amplitude = 0.9
+frequency = 0.8
+[run]
+duration = 12
+window = 8
+[spring.first]
+between = ["first"]
+{spring}
+[spring.coupling]
+between = ["first", "second"]
+stiffness = 1.2
+"""
+STRIBECK = """
+[friction.belt]
+between = ["first"]
+law = "coulomb_stribeck"
+force = 0.6
+static_force = 1
+stribeck_velocity = 0.15
+velocity = 0.2
+[friction.between]
+between = ["first", "second"]
+law = "coulomb_hyperbolic"
+force = 0.1
+static_force = 0.3
+fading_velocity = 0.3
+"""
+HERTZ = """
+[contact.soft]
+between = ["first", "second"]
+law = "hunt_crossley"
+stiffness = 2000
+damping = 0.2
+upper = 0.3
+lower = -0.4
+[friction.ground]
+between = ["first"]
+law = "coulomb_viscous"
+force = 0.05
+damping = 0.1
+"""
+STOP = """
+[contact.stop]
+between = ["first", "second"]
+law = "newton_linear"
+slope = 0.1
+upper = 0.25
+"""
+
+
+def forces(restoring):
+    """Of the two bodies but for the joints."""
+
+    def force(t, q, v):
+        pull = 1.2 * (q[1] - q[0])
+        return np.array([restoring(q[0], v[0]) + pull, -pull + 0.9 * cos(0.8 * t)])
+
+    return force
+
+
+def hertz(p, rate):
+    """Hunt and Crossley's force."""
+    return 2000 * np.sign(p) * abs(p) ** 1.5 * (1 + 0.2 * rate)
+
+
+MACHINES = {
+    "stribeck": (
+        TIES.format(spring="stiffness = 1\ndamping = 0.02") + STRIBECK,
+        lambda: Structure(
+            [1, 1.3],
+            forces(lambda x, v: -x - 0.02 * v),
+            [
+                Friction([1, 0], lambda u: 0.6 + 0.4 * exp(-u / 0.15), 1.0, 0.2),
+                Friction([-1, 1], lambda u: 0.1 + 0.2 / (1 + u / 0.3), 0.3),
+            ],
+        ),
+    ),
+    "double well, hertz": (
+        TIES.format(spring='law = "polynomial"\nstiffness = -1\ncubic = 1\ndamping = 0.6') + HERTZ,
+        lambda: Structure(
+            [1, 1.3],
+            forces(lambda x, v: x - x**3 - 0.6 * v),
+            [Friction([1, 0], lambda u: 0.05 + 0.1 * u, 0.05)],
+            soft=[Soft([-1, 1], 0.3, 1, hertz), Soft([-1, 1], -0.4, -1, hertz)],
+        ),
+    ),
+    "pendulum, stop": (
+        TIES.format(spring='law = "pendulum"\nmoment = 3\ndamping = 0.1') + STOP,
+        lambda: Structure(
+            [1, 1.3],
+            forces(lambda x, v: -3 * sin(x) - 0.1 * v),
+            rigid=[Rigid([-1, 1], 0.25, 1, lambda u: max(0.0, 1 - 0.1 * u))],
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_events_are_those_of_the_referee(separatrix, name, tmp_path):
+    """Every event, in order, to 1e-9 s: scipy locates them no better than its tolerance."""
+    text, build = MACHINES[name]
+    (tmp_path / "case.toml").write_text(text)
+    succeed(separatrix, "trajectory", "case.toml", "--csv", "events.csv", folder=tmp_path)
+    with (tmp_path / "events.csv").open() as file:
+        # What a joint that stops does to another is an event of its own, at the same time.
+        ours = sorted({float(row["time"]) for row in csv.DictReader(file)})
+    referee = build()
+    referee.run([0.3, 0.1], [0.0, 0.0], 12.0)
+    theirs = [at for _, _, at in referee.events]
+    assert len(ours) >= 5
+    assert ours == pytest.approx(theirs, abs=1e-9)

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Machines of several bodies beside closed forms: the quick rows of docs/validation.md."""
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def rows(source_dir):
+    sys.path.insert(0, str(source_dir / "scripts"))
+    yield importlib.import_module("validation_structures")
+    sys.path.remove(str(source_dir / "scripts"))
+
+
+@pytest.mark.parametrize("name", ["nonsmooth_modes", "others"])
+def test_numbers_agree(rows, separatrix, build_dir, tmp_path, name):
+    found = getattr(rows, name)(rows.Program(build_dir, tmp_path))
+    assert len(found) == 3
+    assert [number for number in found if number.verdict != "agrees"] == []
+
+
+def test_the_quadratic_gives_orbits_that_come_back(rows):
+    """The closed form, by steps of the other simulator: after a period the same state, but for the impact."""
+    coupled, damping = np.array([[2, -1], [-1, 1]]), np.diag([0.5, 0.0])
+    force, row, frequency = np.array([1, 0]), np.array([0, 1]), 0.6
+    found = rows.orbits(frequency, np.eye(2), damping, coupled, force, row, 1, 0.8)
+    speed, phase, place, velocity = max(found, key=lambda one: one[0])
+    assert speed == pytest.approx(1.418642594893, abs=1e-11)
+    machine = rows.Structure(
+        [1, 1], lambda t, q, v: -coupled @ q - damping @ v + force * np.cos(frequency * t)
+    )
+    start = phase / frequency
+    end = machine.run(place, velocity, start + 2 * np.pi / frequency, start)
+    assert end[:2] == pytest.approx(place, abs=1e-9)
+    assert end[3] == pytest.approx(speed, abs=1e-9)
+    assert velocity[1] == pytest.approx(-0.8 * speed, abs=1e-12)
+
+
+def test_a_number_that_is_off_is_told(rows):
+    one = rows.Number("somebody", "speed", 1.0, 1.1, 1e-9)
+    assert one.verdict == "DIFFERS"
+    assert "**DIFFERS**" in rows.section([one])
