@@ -98,7 +98,7 @@ def reached(results: list[RowResult]) -> str:
 def against(result: RowResult, name: str, what: str) -> str:
     """A number of an agreement, if there is one."""
     found = result.agreements.get(name)
-    if found is None:
+    if found is None or found.points == 0:
         return ""
     if what == "deviation":
         return f"{found.deviation:.1e}"

@@ -110,8 +110,8 @@ class RowBench:
             truth = run_on_all_cores(self.reference, self.program.program, starts, self.case, sizes.share)
             found["ours"] = compare(self.points(starts), truth)
             for name, driver in self.peers.items():
-                size = min(len(starts), self.count(name)) // BATCH * BATCH
-                found[name] = compare(driver.run(starts[:size]), truth)
+                size = max(BATCH, min(len(starts), self.count(name)) // BATCH * BATCH)
+                found[name] = compare(driver.run(start_points(size)), truth)
         starts = self.row.starts(sizes.single)
         found["single"] = compare(self.points(starts), self.points(starts, *ONE_BY_ONE))
         with (

@@ -278,12 +278,16 @@ void fly_in_series(const lane_machine &m, int first, lane_batch &batch) {
     vec barrier = pick(upward, m.upper, m.lower);
     expansion p;
     expand(m, g, within, p);
-    vec length = step_length(m, p), ahead = g.until - g.time;
+    vec length = step_length(m, p), ahead = g.until - g.time, room = speed_room(m.law, g, within);
+    vec longest = room / (magnitude(p.v[1]) + 1e-290);
+    put(length, longest < length, longest);
     put(length, limit < length, limit);
     mask last = length >= ahead;
     put(length, last, ahead);
     stride_of_lanes t = look_for_events(m, p, flying, within, barrier, length, g);
     mask proven = flying & ~t.lost & positive_until(t.fall, flying, t.end);
+    if (any(flying & (room < 1e299)))
+      proven = proven & keeps_within(t.fall, t.end, room);
     // At a barrier that it moves towards, a body hits at once.
     left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
     proven = proven & ~left;

@@ -16,7 +16,7 @@ namespace {
 enum { order = 18, most_root_rounds = 30 };
 
 // Successive terms of a step shrink by exp(-shrinking); the last is then 2e-14 of the first.
-const double shrinking = 2;
+const double shrinking = 1.75;
 
 // Coefficients of position and velocity in the time since the start of a step.
 struct expansion {
@@ -164,14 +164,41 @@ inline void expand(const lane_machine &m, const lane_group &g, mask within, expa
   p.x[order] = (1.0 / order) * p.v[order - 1];
 }
 
-// Length of a step over which the terms shrink so.
+// Length of a step over which the terms shrink so. The last few are asked, as one may happen to be small.
 inline vec step_length(const lane_machine &m, const expansion &p) {
   const double smallest = 1e-290;
-  vec last = logarithm(magnitude(p.x[order]) + smallest),
-      before = logarithm(magnitude(p.x[order - 1]) + smallest);
-  const double scale = m.law.log_scale;
-  vec a = (1.0 / order) * (scale - last), b = (1.0 / (order - 1)) * (scale - before);
-  return exponential(pick(a < b, a, b) - shrinking);
+  vec least = 1e300;
+  for (int k = order - 3; k <= order; k++) {
+    vec length = (1.0 / k) * (m.law.log_scale - logarithm(magnitude(p.x[k]) + smallest));
+    put(least, length < least, length);
+  }
+  return exponential(least - shrinking);
+}
+
+// How much the speed may change over a step where there is friction E exp(-(v/v_s)^2): the terms of its
+// series grow up to order 2 (v/v_s)^2 before they shrink, so that the last one says little. For |x| <= 0.5
+// what is left out of exp(-(u + x)^2) is below exp(r^2) (0.5/r)^18 = 1e-10 (Cauchy, r = 2.5); above u = 6.2
+// it is nil.
+inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
+  vec room = 1e300;
+  for (int i = 0; i < 2; i++) {
+    if (!(l.excess[i] > 0) || l.exponent[i] < 1.5)
+      continue;
+    vec here = magnitude(g.v) - 6.2 * l.velocity[i];
+    put(here, here < 0.5 * l.velocity[i], 0.5 * l.velocity[i]);
+    put(room, within & (here < room), here);
+  }
+  return room;
+}
+
+// Does the speed keep within that over the step?
+inline mask keeps_within(const vec (&c)[order], vec end, vec room) {
+  vec power = end, sum = {};
+  for (int k = 1; k < order; k++) {
+    sum += magnitude(c[k]) * power;
+    power *= end;
+  }
+  return sum <= 1.5 * room;
 }
 
 // A polynomial over a step, in the fraction of the step, with its derivatives.

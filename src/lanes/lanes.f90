@@ -365,8 +365,8 @@ contains
     end associate
   end subroutine set_layer
 
-  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, barriers that are rigid or whose
-  !> contacts have one. Lanes know no coordinate on a circle.
+  !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, barriers that are rigid or
+  !> whose contacts have one. Lanes know no coordinate on a circle.
   pure subroutine prepare_series(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
