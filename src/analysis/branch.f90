@@ -41,6 +41,8 @@ module branch
   real(wp), parameter :: smallest_step = 1e-7_wp, first_look = 1e-4_wp
   !> A margin within this of 0 is not passed; margins within this of 0 are zero together.
   real(wp), parameter :: no_passage = 1e-11_wp, together = 1e-9_wp
+  !> Nearness to a graze and to a doubling, in speed and multiplier, at the end of a branch.
+  real(wp), parameter :: at_graze = 1e-6_wp, at_doubling = 1e-2_wp
 
   type, public :: point_t
     type(orbit_t) :: orbit
@@ -205,7 +207,7 @@ contains
       end if
     end do
     if (swaps_halves(trace, next)) then
-      call end_at_parent(family, trace, next, length, points, ending)
+      call end_at_parent(family, trace, length, points, ending)
       return
     end if
     if (leaves_range(plan, next%now%orbit%parameter)) then
@@ -252,24 +254,27 @@ contains
     if (swaps_halves) swaps_halves = sum(halves_differ(trace)*halves_differ(next)) < 0
   end function swaps_halves
 
-  !> The end of a branch at the doubling in which it began.
-  subroutine end_at_parent(family, trace, next, length, points, ending)
+  !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze.
+  subroutine end_at_parent(family, trace, length, points, ending)
     type(family_t), intent(in) :: family
-    type(trace_t), intent(in) :: trace, next
+    type(trace_t), intent(in) :: trace
     real(wp), intent(in) :: length
     type(point_t), allocatable, intent(inout) :: points(:)
     integer, intent(out) :: ending
-    type(trace_t) :: there
+    type(trace_t) :: there, tried
     real(wp) :: low, high, middle
     logical :: ok
     integer :: i, steps
-    ending = label_pd
+    ending = label_not_known
+    there = trace
     low = 0
     high = length
     do i = 1, most_secants
       middle = (low + high)/2
-      call step_to(family, trace, middle, there, ok, steps)
-      if (.not. ok) return
+      call step_to(family, trace, middle, tried, ok, steps)
+      ! At the end itself the equations are singular.
+      if (.not. ok) exit
+      there = tried
       if (sum(halves_differ(trace)*halves_differ(there)) < 0) then
         high = middle
       else
@@ -277,8 +282,14 @@ contains
       end if
       if (high - low <= 4*spacing(high)) exit
     end do
-    if (next%now%orbit%periods /= there%now%orbit%periods) return
-    there%now%label = label_pd
+    ending = label_pd
+    ! It began in a graze, or in a doubling, where the orbit of twice the period has a multiplier +1.
+    if (any(there%margins%list%kind == of_impact .and. abs(there%margins%list%value) < at_graze)) then
+      ending = label_gr
+    else if (minval(abs(there%now%orbit%multipliers - 1)) > at_doubling) then
+      ending = label_not_known
+    end if
+    there%now%label = ending
     points = [points, there%now]
   end subroutine end_at_parent
 
