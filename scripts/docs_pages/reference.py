@@ -16,7 +16,6 @@ FAMILIES = {
     "body": "Bodies", "restoring": "Restoring forces", "friction": "Friction", "contact": "Contacts",
     "drive": "Drives", "part": "Parts of a machine of several bodies",
 }  # fmt: skip
-COMMANDS = ("basin", "sweep", "trajectory", "points", "merge", "laws", "info", "verify")
 TOOLS = ("separatrix-figures", "separatrix-view", "separatrix-discover", "separatrix-structure")
 # one of each kind of file, small
 RUNS = {
@@ -126,7 +125,7 @@ def _commands(program: Path, tools: Path) -> str:
     text = "# Commands\n\nWhat each prints with `--help`.\n\n## separatrix\n\n" + _block(
         _said(program, "--help")
     )
-    for command in COMMANDS:
+    for command in re.findall(r"^  ([a-z]+) ", _said(program, "--help").split("Options:")[0], re.MULTILINE):
         text += f"\n## separatrix {command}\n\n" + _block(_said(program, command, "--help"))
     for tool in TOOLS:
         text += f"\n## {tool}\n\n" + _block(_said(tools / tool, "--help"))
