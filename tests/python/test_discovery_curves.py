@@ -149,8 +149,6 @@ def test_a_restitution_that_is_a_power_of_the_speed_is_found_as_a_function():
     at, value = np.array(found["at"]), np.array(found["value"])
     inside = at > 0.3
     assert np.allclose(value[inside], 0.5 * at[inside] ** -0.25, rtol=0.03)
-    assert verdict["function"]["closed_forms"]["power"]["fits"]
-    assert not verdict["function"]["closed_forms"]["linear"]["fits"]
     assert min(one["closed"] for one in verdict["remains"]) > 0.98
 
 
