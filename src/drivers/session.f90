@@ -77,7 +77,8 @@ contains
     call session%journal%open_copy(command%log, error)
     call session%stop_if(error)
     ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
-    if (command%name /= 'trajectory') call install_signals(error)
+    ! What has nothing to resume ends at once.
+    if (.not. any(command%name == [character(len=10) :: 'trajectory', 'branches', 'stability'])) call install_signals(error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
                                                    wants_sweep=command%name == 'sweep', structure_file=read_structure_file)

@@ -84,3 +84,15 @@ def test_a_parameter_without_effect_has_straight_branches(run):
             chosen = result["branch"].values == number
             assert np.ptp(result["x"].values[chosen]) < 1e-9
         assert set(decode_flags(result["label"]).values) == {"none", "end_of_range"}
+
+
+def test_a_signal_ends_it(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
+    """Nothing is kept that could be resumed."""
+    process = subprocess.Popen(
+        [separatrix, "branches", source_dir / "examples" / "sweep_stribeck.toml", "--parameter", "drive.ratio", "-q"],
+        cwd=tmp_path,
+    )
+    time.sleep(0.5)
+    process.terminate()
+    assert process.wait(10) == -signal.SIGTERM
+    assert list(tmp_path.iterdir()) == []
