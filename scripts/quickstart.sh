@@ -27,7 +27,7 @@ source scripts/environment.sh
 
 echo "quickstart: 2/5 building the program and its library in build/"
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release
-cmake --build build -j "$(nproc)" --target separatrix separatrix_library
+cmake --build build -j "$(env -u OMP_NUM_THREADS nproc)" --target separatrix separatrix_library
 
 mkdir -p out
 echo "quickstart: 3/5 basin map: where each initial condition ends up (out/basin_coulomb.h5)"

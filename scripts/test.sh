@@ -10,7 +10,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 scripts/bootstrap.sh --browser --docs
 # shellcheck source=scripts/environment.sh
 source scripts/environment.sh
-jobs=$(nproc)
+# environment.sh asks for one thread a process, which nproc would count as the cores.
+jobs=$(env -u OMP_NUM_THREADS nproc)
 status=0
 
 # Layers whose serial build differs from the MPI build, and what they stand on.
