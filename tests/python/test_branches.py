@@ -3,7 +3,9 @@
 """The command `branches`: its file, its log, its figure, and what it refuses."""
 
 import json
+import signal
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +91,14 @@ def test_a_parameter_without_effect_has_straight_branches(run):
 def test_a_signal_ends_it(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
     """Nothing is kept that could be resumed."""
     process = subprocess.Popen(
-        [separatrix, "branches", source_dir / "examples" / "sweep_stribeck.toml", "--parameter", "drive.ratio", "-q"],
+        [
+            separatrix,
+            "branches",
+            source_dir / "examples" / "sweep_stribeck.toml",
+            "--parameter",
+            "drive.ratio",
+            "-q",
+        ],
         cwd=tmp_path,
     )
     time.sleep(0.5)
