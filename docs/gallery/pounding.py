@@ -34,5 +34,5 @@ result = sx.basin(case, x0=(-0.1, 0.06, points), v0=(-2.0, 2.0, points))
 print(result.separatrix.attractors[["share", "regime", "period", "amplitude"]].to_string())
 print(f"without a label: {np.mean(result.attractor.values == 0):.2%}")
 result.separatrix.save(
-    "pounding", formats=["png"], shade=True, units=["mm"], size=(130, 90), caption="none", dpi=180
+    "pounding", formats=["png"], shade=True, units=["mm"], size=(130, 90), caption="full", dpi=180
 )

@@ -4,7 +4,8 @@
 
 The basins of the oscillator at twelve ratios of the drive, four per cent from the first to the last. A
 single motion takes all, until the petals of period 3 open all at once: a fold. Then that motion doubles
-its period to 6, to 12, and becomes chaotic. A machine that is safe at one speed may not be at the next.
+its period to 6, to 12, and becomes chaotic. One step on it is gone, and the single motion takes all again.
+A machine that is safe at one speed may not be at the next.
 """
 
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 import separatrix as sx
 
 points = int(sys.argv[1]) if sys.argv[1:] else 200
-ratios = np.linspace(2.535, 2.645, 12).round(3)
+ratios = np.linspace(2.545, 2.655, 12).round(3)
 result = sx.basin("petals.toml", {"drive.ratio": ratios}, x0=points, v0=points)
 table = result.separatrix.attractors.reset_index()
 for index, group in table.groupby("slice"):

@@ -110,8 +110,8 @@ class Accessor:
         `save` in several formats.
 
         `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
-        slice={"drive.ratio": 1.2}, axes=("v0", "x0"), units=["mm"], shade=True, attractors=False,
-        colours=[...], colour_map, limits, size=(120, 90), caption="short".
+        slice={"drive.ratio": 1.2}, inset={"x0": (0, 0.1), "v0": (-1, 1)}, axes=("v0", "x0"), units=["mm"],
+        shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
         from separatrix.figures import basin, points, sweep, trajectory

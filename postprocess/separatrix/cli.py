@@ -129,6 +129,7 @@ def _look(options: argparse.Namespace) -> Look:
     return Look(
         region=options.region,
         slice=options.slice,
+        inset=options.inset,
         axes=options.axes,
         units=options.units,
         shade=options.shade,
@@ -201,6 +202,13 @@ def _add_looks(parser: Parser) -> None:
         type=pairs(ranges=False),
         default={},
         help="show one value of axes, the nearest",
+    )
+    looks.add_argument(
+        "--inset",
+        metavar="NAME=A:B,NAME=A:B",
+        type=pairs(ranges=True),
+        default={},
+        help="basin files: draw this part of the map once more, larger, beside it",
     )
     looks.add_argument(
         "--axes", metavar="ACROSS,UP", type=two_names, help="basin files: the axes of the map [x0,v0]"

@@ -6,6 +6,7 @@ import importlib.machinery
 import itertools
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +110,41 @@ def test_ranges_slices_axes_and_units_show_the_same_points(tmp_path: Path) -> No
     shown = attractor[inside, :, 1]
     share = f"({100 * np.mean(shown == 1):.1f}"
     assert legend_texts(figure)[0].split(": ")[1].find(share) > 0
+
+
+def test_an_inset_shows_the_colours_of_the_map_beside_it(tmp_path: Path) -> None:
+    path, attractor = stack(tmp_path / "b.h5")
+    ranges = {"x0": (-0.5, 0.6), "v0": (-3.0, 3.0)}
+    look = Look(slice={"drive.ratio": 1.2}, units=["mm"], inset=ranges, colours=["red", "lime", "blue"])
+    figure = drawn(path, look)
+    main, inset = figure.axes
+    assert legend_texts(figure) == legend_texts(drawn(path, replace(look, inset={})))
+    xs, vs = (
+        axis[(axis >= low) & (axis <= high)]
+        for axis, (low, high) in zip((X0, V0), ranges.values(), strict=True)
+    )
+    for x, v in itertools.product(xs, vs):
+        expected = np.eye(3)[attractor[list(X0).index(x), list(V0).index(v), 1] - 1]
+        assert colour_at(figure, 1000 * x, v, panel=1) == pytest.approx(expected, abs=0.01)
+    half = 500 * (X0[1] - X0[0]), (V0[1] - V0[0]) / 2
+    assert inset.get_xlim() == pytest.approx((1000 * xs[0] - half[0], 1000 * xs[-1] + half[0]))
+    # the frame on the map is what the inset shows, which lies beside it
+    (box,) = main.patches
+    assert box.get_bbox().get_points() == pytest.approx(np.array([inset.get_xlim(), inset.get_ylim()]).T)
+    assert main.get_tightbbox().x1 < inset.get_tightbbox().x0
+    assert f"right: the part framed, {xs.size * vs.size} points" in figure.separatrix_caption
+
+
+@pytest.mark.parametrize("field", ["attractor", "settle_time"])
+def test_an_inset_has_the_shades_and_the_scale_of_its_map(tmp_path: Path, field: str) -> None:
+    times = np.random.default_rng(2).random((7, 4))
+    times[3, 1] = np.nan
+    attractor = np.random.default_rng(3).integers(1, 3, (7, 4))
+    path = write_basin(tmp_path / "b.h5", {"x0": X0, "v0": V0}, attractor, fields={"settle_time": times})
+    ranges = {"x0": (-0.5, 0.6), "v0": (-3.0, 7.0)}
+    figure = drawn(path, Look(shade=True, attractors=False, inset=ranges), field)
+    for x, v in itertools.product(X0[(X0 >= -0.5) & (X0 <= 0.6)], V0[V0 >= -3]):
+        assert colour_at(figure, x, v, panel=1) == pytest.approx(colour_at(figure, x, v), abs=0.01)
 
 
 def test_shading_keeps_the_hue_and_gets_darker_with_time(tmp_path: Path) -> None:
@@ -229,6 +265,17 @@ def test_runs_that_agree_are_drawn_as_one(tmp_path: Path) -> None:
         (["--size", "5x5"], "allowed 10 to 1000 mm"),
         (["--style", "absent.mplstyle"], "no style of matplotlib"),
         (["--animate", "x1"], "found the axes"),
+        (["--inset", "x0=-0.5:0.5,v0=-3:3"], "inset: found 3 maps in the figure, allowed one"),
+        (
+            ["--inset", "x0=-0.5:0.5", "--slice", "drive.ratio=1.2"],
+            "inset: found x0, allowed the axes x0 and v0",
+        ),
+        (
+            ["--inset", "x0=5:6,v0=-3:3", "--slice", "drive.ratio=1.2"],
+            "inset x0: found 5 to 6, allowed -1 to 0.8",
+        ),
+        (["--inset", "x0=-0.01:0.01,v0=-3:3", "--slice", "drive.ratio=1.2"], "inset x0: found"),
+        (["--inset", "x0=-1:1,v0=-3:3", "--field", "shares"], "inset: not served by the figure of shares"),
     ],
 )
 def test_wishes_that_make_no_sense_are_one_line(

@@ -22,7 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from separatrix import style
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes, recoloured
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import marks, shares
+from separatrix.figures import inset, marks, shares
 from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
@@ -40,6 +40,9 @@ class _Panel:
 
     heading: str
     plane: Plane
+    # of rows and columns of the image
+    edges: tuple[np.ndarray, np.ndarray]
+    settle_time: np.ndarray | None = None
 
 
 def figures(
@@ -50,6 +53,8 @@ def figures(
     Without any label there is no map of the attractors, unless it is asked for; "shares" is their share over
     the parameter of a stack of maps. `path`: the file, which is read by slabs; None: the result is in memory.
     """
+    if look.inset and (field == "shares" or "sample" in result["regime"].dims):
+        raise SeparatrixError("inset: not served by the figure of shares", USAGE)
     if "sample" in result["regime"].dims and field in (None, "shares"):
         return {"shares": shares.sampled(result, title, look)}
     if field == "shares":
@@ -83,28 +88,37 @@ def basin_map(
     path = path if look.whole else None
     down, across = plane_axes(result, look)
     others = [name for name in result[field].dims if name not in (down, across)]
-    places = list(product(*(range(result.sizes[name]) for name in others)))
-    chosen = _spread(places, MOST_PANELS)
-    panels = _read_panels(path, result, field, (down, across), others, chosen)
-
+    places_of_all = list(product(*(range(result.sizes[name]) for name in others)))
+    chosen = _spread(places_of_all, MOST_PANELS)
+    axes, shaded = (down, across), look.shade and field in CLASS_FIELDS and "settle_time" in result
+    panels = _read_panels(path, result, field, axes, others, chosen, shaded)
+    part = inset.enlarged(whole, axes, len(panels), look) if look.inset else None
     figure, grid = _grid(len(panels), 62.0 if down else 22.0, look)
+    # the inset is one more panel, which does not count
+    drawn = panels
+    if part is not None:
+        drawn = panels + _read_panels(None, part, field, axes, others, [(0,) * len(others)], shaded)
     caption = caption_pieces(result, look, [*describe_case(result), *start_pieces(result)])
     handles = []
     if field in CLASS_FIELDS:
-        shades = None
-        if look.shade and "settle_time" in result:
-            shades = _read_panels(path, result, "settle_time", (down, across), others, chosen)
-        handles = _draw_classes(grid, result, field, (down, across), panels, look, shades, totals)
+        handles = _draw_classes(grid, result, field, panels, drawn, look, totals)
     else:
-        _draw_scalar(figure, grid, result, field, (down, across), panels, look)
+        _draw_scalar(figure, grid, result, field, panels, drawn, look)
+    _label(grid[: len(panels)], result, axes)
+    if part is not None:
+        inset.frame(figure, *grid, part, axes)
     if look.attractors and field in ("attractor", "regime", "settle_time") and {down, across} == {"x0", "v0"}:
-        marked = marks.draw(grid, whole, result, across, others, chosen, look)
+        places = chosen + chosen[: len(grid) - len(panels)]
+        marked = marks.draw(grid, whole, result, across, others, places, look)
         handles = [marks.on_legend(handle, marked) for handle in handles]
         caption += ["markers: points of the attractors on the section"] if marked else []
-    caption += _count_caption(result, field, panels, len(places), look)
+    caption += _count_caption(result, field, panels, len(places_of_all), look)
+    if part is not None:
+        caption.append(f"right: the part framed, {count_text(part[field].size)} points")
     if over is not None:
-        marked_panels = _read_panels(None, result, over, (down, across), others, chosen)
-        handles.append(_draw_over(grid, result, (down, across), marked_panels))
+        black = _read_panels(None, result, over, axes, others, chosen)
+        closer = [] if part is None else _read_panels(None, part, over, axes, others, [(0,) * len(others)])
+        handles.append(_draw_over(grid, black, closer))
     compose(figure, title, shown([*caption, plain(version_text(result))], look), handles)
     return figure
 
@@ -151,7 +165,9 @@ def _read_panels(
     axes: tuple,
     others: list[str],
     places: list[tuple],
+    shaded: bool = False,
 ) -> list[_Panel]:
+    """Read a field at places of the other axes, with the settling time where the map is shaded by it."""
     dims = result[field].dims
     panels = []
     with _source(path, result, field) as dataset:
@@ -167,8 +183,22 @@ def _read_panels(
                 data = majority_plane(dataset, plane, place)
             else:
                 data = scalar_plane(dataset, plane, place, smallest=field == "grazing_margin")
-            panels.append(_Panel(heading, data))
+            panels.append(_Panel(heading, data, _edges(result, axes, data)))
+    if shaded:
+        for panel, times in zip(
+            panels, _read_panels(path, result, "settle_time", axes, others, places), strict=True
+        ):
+            panel.settle_time = times.plane.image
     return panels
+
+
+def _edges(result: xr.Dataset, axes: tuple, plane: Plane) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of rows and columns of an image, each cell centred on its point."""
+    found = []
+    for name, starts in zip(axes, (plane.row_starts, plane.column_starts), strict=True):
+        whole = cell_edges(result[name].values) if name else np.array([0.0, 1.0])
+        found.append(np.append(whole[starts], whole[-1]))
+    return found[0], found[1]
 
 
 @contextmanager
@@ -204,7 +234,10 @@ def _spread(places: list, most: int) -> list:
 
 
 def _grid(number: int, height: float, look: Look) -> tuple[Figure, list[Axes]]:
-    """Return a figure with axes for so many panels; a single one has the given height in mm."""
+    """Return a figure with axes for so many panels; a single one has the given height in mm, as its inset."""
+    if number == 1 and look.inset:
+        figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, height)))
+        return figure, list(figure.subplots(1, 2))
     if number == 1:
         figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, height)))
         return figure, [figure.add_subplot()]
@@ -224,10 +257,9 @@ def _draw_classes(
     grid: list[Axes],
     result: xr.Dataset,
     field: str,
-    axes: tuple,
     panels: list[_Panel],
+    drawn: list[_Panel],
     look: Look,
-    shades: list[_Panel] | None,
     totals: dict[int, int] | None,
 ) -> list[Patch]:
     if totals is None:
@@ -237,25 +269,28 @@ def _draw_classes(
                 totals[code] = totals.get(code, 0) + count
     entries = recoloured(classes(result, field, totals), look.colours)
     colours = ListedColormap([entry.colour for entry in entries])
-    for place, (ax, panel) in enumerate(zip(grid, panels, strict=True)):
+    first = drawn[0]
+    by = None
+    if len(drawn) > len(panels) and first.settle_time is not None:
+        by = class_index(first.plane.image, entries), first.settle_time
+    for ax, panel in zip(grid, drawn, strict=True):
         index = class_index(panel.plane.image, entries)
-        if shades is not None:
-            _draw_image(ax, result, axes, panel, marks.shaded(index, entries, shades[place].plane.image))
+        if panel.settle_time is not None:
+            _draw_image(ax, panel, marks.shaded(index, entries, panel.settle_time, by))
         else:
-            image = _draw_image(ax, result, axes, panel, index)
+            image = _draw_image(ax, panel, index)
             image.set_cmap(colours)
             image.set_clim(-0.5, len(entries) - 0.5)
         if len(panels) > 1:
             shares = share_texts(class_counts(entries, panel.plane.counts))
             ax.set_title(f"{panel.heading}\n{_short_shares(shares)}", linespacing=1.3)
-    _label(grid, result, axes)
     shares = share_texts(class_counts(entries, totals))
     return [_patch(entry, share) for entry, share in zip(entries, shares, strict=True)]
 
 
-def _draw_over(grid: list[Axes], result: xr.Dataset, axes: tuple, panels: list[_Panel]) -> Patch:
-    for ax, panel in zip(grid, panels, strict=True):
-        image = _draw_image(ax, result, axes, panel, np.ma.masked_equal(panel.plane.image, 0))
+def _draw_over(grid: list[Axes], panels: list[_Panel], closer: list[_Panel]) -> Patch:
+    for ax, panel in zip(grid, panels + closer, strict=True):
+        image = _draw_image(ax, panel, np.ma.masked_equal(panel.plane.image, 0))
         image.set_cmap(ListedColormap(["black"]))
     counts = [sum(panel.plane.counts.get(code, 0) for panel in panels) for code in (0, 1)]
     return Patch(facecolor="black", label=f"another motion ({100 * counts[1] / sum(counts):.3g} %)")
@@ -275,8 +310,8 @@ def _draw_scalar(
     grid: list[Axes],
     result: xr.Dataset,
     field: str,
-    axes: tuple,
     panels: list[_Panel],
+    drawn: list[_Panel],
     look: Look,
 ) -> None:
     values = np.concatenate([panel.plane.image.ravel() for panel in panels])
@@ -287,13 +322,12 @@ def _draw_scalar(
     low, high = look.limits or (low, high)
     colour_map = _colour_map(look)
     norm = Normalize(low, high)
-    for ax, panel in zip(grid, panels, strict=True):
-        image = _draw_image(ax, result, axes, panel, np.ma.masked_invalid(panel.plane.image))
+    for ax, panel in zip(grid, drawn, strict=True):
+        image = _draw_image(ax, panel, np.ma.masked_invalid(panel.plane.image))
         image.set_cmap(colour_map)
         image.set_norm(norm)
         ax.set_facecolor(style.NOTHING)
         ax.set_title(panel.heading if len(panels) > 1 else "")
-    _label(grid, result, axes)
     below = values.size > 0 and values.min() < low
     above = values.size > 0 and values.max() > high
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
@@ -308,14 +342,10 @@ def _colour_map(look: Look) -> str:
     return name
 
 
-def _draw_image(ax: Axes, result: xr.Dataset, axes: tuple, panel: _Panel, image: np.ndarray) -> object:
-    """Draw an image over the axes of the map, ascending, each cell centred on its point."""
+def _draw_image(ax: Axes, panel: _Panel, image: np.ndarray) -> object:
+    """Draw an image over the axes of the map, ascending."""
     edges = []
-    for dimension, (name, starts) in enumerate(
-        zip(axes, (panel.plane.row_starts, panel.plane.column_starts), strict=True)
-    ):
-        whole = cell_edges(result[name].values) if name else np.array([0.0, 1.0])
-        edge = np.append(whole[starts], whole[-1])
+    for dimension, edge in enumerate(panel.edges):
         if edge[0] > edge[-1]:
             edge, image = edge[::-1], np.flip(image, dimension)
         edges.append(edge)

@@ -11,6 +11,7 @@ import xarray as xr
 
 from separatrix.errors import CaseError
 from separatrix.figures.look import Look
+from separatrix.figures.parts import numbers_of_parts, parts, several_bodies
 from separatrix.library import Model
 
 # symbol and unit of the parameters that matter for a caption, in this order
@@ -74,9 +75,7 @@ def describe_case(result: xr.Dataset) -> list[str]:
     if "driven_mass" in case.get("body", {}):
         return _two_bodies(case, axes)
     if several_bodies(case):
-        joints = len(case.get("friction", {})) + len(case.get("contact", {}))
-        bodies = sum(isinstance(one, dict) for one in case["body"].values())
-        return [f"{bodies} {'body' if bodies == 1 else 'bodies'}, {joints} joint{'' if joints == 1 else 's'}"]
+        return [numbers_of_parts(case)]
     pieces = []
     friction = case.get("friction")
     if isinstance(friction, dict):
@@ -117,12 +116,14 @@ def machine_pieces(result: xr.Dataset) -> list[str]:
         if isinstance(law, dict):
             pieces += _law_pieces(family, law, axes, units)
     if several:
-        pieces += _parts(case, axes)
+        units = {path: raised(unit) for path, unit in units.items()}
+        pieces += parts(case, axes, units)
     for name, effect in case.get("effect", {}).items():
         pieces += _law_pieces(f"effect.{name}", effect, axes, units)
     run = case.get("run", {})
     if "duration" in run:
-        longer = f", at most {run['extension']:g} times that" if result.attrs.get("kind") == "basin" else ""
+        extended = result.attrs.get("kind") == "basin" and run["extension"] > 1
+        longer = f", at most {run['extension']:g} times that" if extended else ""
         pieces.append(f"duration {run['duration']:.6g} s{longer}")
     return pieces
 
@@ -170,34 +171,6 @@ def _units(resolved: str) -> dict[str, str]:
 def raised(unit: str) -> str:
     """Return a unit with its powers raised."""
     return re.sub(r"\^(-?[\d.]+)", lambda power: f"$^{{{power[1]}}}$", unit)
-
-
-def several_bodies(case: dict) -> bool:
-    """Whether a case has tables [body.NAME]."""
-    body = case.get("body")
-    return isinstance(body, dict) and any(isinstance(one, dict) for one in body.values())
-
-
-def _parts(case: dict, axes: set[str]) -> list[str]:
-    """Every part of a machine of several bodies with its numbers, but zeros and what is an axis."""
-    pieces = []
-    for kind in ("body", "spring", "friction", "contact", "drive"):
-        for name, part in case.get(kind, {}).items():
-            if not isinstance(part, dict):
-                continue
-            numbers = [
-                f"{key.replace('_', ' ')} {value:.6g}"
-                for key, value in part.items()
-                if isinstance(value, int | float)
-                and 0 < abs(value) < _HUGE
-                and f"{kind}_{name}_{key}" not in axes
-                and not (key == "static_force" and value == part.get("force"))
-            ]
-            if kind != "body" or numbers:
-                pieces.append(
-                    f"{kind if kind != 'body' else ''} {name}: {', '.join(numbers)}".strip().rstrip(":")
-                )
-    return pieces
 
 
 def _two_bodies(case: dict, axes: set[str]) -> list[str]:

@@ -28,6 +28,8 @@ class Look:
     region: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     #: values of axes to show, by name; the nearest of the result is taken
     slice: Mapping[str, float] = field(default_factory=dict)
+    #: ranges of the two axes of a map that are drawn once more, larger, beside it
+    inset: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     #: which axis is horizontal and which vertical
     axes: tuple[str, str] | None = None
     #: units in the place of the SI units, each for all that has its SI unit
@@ -66,7 +68,7 @@ class Look:
 
     def require(self, kind: str, *served: str) -> None:
         """Refuse wishes that the figures of a kind do not serve."""
-        for name in ("region", "slice", "axes", "units", "shade", "colours", "colour_map", "limits"):
+        for name in ("region", "slice", "inset", "axes", "units", "shade", "colours", "colour_map", "limits"):
             if getattr(self, name) and name not in served:
                 raise SeparatrixError(
                     f"{name.replace('_', ' ')}: not served by the figures of a {kind}", USAGE
@@ -76,8 +78,8 @@ class Look:
         """Return this look at one value of an axis."""
         return replace(self, slice={**self.slice, name: value})
 
-    def selected(self, result: xr.Dataset) -> xr.Dataset:
-        """Return what is to be shown of a result, in the units asked for."""
+    def selected(self, result: xr.Dataset, wish: str = "region") -> xr.Dataset:
+        """Return what is to be shown of a result, in the units asked for; `wish`: its name in errors."""
         places = {}
         for name, value in self.slice.items():
             dim = _axis(result, name)
@@ -88,7 +90,7 @@ class Look:
             inside = np.flatnonzero((result[dim].values >= low) & (result[dim].values <= high))
             if inside.size == 0:
                 ends = f"{result[dim].values.min():g} to {result[dim].values.max():g}"
-                raise SeparatrixError(f"region {name}: found {low:g} to {high:g}, allowed {ends}", USAGE)
+                raise SeparatrixError(f"{wish} {name}: found {low:g} to {high:g}, allowed {ends}", USAGE)
             places[dim] = slice(int(inside[0]), int(inside[-1]) + 1)
         return self._in_units(result.isel(places))
 

@@ -18,18 +18,29 @@ from separatrix.figures.look import Look
 _MARKS = "osD^vP*X"
 
 
-def shaded(index: np.ndarray, entries: list[Class], settle_time: np.ndarray) -> np.ndarray:
+def shaded(
+    index: np.ndarray,
+    entries: list[Class],
+    settle_time: np.ndarray,
+    by: tuple[np.ndarray, np.ndarray] | None = None,
+) -> np.ndarray:
     """Return the colour of each pixel: that of its class, light where it settles early, dark where late.
 
-    The lightness goes by rank within each class, so that every class uses all of it.
+    The lightness goes by rank within each class, so that every class uses all of it. `by`: index and settling
+    time of the image whose ranks count, for a part of it that is to have its colours.
     """
     image = np.empty((*index.shape, 3))
+    ranked, times_ranked = by or (index, settle_time)
     for place, entry in enumerate(entries):
         mine = index == place
         times = settle_time[mine]
-        _, ranks, numbers = np.unique(times, return_inverse=True, return_counts=True)
-        rank = (np.cumsum(numbers) - 0.5 * numbers)[ranks] / max(1, times.size)
-        rank = np.where(np.isfinite(times), rank, 0.5)[:, np.newaxis]
+        values, numbers = np.unique(times_ranked[ranked == place], return_counts=True)
+        ranks = (np.cumsum(numbers) - 0.5 * numbers) / max(1, numbers.sum())
+        known = np.isfinite(values)
+        rank = np.full(times.shape, 0.5)
+        if known.any():
+            rank = np.where(np.isfinite(times), np.interp(times, values[known], ranks[known]), 0.5)
+        rank = rank[:, np.newaxis]
         light, dark = np.clip(0.5 - rank, 0, None) * 2 * 0.6, np.clip(rank - 0.5, 0, None) * 2 * 0.5
         image[mine] = (np.array(to_rgb(entry.colour)) * (1 - light) + light) * (1 - dark)
     return image
