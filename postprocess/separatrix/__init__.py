@@ -34,11 +34,16 @@ if TYPE_CHECKING:
     from separatrix.open import flag_names as flag_names
     from separatrix.open import open_result as open_result
     from separatrix.open import table as table
+    from separatrix.orbits import Stability as Stability
+    from separatrix.orbits import branches as branches
+    from separatrix.orbits import stability as stability
 
 _HOME = {
     "Case": "separatrix.cases",
     "Discovery": "separatrix.discovery.api",
+    "Stability": "separatrix.orbits",
     "basin": "separatrix.maps",
+    "branches": "separatrix.orbits",
     "decode_flags": "separatrix.open",
     "decode_word": "separatrix.open",
     "decode_words": "separatrix.open",
@@ -49,6 +54,7 @@ _HOME = {
     "load": "separatrix.cases",
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
+    "stability": "separatrix.orbits",
     "sweep": "separatrix.maps",
     "table": "separatrix.open",
     "trajectory": "separatrix.motions",

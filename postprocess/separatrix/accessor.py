@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("separatrix")
 class Accessor:
-    """The result of `basin`, `sweep`, `points` or `trajectory`, or of `open_result`."""
+    """The result of `basin`, `sweep`, `points`, `branches` or `trajectory`, or of `open_result`."""
 
     def __init__(self, result: xr.Dataset) -> None:
         """Take any Dataset; what is no result is refused when it is asked."""
@@ -31,7 +31,7 @@ class Accessor:
 
     @property
     def kind(self) -> str:
-        """The kind of result: basin, sweep, points or trajectory."""
+        """The kind of result: basin, sweep, points, branches or trajectory."""
         kind = self._result.attrs.get("kind")
         if kind is None:
             raise SeparatrixError("this Dataset is no result of Separatrix (no attribute kind)", USAGE)
@@ -60,6 +60,23 @@ class Accessor:
         slices = np.unique(catalogue["slice"].values).size
         frame.insert(2, "share", frame["count"] * slices / self._result["attractor"].size)
         return frame.set_index(["slice", "attractor"] if slices > 1 else "attractor")
+
+    @property
+    def labelled_points(self) -> "pandas.DataFrame":
+        """The labelled points of branches: folds, period doublings, grazes, ends of the range, ..."""
+        self._require("branches")
+        found = self._result
+        labels = self.decoded("label").values
+        chosen = np.flatnonzero(labels != "none")
+        columns = ("branch", "parameter", "period", "impacts", "x", "v", "x_min", "x_max")
+        import pandas
+
+        frame = pandas.DataFrame({name: found[name].values[chosen] for name in columns})
+        frame.insert(1, "label", labels[chosen])
+        frame["event_word"] = self.decoded("event_word").values[chosen]
+        multipliers = found["multiplier_real"].values + 1j * found["multiplier_imag"].values
+        frame["multiplier_1"], frame["multiplier_2"] = multipliers[chosen].T
+        return frame.rename(columns={"parameter": str(found.attrs["parameter"])})
 
     def shares(self, field: str = "attractor") -> "pandas.Series":
         """Return the share of the points in each class: attractor, regime, reason, period."""
@@ -106,15 +123,15 @@ class Accessor:
 
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
-        "phase", "energy" and "contact", of points "regime". Notebooks show the figure; `savefig` writes it,
-        `save` in several formats.
+        "phase", "energy" and "contact", of points "regime", of branches "branches". Notebooks show
+        the figure; `savefig` writes it, `save` in several formats.
 
         `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
         slice={"drive.ratio": 1.2}, inset={"x0": (0, 0.1), "v0": (-1, 1)}, axes=("v0", "x0"), units=["mm"],
         shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
-        from separatrix.figures import basin, points, sweep, trajectory
+        from separatrix.figures import basin, branches, points, sweep, trajectory
         from separatrix.labels import plain
 
         kind = self.kind
@@ -124,7 +141,7 @@ class Accessor:
             if kind == "basin":
                 made = basin.figures(None, self._result, name, heading, look)
             else:
-                modules = {"sweep": sweep, "trajectory": trajectory, "points": points}
+                modules = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
                 made = modules[kind].figures(self._result, heading, look)
         if name is not None and name not in made:
             raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)

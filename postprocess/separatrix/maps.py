@@ -149,7 +149,7 @@ def basin(
     Ctrl-C raises `Interrupted`, a KeyboardInterrupt whose `resume()` goes on. What is wrong in the case is a
     `CaseError` with the message of the program.
     """
-    case = _with_axes(as_case(case), {**(axes or {}), **_paths(more)})
+    case = with_axes(as_case(case), {**(axes or {}), **_paths(more)})
     sizes = [_size(axis) for axis in case.resolved.get("axis", [])]
     number = int(np.prod(sizes)) if sizes else 0
     if output is None and number > _MOST_IN_MEMORY:
@@ -275,7 +275,7 @@ def kept_in_memory(result: xr.Dataset) -> xr.Dataset:
     return kept
 
 
-def _with_axes(case: Case, asked: Mapping[str, Values]) -> Case:
+def with_axes(case: Case, asked: Mapping[str, Values]) -> Case:
     """Return the case with other axes."""
     if not asked:
         return case

@@ -66,10 +66,12 @@ def run(
     rename: Mapping[str, str] | None = None,
     environment: Mapping[str, str] | None = None,
     time_limit: float | None = None,
+    take: Callable[[dict], object] | None = None,
 ) -> None:
     """Run the program once for each list of arguments, all at once, to their ends.
 
     `ranks`: each under mpiexec with so many. `rename`: what the names of files in messages stand for.
+    `take` gets each line of the report.
     Raises CaseError or SeparatrixError with the message of the program, StoppedError where it was stopped and
     can go on; Ctrl-C stops it so.
     """
@@ -78,7 +80,7 @@ def run(
     interrupted = False
     try:
         running = [_start(arguments, events, ranks, progress, environment) for arguments in commands]
-        _follow(running, events, progress, time_limit)
+        _follow(running, events, progress, time_limit, take)
     except KeyboardInterrupt:
         interrupted = True
         _stop(running, ranks)
@@ -110,8 +112,8 @@ def _start(
     environment: Mapping[str, str] | None,
 ) -> _Process:
     command = [*_launcher(ranks), str(program_path()), *arguments]
-    # These two compute and say how far they are.
-    if arguments[0] in ("basin", "sweep", "points") and progress.wanted:
+    # These compute and say how far they are.
+    if arguments[0] in ("basin", "sweep", "points", "branches") and progress.wanted:
         command += ["--progress", "0.2"]
     log.debug("run: %s", " ".join(command))
     process = subprocess.Popen(
@@ -173,7 +175,11 @@ def _take_words(one: _Process, line: str, events: queue.Queue) -> None:
 
 
 def _follow(
-    running: list[_Process], events: queue.Queue, progress: Progress, time_limit: float | None
+    running: list[_Process],
+    events: queue.Queue,
+    progress: Progress,
+    time_limit: float | None,
+    take: Callable[[dict], object] | None,
 ) -> None:
     """Pass on what the programs say until all streams have ended; stop them when the time is over."""
     open_streams = 2 * len(running)
@@ -193,6 +199,8 @@ def _follow(
                 _signal(running, signal.SIGTERM)
             continue
         _pass_on(running, *event, progress)
+        if take is not None:
+            take(event[1])
 
 
 def _pass_on(running: list[_Process], one: _Process, event: dict, progress: Progress) -> None:

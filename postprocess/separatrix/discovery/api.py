@@ -9,10 +9,12 @@ from pathlib import Path
 
 from separatrix.cases import Case, as_case
 from separatrix.discovery.cli import summary
+from separatrix.discovery.fitting.catalogue import STARTS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, extended_case, replacing, require_writable, write_results
 from separatrix.discovery.workflow import investigate
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.progress import Progress, Report
 
 
@@ -51,7 +53,7 @@ def discover(
     hold_out: str | Path | Sequence[str | Path] = (),
     rest: str | Path | None = None,
     out: str | Path | None = None,
-    effects: Sequence[str] | None = None,
+    effects: str | Sequence[str] | None = None,
     partial: bool = False,
     quick: bool = False,
     seed: int = 1,
@@ -79,6 +81,10 @@ def discover(
         As for `basin`; what is counted are thousandths of the work.
     """
     case = as_case(case)
+    effects = [effects] if isinstance(effects, str) else effects
+    for name in effects or ():
+        if name not in STARTS:
+            raise SeparatrixError(f"effects: found '{name}', allowed {', '.join(STARTS)}", USAGE)
     with Progress(progress) as told:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,
@@ -90,6 +96,7 @@ def discover(
         verdict, findings = investigate(case.model, _paths(records), _paths(hold_out), options, still)
         text = extended_case(verdict, findings) if findings.decision.accepted else None
         files = {} if out is None else _write(Path(out), case, verdict, findings, options)
+        told("steps", 1000, 1000)
     return Discovery(verdict, None if text is None else Case.from_text(text, case.directory), files)
 
 

@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`branches` of periodic orbits over a parameter, and `stability` of one motion."""
+
+import math
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import xarray as xr
+
+from separatrix.cases import Case, as_case, linspace, toml
+from separatrix.errors import CANNOT_CREATE, INTERNAL, USAGE, SeparatrixError
+from separatrix.maps import kept_in_memory, with_axes
+from separatrix.open import open_result
+from separatrix.progress import Progress, Report
+from separatrix.runner import StoppedError, run
+
+__all__ = ["Stability", "branches", "stability"]
+
+# What the program names by its options.
+_IN_PYTHON = {
+    "--parameter": "parameter", "--from": "start", "--to": "stop", "--searches": "searches",
+    "--periods": "periods",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What is known of one motion by its Lyapunov exponents and the 0-1 test.
+
+    `exponents` [1/s], the first the largest within its error, are -inf where sticking or a completed chatter
+    loses a direction; `errors` are their standard errors. `sum_found` and `sum_exact` [1/s], the sum of the
+    exponents and what damping, impacts and turning points alone make of it, check them. `zero_one` is near 0
+    for a regular and near 1 for a chaotic motion. `motion` is "chaotic", "periodic", "quasi_periodic",
+    "transient" or "not_known", by `periods` drive periods with `impacts` impacts. What is not known is nan.
+    """
+
+    motion: str = "not_known"
+    exponents: tuple[float, float] = (math.nan, math.nan)
+    errors: tuple[float, float] = (math.nan, math.nan)
+    sum_found: float = math.nan
+    sum_exact: float = math.nan
+    zero_one: float = math.nan
+    periods: int = 0
+    impacts: int = 0
+    report: str = field(default="", repr=False)
+
+    def __str__(self) -> str:
+        """Say it as the command does."""
+        return self.report
+
+
+def branches(
+    case: Case | str | Path,
+    parameter: str,
+    start: float | None = None,
+    stop: float | None = None,
+    *,
+    searches: int | None = None,
+    x0: tuple[float, float] | None = None,
+    v0: tuple[float, float] | None = None,
+    output: str | Path | None = None,
+    progress: bool | Report | None = None,
+    overwrite: bool = False,
+) -> xr.Dataset:
+    """Return the periodic orbits over a parameter, stable and unstable, with their bifurcations.
+
+    Parameters
+    ----------
+    case
+        The machine, as a Case or the file of one; one body.
+    parameter, start, stop
+        The path of the parameter and its range; without one that of the sweep or the axis of the case.
+    searches
+        At how many values orbits are searched; 12 if not given.
+    x0, v0
+        Ranges of the starts from which they are searched [m, m/s]; those of the axes of the case, else twice
+        the motion that the drive brings about.
+    output
+        The result file. Without one the result is kept in memory.
+    progress, overwrite
+        As for `basin`; what is counted are values searched. Ctrl-C is a KeyboardInterrupt, and nothing is
+        kept.
+
+    `.separatrix.plot()` draws them, `.separatrix.labelled_points` is the table of their bifurcations.
+    """
+    case = as_case(case)
+    case = with_axes(case, {name: _ends(name, given) for name, given in (("x0", x0), ("v0", v0)) if given})
+    options = ["--parameter", parameter]
+    for name, value in (("--from", start), ("--to", stop)):
+        if value is not None:
+            options += [name, toml(value)]
+    if searches is not None:
+        options += ["--searches", str(searches)]
+    with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
+        target = (Path(folder) / "branches.h5" if output is None else Path(output).expanduser()).absolute()
+        if output is not None and target.exists() and not overwrite:
+            raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", CANNOT_CREATE)
+        options += ["-o", str(target), *(["--force"] if overwrite else [])]
+        _run("branches", case, Path(folder), options, progress)
+        if output is not None:
+            return open_result(target)
+        with open_result(target) as result:
+            return kept_in_memory(result)
+
+
+def stability(
+    case: Case | str | Path,
+    x0: float | None = None,
+    v0: float | None = None,
+    crank_angle: float | None = None,
+    *,
+    periods: int | None = None,
+) -> Stability:
+    """Return the Lyapunov exponents of one motion after its transients, and what kind of motion it is.
+
+    Parameters
+    ----------
+    case
+        The machine, as a Case or the file of one; one body.
+    x0, v0, crank_angle
+        The start [m, m/s, rad]; what is not given is that of the case.
+    periods
+        Drive periods watched, after a quarter as many, 64 or more; 20000 if not given.
+    """
+    given = {"start.x0": x0, "start.v0": v0, "start.crank_angle": crank_angle}
+    case = as_case(case).with_({name: float(value) for name, value in given.items() if value is not None})
+    events: list[dict] = []
+    options = [] if periods is None else ["--periods", str(periods)]
+    with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
+        _run("stability", case, Path(folder), options, False, events.append)
+    return _stability(events)
+
+
+def _ends(name: str, given: tuple[float, float]) -> linspace:
+    """A range as the axis of which the program takes the ends."""
+    if len(given) != 2:
+        raise SeparatrixError(f"{name}: found {given}, allowed (lowest, highest)", USAGE)
+    return linspace(*given, 2)
+
+
+def _run(
+    command: str,
+    case: Case,
+    folder: Path,
+    options: list[str],
+    progress: bool | Report | None,
+    take: Callable[[dict], object] | None = None,
+) -> None:
+    """Run a command that keeps nothing when it is stopped."""
+    named = case.on_command_line(folder)
+    try:
+        with Progress(progress) as told:
+            rename = {named[0]: case.name, **_IN_PYTHON}
+            run([[command, *named, *options, "--json"]], told, rename=rename, take=take)
+    except StoppedError:
+        raise KeyboardInterrupt(f"{command} was stopped; nothing of it is kept") from None
+
+
+def _stability(events: list[dict]) -> Stability:
+    """What the report of the program says, in numbers."""
+    kinds = ("exponent", "sum", "zero_one", "motion", "not_known")
+    said = [event for event in events if event.get("event") in kinds]
+    report = "\n".join(str(event["message"]) for event in said)
+    one = {event["event"]: event for event in said}
+    if "motion" not in one:
+        if "not_known" not in one:
+            raise SeparatrixError(f"stability: the program said nothing of the motion ({report})", INTERNAL)
+        return Stability(report=report)
+    exponents = [event for event in said if event["event"] == "exponent"]
+    return Stability(
+        motion=str(one["motion"]["type"]),
+        exponents=tuple(-math.inf if event["value"] is None else event["value"] for event in exponents),
+        errors=tuple(event.get("error", math.nan) for event in exponents),
+        sum_found=one.get("sum", {}).get("found", math.nan),
+        sum_exact=one.get("sum", {}).get("exact", math.nan),
+        zero_one=one["zero_one"]["value"],
+        periods=one["motion"]["periods"],
+        impacts=one["motion"]["impacts"],
+        report=report,
+    )

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sx.branches` and `sx.stability` are the commands of these names, to the bit and to the word."""
+
+from pathlib import Path
+
+import pytest
+import separatrix as sx
+from program import succeed
+from test_python_api import assert_same
+
+
+@pytest.fixture(autouse=True)
+def tools(library: Path, separatrix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program and the library of the build that is tested."""
+    monkeypatch.setenv("SEPARATRIX_PROGRAM", str(separatrix))
+
+
+@pytest.fixture
+def grazing(source_dir: Path) -> sx.Case:
+    """The oscillator whose free motion grazes at the amplitude 0.1."""
+    return sx.load(source_dir / "examples" / "validation" / "impact_coco.toml")
+
+
+def test_branches_are_those_of_the_program(grazing: sx.Case, separatrix: Path, tmp_path: Path) -> None:
+    asked = ("--parameter", "drive.amplitude", "--from", "0.05", "--to", "0.3", "--searches", "3")
+    succeed(separatrix, "branches", grazing.name, "-o", "theirs.h5", *asked, folder=tmp_path)
+    told: list[tuple] = []
+    mine = sx.branches(
+        grazing, "drive.amplitude", 0.05, 0.3, searches=3, progress=lambda *what: told.append(what)
+    )
+    assert_same(mine, sx.open_result(tmp_path / "theirs.h5"))
+    assert {things for things, _, _ in told} == {"values"}
+    found = mine.separatrix.labelled_points.set_index("label")
+    assert found.loc["GR-fold", "drive.amplitude"] == pytest.approx(0.1, abs=1e-11)
+    assert found.loc["SN", "multiplier_1"] == pytest.approx(1.0, abs=1e-8)
+    assert "none" not in found.index
+    assert mine.separatrix.plot("branches") is not None
+    # from starts of its own, into a file
+    output = tmp_path / "mine.h5"
+    near = {"searches": 2, "x0": (0.0, 0.2), "v0": (-0.1, 0.1), "output": output}
+    kept = sx.branches(grazing, "drive.amplitude", 0.02, 0.05, **near)
+    assert kept.separatrix.case.resolved["axis"][0]["to"] == 0.2
+    assert set(kept.separatrix.decoded("event_word").values) == {"."}
+    with pytest.raises(sx.SeparatrixError, match="exists; overwrite=True"):
+        sx.branches(grazing, "drive.amplitude", 0.02, 0.05, **near)
+
+
+def test_branches_that_make_no_sense_are_refused(grazing: sx.Case) -> None:
+    for wrong, said in (
+        (("drive.ration", 1, 2), "^parameter: found 'drive.ration', allowed body.mass"),
+        (("body.mass",), "^start and stop are needed"),
+        (("drive.amplitude", 2.0, 1.0), "^start, stop: found 2.0 and 1.0, allowed is a range that rises"),
+        (("contact.restitution", 0.5, 1.5), "^stop: found 1.5, allowed"),
+    ):
+        with pytest.raises(sx.CaseError, match=said):
+            sx.branches(grazing, *wrong)
+    with pytest.raises(sx.SeparatrixError, match="^x0: found"):
+        sx.branches(grazing, "drive.amplitude", 1, 2, x0=(0, 1, 2))
+
+
+def test_branches_end_at_an_interrupt(grazing: sx.Case, tmp_path: Path) -> None:
+    """Nothing can be resumed, so that it is no `Interrupted`."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="branches was stopped") as caught:
+        sx.branches(grazing, "drive.amplitude", 0.05, 1.2, progress=stop, output=tmp_path / "out.h5")
+    assert not isinstance(caught.value, sx.Interrupted)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_stability_is_that_of_the_program(source_dir: Path, separatrix: Path, tmp_path: Path) -> None:
+    case = sx.load(source_dir / "examples" / "validation" / "budd_dux.toml")
+    chaos = case.with_(contact__upper=0.0)
+    found = sx.stability(chaos, x0=-0.3, periods=5000)
+    settings = ("--set", "contact.upper=0.0", "--set", "start.x0=-0.3", "--periods", "5000")
+    said = succeed(separatrix, "stability", case.name, *settings, folder=tmp_path).out
+    assert str(found) == said.strip()
+    assert (found.motion, found.periods) == ("chaotic", 5000)
+    assert found.exponents[0] > 10 * found.errors[0] > 0 > found.exponents[1]
+    assert sum(found.exponents) == pytest.approx(found.sum_found, abs=1e-12)
+    assert found.sum_found == pytest.approx(found.sum_exact, abs=1e-8)
+    assert found.zero_one > 0.9 and found.impacts > 5000
+    assert sx.stability(case, x0=-1.0, periods=2000).motion == "periodic"
+    with pytest.raises(sx.SeparatrixError, match="^periods: found 3, allowed"):
+        sx.stability(case, periods=3)
+    with pytest.raises(sx.CaseError, match=r"budd_dux.toml: key 'start.x0': found"):
+        sx.stability(case, x0=1.0)
+    with pytest.raises(sx.CaseError, match="variations are known of one body"):
+        sx.stability(source_dir / "examples" / "pair_backlash.toml")
