@@ -37,7 +37,7 @@ MAP = {
     "regime": ("1", "regime of the motion", _flags(_REGIMES)),
     "attractor": ("1", "label of the attractor in the catalogue, 0 = none", {}),
     "reason": ("1", "why the trajectory ended", _flags(_REASONS)),
-    "period": ("1", "period in drive periods, 0 = none or not known", {}),
+    "period": ("1", "period in drive periods, 0 = not periodic", {}),
     "event_word": ("1", "events of one period of the motion, three bits each", {}),
     "impacts_per_period": ("1", "impacts per drive period", {}),
     "mean_impact_speed": ("m/s", "mean speed just before impact", {}),
