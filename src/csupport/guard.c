@@ -4,6 +4,7 @@
 /* Ends the program with a message where a library loops for ever, or crashes, on a damaged file. The time is
    that of the processor, so that a slow file system is not taken for a loop. */
 #define _GNU_SOURCE
+#include <fcntl.h>
 #include <signal.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -17,12 +18,31 @@ enum { guarded_count = sizeof guarded / sizeof *guarded };
 static struct sigaction before[guarded_count];
 static char message[1024];
 static int exit_code;
+/* Standard error, which is silent meanwhile: the C library has a word of its own before it aborts. */
+static int messages = -1;
 
 static void give_up(int number) {
   (void)number;
-  if (write(STDERR_FILENO, message, strlen(message)) < 0)
+  if (write(messages < 0 ? STDERR_FILENO : messages, message, strlen(message)) < 0)
     _exit(exit_code);
   _exit(exit_code);
+}
+
+static void silence(void) {
+  const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  messages = nowhere < 0 ? -1 : fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  if (messages >= 0)
+    dup2(nowhere, STDERR_FILENO);
+  if (nowhere >= 0)
+    close(nowhere);
+}
+
+static void speak_again(void) {
+  if (messages < 0)
+    return;
+  dup2(messages, STDERR_FILENO);
+  close(messages);
+  messages = -1;
 }
 
 /* From here to separatrix_guard_end the program ends with `code`, and says `text`, when a library crashes or
@@ -36,6 +56,7 @@ void separatrix_guard_begin(const char *text, int seconds, int code) {
   sigemptyset(&action.sa_mask);
   for (size_t i = 0; i < guarded_count; i++)
     sigaction(guarded[i], &action, &before[i]);
+  silence();
   setitimer(ITIMER_PROF, &limit, NULL);
 }
 
@@ -44,4 +65,5 @@ void separatrix_guard_end(void) {
   setitimer(ITIMER_PROF, &none, NULL);
   for (size_t i = 0; i < guarded_count; i++)
     sigaction(guarded[i], &before[i], NULL);
+  speak_again();
 }

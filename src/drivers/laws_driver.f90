@@ -5,6 +5,7 @@
 module laws_driver
   use journal, only: json_text
   use kinds, only: wp
+  use law_row, only: law_row_t
   use law_table, only: effect_family, families, is_hidden, laws, parameter_row_t, parameters_of, part_family, part_kind, &
     part_law, table_of
   use text, only: to_text
@@ -53,14 +54,22 @@ contains
         write (output_unit, '(a)') '  law = "'//trim(row%name)//'": '//trim(row%meaning)
       end if
       if (len_trim(row%source) > 0) write (output_unit, '(a)') '    source: '//trim(row%source)
-      rows = parameters_of(trim(row%family), trim(row%name))
+      rows = shown_rows(row)
     end associate
     do i = 1, size(rows)
-      if (is_hidden(rows(i))) cycle
       write (output_unit, '(4x,a20,1x,a9,1x,a)') rows(i)%name, rows(i)%unit, &
         range_text(rows(i))//default_text(rows(i))//': '//trim(rows(i)%meaning)
     end do
   end subroutine print_plain
+
+  !> The parameters that a case may set by a number.
+  pure function shown_rows(law) result(rows)
+    type(law_row_t), intent(in) :: law
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i
+    rows = parameters_of(trim(law%family), trim(law%name))
+    rows = pack(rows, [(.not. is_hidden(rows(i)), i=1, size(rows))])
+  end function shown_rows
 
   !> How a part is written down.
   pure function part_text(law) result(text)
@@ -85,7 +94,7 @@ contains
     character(len=:), allocatable :: list
     integer :: i
     associate (row => laws(law))
-      rows = parameters_of(trim(row%family), trim(row%name))
+      rows = shown_rows(row)
       list = ''
       do i = 1, size(rows)
         if (i > 1) list = list//', '

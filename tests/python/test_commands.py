@@ -224,8 +224,7 @@ def test_laws(separatrix, tmp_path):
                 or parameter["upper"] is None
                 or parameter["lower"] < parameter["upper"]
             )
-            # the ends of a part are written as a list of names
-            assert parameter["name"] in text or parameter["name"] in ("first_end", "second_end")
+            assert parameter["name"] in text
 
 
 @pytest.mark.parametrize("kind", KINDS)
