@@ -39,6 +39,7 @@ def boundary(
 
     `.separatrix.plot(over=basins)` draws the curves over the map. Piece k has the points `first[k]` to
     `first[k] + points[k] - 1`, between the attractors `label_one[k]` and `label_two[k]`; 0 is not known.
+    `piece_name` says what it leads to, `piece_saddle` to which of the saddles in `table(result, "saddles")`.
     """
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         target = (Path(folder) / "boundary.h5" if output is None else Path(output).expanduser()).absolute()

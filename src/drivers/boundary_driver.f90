@@ -8,12 +8,15 @@ module boundary_driver
   use boundary_layout, only: describe_boundary
   use boundary_search, only: plane_t, search_lines
   use boundary_lines, only: crossed_edges
+  use boundary_names, only: name_points, names_t
   use case_setup, only: grid_of, span_of
   use catalogue_search, only: check_slices
   use command_line, only: command_t
+  use edge_state, only: edge_names, edge_texts
   use errors, only: error_t, fail
+  use event_words, only: word_text
   use grid, only: grid_t, point_slice, two_axes
-  use kinds, only: int64, wp
+  use journal, only: json_number, json_text
   use map_final, only: write_whole
   use map_reader, only: reader_t
   use map_schema, only: schema_t
@@ -38,6 +41,7 @@ contains
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(plane_t), allocatable :: planes(:)
+    type(names_t), allocatable :: names(:)
     type(schema_t) :: schema
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
@@ -48,7 +52,7 @@ contains
     if (.not. allocated(error)) call check_slices(grid, span_of(session%the_case), error)
     call session%stop_if(error)
     path = result_path(command)
-    allocate (planes(product(grid%shape)/product(grid%shape(axes))))
+    allocate (planes(product(grid%shape)/product(grid%shape(axes))), names(product(grid%shape)/product(grid%shape(axes))))
     do i = 1, size(planes)
       call open_plane(grid, axes, i - 1, planes(i))
       call read_labels(reader, grid%shape, axes, planes(i)%index, planes(i)%labels, planes(i)%inferred, error)
@@ -70,10 +74,12 @@ contains
         planes(i)%attractors = catalogues(slice + 1)%attractors
       end associate
       call search_lines(session, grid, planes(i))
+      call name_points(session%team, session%journal, grid, planes(i), names(i))
     end do
     call report(session, planes)
+    call report_names(session, planes, names)
     call describe_file(session, 'boundary', schema)
-    if (session%team%is_root()) call describe_boundary(reader, grid, planes, schema, error)
+    if (session%team%is_root()) call describe_boundary(reader, grid, planes, names, schema, error)
     call session%stop_if(error)
     call session%provenance%finish(schema)
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)
@@ -151,7 +157,6 @@ contains
     type(session_t), intent(inout) :: session
     type(plane_t), intent(in) :: planes(:)
     integer :: points, lines, corrected, i, coarse
-    real(wp) :: error
     points = sum([(size(planes(i)%intervals), i=1, size(planes))])
     lines = sum([(size(planes(i)%lines), i=1, size(planes))])
     corrected = sum(planes%corrected)
@@ -162,7 +167,6 @@ contains
       call session%journal%line('found', 'no boundary: all points of the map have the same label', '"points": 0, "lines": 0')
       return
     end if
-    error = 0
     coarse = 0
     do i = 1, size(planes)
       if (size(planes(i)%points) == 0) cycle
@@ -171,5 +175,43 @@ contains
     call session%journal%line('found', to_text(points)//' boundary points on '//to_text(lines)//' lines, '//to_text(coarse)// &
       ' junctions', '"points": '//to_text(points)//', "lines": '//to_text(lines)//', "junctions": '//to_text(coarse))
   end subroutine report
+
+  !> The saddles, and what the boundary points are.
+  subroutine report_names(session, planes, names)
+    type(session_t), intent(inout) :: session
+    type(plane_t), intent(in) :: planes(:)
+    type(names_t), intent(in) :: names(:)
+    integer :: i, k, edge, number, points
+    character(len=:), allocatable :: name
+    if (len(names(1)%problem) > 0) then
+      call session%journal%line('unnamed', 'what the boundary leads to is not known: '//names(1)%problem)
+      return
+    end if
+    number = 0
+    do i = 1, size(names)
+      do k = 1, size(names(i)%saddles)
+        number = number + 1
+        associate (saddle => names(i)%saddles(k))
+          call session%journal%line('saddle', 'saddle '//to_text(number)//': period '//to_text(saddle%periods)//', '// &
+            word_text(saddle%word)//', multipliers '//to_text(saddle%multipliers(1), 9)//', '//to_text(saddle%multipliers(2), 9)// &
+            ', '//to_text(names(i)%reached(k))//' boundary points lead to it', '"number": '//to_text(number)//', "period": '// &
+            to_text(saddle%periods)//', "word": '//json_text(word_text(saddle%word))//', "x": '// &
+            json_number(saddle%points(1, 1))//', "v": '//json_number(saddle%points(2, 1))// &
+            ', "multipliers": ['//json_number(saddle%multipliers(1))//', '// &
+            json_number(saddle%multipliers(2))//'], "points": '//to_text(names(i)%reached(k)))
+        end associate
+      end do
+    end do
+    do edge = 0, ubound(edge_names, 1)
+      points = 0
+      do i = 1, size(planes)
+        if (size(planes(i)%points) > 0) points = points + count(names(i)%edge == edge .and. planes(i)%points%along > 0)
+      end do
+      if (points == 0) cycle
+      name = trim(edge_names(edge))
+      call session%journal%line('name', '  '//trim(edge_texts(edge))//': '//to_text(points)//' points', '"name": '// &
+                                json_text(name)//', "points": '//to_text(points))
+    end do
+  end subroutine report_names
 
 end module boundary_driver

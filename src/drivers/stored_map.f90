@@ -4,7 +4,6 @@
 !> A finished map as the beginning of other work: its case, its attractors, and planes of its labels.
 module stored_map
   use basin, only: catalogue_t
-  use bisection, only: label_left_domain
   use case_reader, only: load_case_text
   use case_setup, only: span_of
   use case_type, only: case_t
@@ -23,6 +22,7 @@ module stored_map
   use serial_team, only: serial_team_t
   use session, only: session_t
   use signals, only: ignore_file_limit
+  use start_label, only: label_left_domain
   use status, only: exit_bad_case, exit_io, exit_resumable, reason_left_domain
   use team, only: team_t
   implicit none

@@ -6,16 +6,14 @@
 module bisection
   use attractors, only: attractor_t
   use kinds, only: wp
-  use status, only: reason_left_domain
+  use start_label, only: label_not_known, label_of
   use trajectories, only: journey_t, run_trajectories
   use trajectory, only: outcome_t
   implicit none
   private
 
-  public :: label_starts, label_of, halve_intervals, join_slivers
+  public :: label_starts, halve_intervals, join_slivers
 
-  !> Labels that are no attractors: the motion is not known (not captured, or given up), or it has left the domain.
-  integer, parameter, public :: label_not_known = 0, label_left_domain = -1
   !> Intervals that one edge may fall into: beyond, an interval with a third label in it stays as wide as it is.
   integer, parameter :: most_intervals = 6
   !> Starts that are not captured in time lie between two basins in a sliver; one narrower than this share of its edge is taken
@@ -32,13 +30,6 @@ module bisection
   end type interval_t
 
 contains
-
-  !> The label that a trajectory gives its start.
-  pure integer function label_of(outcome) result(label)
-    type(outcome_t), intent(in) :: outcome
-    label = max(outcome%attractor, label_not_known)
-    if (outcome%attractor == 0 .and. outcome%reason == reason_left_domain) label = label_left_domain
-  end function label_of
 
   !> Labels of `starts` (columns as `point_start` of module `grid` has them).
   pure subroutine label_starts(journey, catalogue, starts, labels)

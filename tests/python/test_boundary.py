@@ -12,7 +12,7 @@ import separatrix as sx
 from separatrix import style
 from separatrix.figures import boundary
 from separatrix.library import Model
-from separatrix.open import open_result
+from separatrix.open import decode_flags, decode_words, open_result, table
 from separatrix.simulate import search_slices
 
 
@@ -92,6 +92,7 @@ def test_two_ranks_write_the_same_curves(run, coulomb, curves, tmp_path):
     with h5py.File(out) as one, h5py.File(curves) as other:
         names = [name for name in one if isinstance(one[name], h5py.Dataset)]
         assert {"x0", "v0", "across", "below", "above", "error", "first", "points"} <= set(names)
+        names += [f"saddles/{name}" for name in one["saddles"]]
         for name in names:
             np.testing.assert_array_equal(one[name][()], other[name][()])
 
@@ -137,6 +138,23 @@ def test_a_stack_of_maps_has_the_curves_of_every_slice(run, coulomb, tmp_path):
         assert all(len(ax.lines) > 1 for ax in figure.axes[:2])
 
 
+def test_the_boundary_of_the_coulomb_machine_is_the_stable_set_of_one_saddle(coulomb, curves):
+    with open_result(curves) as result:
+        assert set(decode_flags(result["piece_name"]).values) == {"stable_set"}
+        assert set(result["saddle"].values) == {1} and set(result["piece_saddle"].values) == {1}
+        saddles = table(result, "saddles")
+        assert saddles["boundary_points"].values.tolist() == [result.sizes["point"]]
+        assert decode_words(saddles["event_word"]).values.tolist() == ["R."]
+        unstable, stable = saddles["multipliers"].values[0]
+        assert abs(unstable) > 1 > abs(stable)
+        x, v = saddles["x"].values[0], saddles["v"].values[0]
+        case = result.separatrix.case
+        period = sx.trajectory(case, x, v, samples=4).attrs["drive_period"]
+        once = sx.trajectory(case.with_({"run.duration": period, "run.window": period}), x, v, samples=4)
+        assert once["x"].values[-1] == pytest.approx(x, abs=1e-10)
+        assert once["v"].values[-1] == pytest.approx(v, abs=1e-9)
+
+
 def test_a_map_of_one_attractor_has_no_boundary(run, source_dir, tmp_path):
     basins, out = tmp_path / "one.h5", tmp_path / "out.h5"
     case = source_dir / "examples" / "validation" / "budd_dux.toml"
@@ -146,6 +164,10 @@ def test_a_map_of_one_attractor_has_no_boundary(run, source_dir, tmp_path):
     assert "no boundary: all points of the map have the same label" in ended.stdout
     with open_result(out) as result, style.context():
         assert result.sizes["point"] == 0
+        # Budd and Dux at sigma = -0.4: within the one basin lies a saddle
+        saddles = table(result, "saddles")
+        assert saddles["boundary_points"].values.tolist() == [0]
+        assert saddles["multipliers"].values[0] == pytest.approx([4.16349147, 0.15371714], abs=1e-8)
         boundary.figures(out, result, "title")
 
 

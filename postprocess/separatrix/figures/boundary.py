@@ -14,12 +14,33 @@ from matplotlib.lines import Line2D
 from separatrix import style
 from separatrix.errors import SeparatrixError
 from separatrix.figures import basin
-from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
+from separatrix.figures.caption import (
+    caption_pieces,
+    describe_case,
+    resolved_case,
+    shown,
+    start_pieces,
+    version_text,
+)
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, count_text, plain
 from separatrix.layout import compose
-from separatrix.open import open_result
+from separatrix.open import decode_flags, decode_word, open_result
 
+# Text of the legend, colour and line of each name of a piece.
+_LINES = {
+    "stable_set": ("boundary: stable set of saddle", "black", "-"),
+    "recurrent": ("boundary: recurrent edge state", style.OKABE_ITO[0], "-"),
+    "graze": ("boundary: edge of a graze", style.OKABE_ITO[1], "--"),
+    "stick": ("boundary: rim of a stick set", style.OKABE_ITO[2], "--"),
+    "chatter": ("boundary: edge of a completed chatter", style.OKABE_ITO[4], "--"),
+    "other_event": ("boundary: edge at another event", style.OKABE_ITO[3], "--"),
+    "not_known": ("boundary: leads to what is not known", "0.25", "-."),
+}
+_SADDLES = ("black", "#56B4E9", "#F0E442", "#CC79A7", "#009E73", "#D55E00")
+_UNKNOWN = ("edge of what is not known", "0.4", ":")
+# Saddles that a caption describes.
+_MOST_LISTED = 4
 _OURS = ("region", "slice", "inset", "axes", "units", "shade", "colours")
 
 
@@ -115,36 +136,85 @@ def _notes(result: xr.Dataset) -> list[str]:
     errors = result["error"].values[found]
     if errors.size == 0:
         return ["no boundary: all points have the same label"]
-    return [f"{count_text(int(found.sum()))} boundary points, half of them known to {np.median(errors):.1g}"]
+    notes = [f"{count_text(int(found.sum()))} boundary points, half of them known to {np.median(errors):.1g}"]
+    rows = zip(
+        result["saddles_period"].values,
+        result["saddles_event_word"].values,
+        result["saddles_multipliers"].values,
+        result["saddles_boundary_points"].values,
+        strict=True,
+    )
+    listed = [
+        f"saddle {k}: period {period}, {decode_word(word)}, multipliers {one:.4g} and {two:.4g}"
+        for k, (period, word, (one, two), reached) in enumerate(rows, 1)
+        if reached > 0
+    ]
+    return notes + listed[:_MOST_LISTED]
 
 
 def draw(
     ax: Axes, result: xr.Dataset, across: str, down: str, look: Look, place: dict[str, float]
 ) -> list[Line2D]:
-    """Draw the pieces of one panel; return what the legend needs."""
+    """Draw the pieces and the saddles of one panel; return what the legend needs."""
     handles: dict[str, Line2D] = {}
     factors = [look.factor(str(result[name].attrs.get("units"))) for name in (across, down)]
     x, y = (result[name].values * factor for name, factor in zip((across, down), factors, strict=True))
+    names = decode_flags(result["piece_name"]).values
     known = (result["label_one"].values != 0) & (result["label_two"].values != 0)
     for piece in range(result.sizes["piece"]):
-        if not _belongs(result, piece, place, look):
+        if not _belongs(result, "piece_", piece, place, look):
             continue
         chosen = np.arange(result["points"].values[piece]) + result["first"].values[piece]
         if result["closed"].values[piece]:
             chosen = np.append(chosen, chosen[0])
-        text = "basin boundary" if known[piece] else "edge of what is not known"
-        colour, line = ("black", "-") if known[piece] else ("0.4", ":")
+        text, colour, line = _LINES[names[piece]] if known[piece] else _UNKNOWN
+        saddle = int(result["piece_saddle"].values[piece])
+        if saddle:
+            text, colour = f"{text} {saddle}", _SADDLES[(saddle - 1) % len(_SADDLES)]
         ax.plot(x[chosen], y[chosen], "-", color="white", linewidth=1.8, zorder=3)
-        (drawn,) = ax.plot(x[chosen], y[chosen], line, color=colour, linewidth=0.8, zorder=4)
-        handles.setdefault(text, Line2D([], [], color=drawn.get_color(), linestyle=line, label=text))
+        ax.plot(x[chosen], y[chosen], line, color=colour, linewidth=0.8, zorder=4)
+        handles.setdefault(text, Line2D([], [], color=colour, linestyle=line, label=text))
+    if (across, down) in (("x0", "v0"), ("v0", "x0")) and _on_section(result, place):
+        handles |= _draw_saddles(ax, result, across, factors, place, look)
     return list(handles.values())
 
 
-def _belongs(result: xr.Dataset, piece: int, place: dict[str, float], look: Look) -> bool:
-    """Whether a piece is of the slice of the map that a panel shows."""
+def _draw_saddles(
+    ax: Axes, result: xr.Dataset, across: str, factors: list[float], place: dict[str, float], look: Look
+) -> dict[str, Line2D]:
+    """Mark the saddles that the boundary leads to, and those within a basin."""
+    handles: dict[str, Line2D] = {}
+    owner = result["saddles_saddle"].values - 1
+    reached = result["saddles_boundary_points"].values > 0
+    x, v = result["saddles_x"].values, result["saddles_v"].values
+    points = (x, v) if across == "x0" else (v, x)
+    for on_boundary, text in ((True, "saddle"), (False, "saddle within a basin")):
+        chosen = reached[owner] == on_boundary
+        chosen &= [_belongs(result, "saddles_", int(one), place, look) for one in owner]
+        if not chosen.any():
+            continue
+        drawn = {"marker": "X", "markersize": 5.0, "markeredgecolor": "black", "linestyle": ""}
+        drawn |= {"markerfacecolor": "white" if on_boundary else "0.6", "markeredgewidth": 0.6, "zorder": 6}
+        limits = ax.get_xlim(), ax.get_ylim()
+        ax.plot(points[0][chosen] * factors[0], points[1][chosen] * factors[1], **drawn)
+        ax.set_xlim(limits[0])
+        ax.set_ylim(limits[1])
+        handles[text] = Line2D([], [], **drawn, label=text)
+    return handles
+
+
+def _on_section(result: xr.Dataset, place: dict[str, float]) -> bool:
+    """Whether the starts of a panel are on the section at crank angle 0, where the saddles are given."""
+    start = resolved_case(result).get("start", {})
+    angle = place.get("crank_angle", start.get("crank_angle", 0.0) if isinstance(start, dict) else 0.0)
+    return bool(np.isclose(np.sin(float(angle) / 2), 0, atol=1e-12))
+
+
+def _belongs(result: xr.Dataset, prefix: str, row: int, place: dict[str, float], look: Look) -> bool:
+    """Whether a piece or a saddle is of the slice of the map that a panel shows."""
     for name, value in place.items():
-        variable = result[f"piece_{name}"]
-        mine = variable.values[piece] * look.factor(str(variable.attrs.get("units")))
+        variable = result[f"{prefix}{name}"]
+        mine = variable.values[row] * look.factor(str(variable.attrs.get("units")))
         if not np.isclose(mine, value, rtol=1e-12, atol=0):
             return False
     return True
