@@ -20,6 +20,7 @@ __all__ = ["boundary"]
 def boundary(
     basins: xr.Dataset | str | Path,
     *,
+    grow: float | None = None,
     output: str | Path | None = None,
     ranks: int | None = None,
     progress: bool | Report | None = None,
@@ -32,6 +33,9 @@ def boundary(
     basins
         The map: its file, or the result of `basin` or `open_result`. One that is in memory only is computed
         once more, into a temporary file.
+    grow
+        Stable and unstable sets of the saddles are grown within so many times the window of the map; 1 if not
+        given, 0: none.
     output
         The result file. Without one the result is kept in memory.
     ranks, progress, overwrite
@@ -46,7 +50,9 @@ def boundary(
         if output is not None and target.exists() and not overwrite:
             raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", CANNOT_CREATE)
         source = _file(basins, Path(folder), ranks, progress)
-        command = ["boundary", str(source), "-o", str(target), "--json", *(["--force"] if overwrite else [])]
+        command = ["boundary", str(source), "-o", str(target), "--json"]
+        command += [] if grow is None else ["--grow", str(float(grow))]
+        command += ["--force"] if overwrite else []
         _run(command, ranks, progress)
         if output is not None:
             return open_result(target)

@@ -8,7 +8,7 @@ module boundary_driver
   use boundary_layout, only: describe_boundary
   use boundary_search, only: plane_t, search_lines
   use boundary_lines, only: crossed_edges
-  use boundary_names, only: name_points, names_t
+  use boundary_names, only: grow_sets, name_points, names_t
   use case_setup, only: grid_of, span_of
   use catalogue_search, only: check_slices
   use command_line, only: command_t
@@ -16,6 +16,7 @@ module boundary_driver
   use errors, only: error_t, fail
   use event_words, only: word_text
   use grid, only: grid_t, point_slice, two_axes
+  use invariant_sets, only: end_names
   use journal, only: json_number, json_text
   use map_final, only: write_whole
   use map_reader, only: reader_t
@@ -23,7 +24,7 @@ module boundary_driver
   use session, only: describe_file, session_t
   use status, only: exit_bad_case, exit_done
   use stored_map, only: open_map_session, read_labels, restore_catalogues
-  use text, only: to_text
+  use text, only: replace_all, to_text
   use trajectories, only: describe_regime
   use written_check, only: check_written
   implicit none
@@ -75,6 +76,7 @@ contains
       end associate
       call search_lines(session, grid, planes(i))
       call name_points(session%team, session%journal, grid, planes(i), names(i))
+      call grow_sets(session%team, session%journal, grid, planes(i), command%grow, names(i))
     end do
     call report(session, planes)
     call report_names(session, planes, names)
@@ -201,6 +203,7 @@ contains
             json_number(saddle%multipliers(2))//'], "points": '//to_text(names(i)%reached(k)))
         end associate
       end do
+      call report_sets(session, names(i), number - size(names(i)%saddles))
     end do
     do edge = 0, ubound(edge_names, 1)
       points = 0
@@ -213,5 +216,24 @@ contains
                                 json_text(name)//', "points": '//to_text(points))
     end do
   end subroutine report_names
+
+  !> How far the stable and unstable sets were grown; `before` saddles belong to the planes before this.
+  subroutine report_sets(session, names, before)
+    type(session_t), intent(inout) :: session
+    type(names_t), intent(in) :: names
+    integer, intent(in) :: before
+    character(len=:), allocatable :: which, ending
+    integer :: k
+    do k = 1, size(names%sets)
+      associate (set => names%sets(k), saddle => names%saddle_of_set(k) + before)
+        which = trim(merge('stable  ', 'unstable', set%stable))
+        ending = trim(end_names(set%ending))
+        call session%journal%line('set', '  saddle '//to_text(saddle)//', side '//to_text(set%side)//' of the '//which// &
+          ' set: '//to_text(size(set%piece))//' points, '//replace_all(ending, '_', ' '), '"saddle": '//to_text(saddle)// &
+          ', "set": '//json_text(which)//', "side": '//to_text(set%side)//', "points": '//to_text(size(set%piece))// &
+          ', "ending": '//json_text(ending))
+      end associate
+    end do
+  end subroutine report_sets
 
 end module boundary_driver

@@ -10,6 +10,7 @@ module boundary_layout
   use errors, only: error_t
   use file_layout, only: axis_dimension
   use grid, only: grid_t
+  use invariant_sets, only: end_names
   use kinds, only: int64, wp
   use map_reader, only: reader_t
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, &
@@ -21,7 +22,7 @@ module boundary_layout
 
   public :: describe_boundary
 
-  character(len=*), parameter :: group = 'saddles'
+  character(len=*), parameter :: group = 'saddles', set_group = 'sets'
 
   type :: piece_t
     integer :: first = 0, points = 0, labels(2) = 0, closed = 0, edge = 0, saddle = 0
@@ -72,6 +73,7 @@ contains
         data=[(grid%axes(i)%values(planes(table%plane(p))%index(i)), p=1, size(table%plane))])
     end do
     call add_saddles(grid, planes, names, schema)
+    call add_sets(names, schema)
   end subroutine describe_boundary
 
   !> Adds the pieces of a plane to the table; `before` saddles belong to the planes before it.
@@ -170,6 +172,58 @@ contains
     call schema%add_variable('v', type_float64, along, units='m/s', group=group, data=points(2, :), &
                              long_name='velocity at crank angle 0')
   end subroutine add_saddles
+
+  !> The curves of the stable and unstable sets, cut where they are, one after the other.
+  subroutine add_sets(names, schema)
+    type(names_t), intent(in) :: names(:)
+    type(schema_t), intent(inout) :: schema
+    character(len=name_length) :: along(1)
+    real(wp), allocatable :: points(:, :)
+    integer, allocatable :: saddle(:), stable(:), side(:), ending(:), piece(:), curve(:)
+    integer :: p, k, before, curves
+    allocate (points(2, 0), saddle(0), stable(0), side(0), ending(0), piece(0), curve(0))
+    before = 0
+    curves = 0
+    do p = 1, size(names)
+      do k = 1, size(names(p)%sets)
+        associate (set => names(p)%sets(k))
+          points = reshape([points, set%points], [2, size(points, 2) + size(set%points, 2)])
+          curve = [curve, spread(curves, 1, size(set%piece))]
+          piece = [piece, set%piece]
+          saddle = [saddle, names(p)%saddle_of_set(k) + before]
+          stable = [stable, merge(1, 0, set%stable)]
+          side = [side, set%side]
+          ending = [ending, set%ending]
+          curves = curves + 1
+        end associate
+      end do
+      before = before + size(names(p)%saddles)
+    end do
+    call schema%add_dimension('side', int(curves, int64))
+    call schema%add_dimension('set_point', size(piece, kind=int64))
+    along = 'side'
+    call add('saddle', type_int32, '1', 'number of the saddle, from 1', real(saddle, wp))
+    call schema%add_variable('stable', type_int8, along, units='1', flag_values=[0, 1], flag_meanings='unstable stable', &
+                             group=set_group, long_name='which set of the saddle', data=real(stable, wp))
+    call add('direction', type_int8, '1', 'side of the saddle, 1 or -1', real(side, wp))
+    call schema%add_variable('ending', type_int8, along, units='1', flag_values=[(k, k=0, ubound(end_names, 1))], &
+      flag_meanings=join(end_names, ' '), group=set_group, long_name='why the curve is no longer', data=real(ending, wp))
+    along = 'set_point'
+    call add('curve', type_int32, '1', 'side that the point is of, from 0', real(curve, wp))
+    call add('piece', type_int32, '1', 'piece of that side between two cuts, from 1', real(piece, wp))
+    call add('x', type_float64, 'm', 'position at crank angle 0', points(1, :))
+    call add('v', type_float64, 'm/s', 'velocity at crank angle 0', points(2, :))
+
+  contains
+
+    subroutine add(name, type, units, long_name, values)
+      character(len=*), intent(in) :: name, units, long_name
+      integer, intent(in) :: type
+      real(wp), intent(in) :: values(:)
+      call schema%add_variable(name, type, along, units=units, long_name=long_name, group=set_group, data=values)
+    end subroutine add
+
+  end subroutine add_sets
 
   subroutine add_points(grid, axes, points, schema)
     type(grid_t), intent(in) :: grid

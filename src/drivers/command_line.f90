@@ -49,6 +49,9 @@ module command_line
     real(wp) :: from = 0, to = 0
     logical :: has_from = .false., has_to = .false.
     integer :: searches = 12
+    !> `boundary`: invariant sets are grown within so many times the window of the map; 0 = none.
+    real(wp) :: grow = 1
+    logical :: has_grow = .false.
     !> `stability`: drive periods that are watched.
     integer :: periods = 20000
     !> `verify`: points rerun, and the seed that chooses them.
@@ -135,6 +138,8 @@ contains
       call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
     else if (command%name /= 'branches' .and. (len(command%parameter) > 0 .or. command%has_from .or. command%has_to)) then
       call fail(error, exit_usage, '--parameter, --from and --to belong to the command branches')
+    else if (command%name /= 'boundary' .and. command%has_grow) then
+      call fail(error, exit_usage, '--grow belongs to the command boundary')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. .not. any(command%name == tabulated)) then
@@ -218,7 +223,7 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--draw', '--parameter', '--from', '--to', '--searches', '--periods', &
+          '--draw', '--parameter', '--from', '--to', '--searches', '--periods', '--grow', &
           '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
@@ -269,6 +274,9 @@ contains
     case ('--to')
       command%has_to = .true.
       call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
+    case ('--grow')
+      command%has_grow = .true.
+      call read_number_in(name, value, 0.0_wp, 1000.0_wp, 'windows', command%grow, error)
     case ('--searches')
       call read_integer(name, value, 1, command%searches, error)
     case ('--periods')
@@ -381,7 +389,9 @@ contains
       lines = 'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
         '  Every edge between neighbours of different attractors is halved until its boundary point is known to 1e-10'//nl// &
         '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
-        '  takes a small part of the time of the map.'//nl
+        '  takes a small part of the time of the map. The pieces are named by what they lead to, and the stable and'//nl// &
+        '  unstable sets of the saddles are grown (one body).'//nl// &
+        '  --grow F           grows these sets within F times the window of the map (default 1; 0: not at all)'//nl
     case ('stability')
       lines = 'separatrix stability CASE [--periods N]: Lyapunov exponents and the kind of one motion'//nl// &
         '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &

@@ -92,7 +92,7 @@ def test_two_ranks_write_the_same_curves(run, coulomb, curves, tmp_path):
     with h5py.File(out) as one, h5py.File(curves) as other:
         names = [name for name in one if isinstance(one[name], h5py.Dataset)]
         assert {"x0", "v0", "across", "below", "above", "error", "first", "points"} <= set(names)
-        names += [f"saddles/{name}" for name in one["saddles"]]
+        names += [f"saddles/{name}" for name in one["saddles"]] + [f"sets/{name}" for name in one["sets"]]
         for name in names:
             np.testing.assert_array_equal(one[name][()], other[name][()])
 
@@ -153,6 +153,45 @@ def test_the_boundary_of_the_coulomb_machine_is_the_stable_set_of_one_saddle(cou
         once = sx.trajectory(case.with_({"run.duration": period, "run.window": period}), x, v, samples=4)
         assert once["x"].values[-1] == pytest.approx(x, abs=1e-10)
         assert once["v"].values[-1] == pytest.approx(v, abs=1e-9)
+
+
+def test_the_stable_set_is_the_boundary_and_the_unstable_set_leads_to_the_attractors(coulomb, curves):
+    with open_result(coulomb) as basins, open_result(curves) as result:
+        catalogue = search_slices(Model.from_text(basins.attrs["resolved_case"]), [{}], ())[0]
+        sets = table(result, "sets")
+        x, v, curve = (sets[name].values for name in ("x", "v", "curve"))
+        stable = sets["stable"].values[curve] == 1
+        # labels on both sides of points of the stable set, across its chord
+        pieces = np.stack([curve, sets["piece"].values])
+        inner = np.flatnonzero(stable & (x > 0.1) & (x < 1.0))[1:-1]
+        inner = inner[(pieces[:, inner - 1] == pieces[:, inner + 1]).all(axis=0)]
+        assert inner.size > 100
+        chord = np.stack([x[inner + 1] - x[inner - 1], (v[inner + 1] - v[inner - 1]) / 10])
+        normal = np.stack([-chord[1], chord[0] * 10]) / np.hypot(*chord)
+        sides = []
+        for sign in (-1, 1):
+            starts = np.zeros((inner.size, 3))
+            starts[:, 0], starts[:, 1] = (
+                x[inner] + sign * 1e-8 * normal[0],
+                v[inner] + sign * 1e-8 * normal[1],
+            )
+            sides.append(catalogue.labels(starts)["attractor"])
+        assert (sides[0] != sides[1]).all()
+        ends = decode_flags(sets["ending"]).values
+        assert set(ends[sets["stable"].values == 0]) == {"converged"}
+
+
+def test_sets_are_grown_as_far_as_asked(run, coulomb, tmp_path):
+    sizes = []
+    for factor in (0, 1, 2):
+        out = tmp_path / f"{factor}.h5"
+        assert run("boundary", coulomb, "-o", out, "--grow", factor).returncode == 0
+        with open_result(out) as result:
+            sizes.append(result.sizes["set_point"])
+            inside = np.abs(result["sets_v"].values) <= 6 * factor
+            assert inside.all()
+    assert sizes[0] == 0 < sizes[1] < sizes[2]
+    assert run("info", coulomb, "--grow", 2).returncode == 64
 
 
 def test_a_map_of_one_attractor_has_no_boundary(run, source_dir, tmp_path):

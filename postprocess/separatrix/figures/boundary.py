@@ -175,8 +175,35 @@ def draw(
         ax.plot(x[chosen], y[chosen], line, color=colour, linewidth=0.8, zorder=4)
         handles.setdefault(text, Line2D([], [], color=colour, linestyle=line, label=text))
     if (across, down) in (("x0", "v0"), ("v0", "x0")) and _on_section(result, place):
+        handles |= _draw_sets(ax, result, across, factors, place, look)
         handles |= _draw_saddles(ax, result, across, factors, place, look)
     return list(handles.values())
+
+
+def _draw_sets(
+    ax: Axes, result: xr.Dataset, across: str, factors: list[float], place: dict[str, float], look: Look
+) -> dict[str, Line2D]:
+    """Draw the stable and unstable sets of the saddles: thin lines that end at cuts."""
+    handles: dict[str, Line2D] = {}
+    curve, part = result["sets_curve"].values, result["sets_piece"].values
+    points = [result[f"sets_{name}"].values for name in ("x", "v")]
+    across_points, down_points = points if across == "x0" else points[::-1]
+    breaks = np.flatnonzero((np.diff(curve) != 0) | (np.diff(part) != 0)) + 1
+    for side in range(result.sizes["side"]):
+        if not _belongs(result, "saddles_", int(result["sets_saddle"].values[side]) - 1, place, look):
+            continue
+        stable = bool(result["sets_stable"].values[side])
+        text = "stable set of a saddle" if stable else "unstable set of a saddle"
+        colour, line = (style.OKABE_ITO[5], "-") if stable else (style.OKABE_ITO[0], "-")
+        mine = np.flatnonzero(curve == side)
+        cuts = np.searchsorted(mine, breaks[(breaks > mine[0]) & (breaks <= mine[-1])])
+        x, y = (np.insert(values[mine], cuts, np.nan) for values in (across_points, down_points))
+        limits = ax.get_xlim(), ax.get_ylim()
+        ax.plot(x * factors[0], y * factors[1], line, color=colour, linewidth=0.6, zorder=3.5)
+        ax.set_xlim(limits[0])
+        ax.set_ylim(limits[1])
+        handles.setdefault(text, Line2D([], [], color=colour, linestyle=line, linewidth=0.8, label=text))
+    return handles
 
 
 def _draw_saddles(
