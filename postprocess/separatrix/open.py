@@ -17,8 +17,8 @@ from separatrix.version import __version__
 
 FORMAT = "separatrix"
 FORMAT_VERSION = 1
-KINDS = ("basin", "sweep", "trajectory", "points", "branches")
-TABLES = ("catalogue", "limits")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary")
+TABLES = ("catalogue", "limits", "saddles")
 
 _WORD_SYMBOLS = {1: "R", 2: "L", 3: "S", 4: "C", 5: "D", 6: "+", 7: "."}
 
@@ -44,6 +44,7 @@ def open_result(path: str | Path) -> xr.Dataset:
             _close(parts)
             raise
     result.attrs = attributes | texts
+    result.encoding["source"] = str(Path(path).absolute())
     # results have their accessor, however they were made
     importlib.import_module("separatrix.accessor")
     result.set_close(lambda: _close(parts))
