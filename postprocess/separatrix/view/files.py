@@ -8,28 +8,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.errors import DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import try_first
 from separatrix.view.packing import clean
+from separatrix.words import decode_word
 
 __all__ = ["ResultFile"]
 
 STARTS = ("x0", "v0", "crank_angle")
-KINDS = ("basin", "sweep", "trajectory", "points")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches")
 _TABLES = ("catalogue", "limits")
-_SYMBOLS = {1: "R", 2: "L", 3: "S", 4: "C", 5: "D", 6: "+", 7: "."}
 # of an axis whose values are sent one by one
 _SHORT = 4096
-_ERRORS = (
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
 
 
 class ResultFile:
@@ -46,7 +36,7 @@ class ResultFile:
             self._read_header(self.file)
         except SeparatrixError:
             raise
-        except _ERRORS as error:
+        except DAMAGE as error:
             raise SeparatrixError(f"{path}: is damaged ({str(error).splitlines()[0]})") from error
 
     def _try(self, file: h5py.File) -> None:
@@ -126,7 +116,7 @@ class ResultFile:
             for row in zip(*(entries[key] for key in entries), strict=True)
         ]
         for one in catalogue:
-            one["word"] = word_text(one.get("event_word", 0))
+            one["word"] = decode_word(one.get("event_word") or 0)
         description = {
             "kind": self.kind,
             "name": self.path.name,
@@ -158,7 +148,7 @@ class ResultFile:
             value = self.file[one["name"]][index]
             text = one["codes"].get(int(value)) if one["classes"] else None
             if one["name"] == "event_word":
-                text = word_text(value)
+                text = decode_word(value)
             found[one["name"]] = text if text is not None else value
         return found
 
@@ -187,15 +177,6 @@ class ResultFile:
             values = item[()]
             arrays[name] = values.astype(np.float64) if values.dtype == np.int64 else values
         return {"variables": header, "limits": self.tables.get("limits", {})}, arrays
-
-
-def word_text(word: int) -> str:
-    """Return the events of one period of a motion as text: 'R.' is one impact a drive period."""
-    rest, symbols = int(word or 0), ""
-    while rest > 0:
-        symbols += _SYMBOLS.get(rest & 7, "?")
-        rest >>= 3
-    return symbols
 
 
 def _order(name: str) -> tuple[int, str]:

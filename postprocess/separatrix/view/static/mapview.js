@@ -168,6 +168,10 @@ export class MapView {
         }
         continue;
       }
+      if (mark.kind === "saddle") {
+        diamond(context, x, y);
+        continue;
+      }
       context.arc(x, y, mark.kind === "section" ? 2 : 5, 0, 2 * Math.PI);
       context.fillStyle = mark.colour;
       context.fill();
@@ -282,6 +286,20 @@ export class MapView {
     this.draw();
     this.callbacks.hover(this.cursor, true);
   }
+}
+
+/** A saddle: a white diamond with a dark edge. */
+function diamond(context, x, y) {
+  context.beginPath();
+  context.moveTo(x - 6, y);
+  context.lineTo(x, y - 6);
+  context.lineTo(x + 6, y);
+  context.lineTo(x, y + 6);
+  context.closePath();
+  context.fillStyle = "#ffffff";
+  context.fill();
+  context.strokeStyle = "#000000";
+  context.stroke();
 }
 
 /** Value of an axis at an index coordinate: lines between the values of the file, and beyond. */
