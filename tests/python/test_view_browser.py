@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from program import succeed
+from sample_files import write_boundary
 from separatrix.view.export import export_page
 from separatrix.view.protocol import Desk
 from separatrix.view.server import Server
@@ -275,6 +276,50 @@ def test_branches_are_linked_with_the_map(page: object, branch_file: Path) -> No
     ready(page)
     diagram.click(position={"x": look(page, "v.links.diagrams[1].plot.x(1.29)"), "y": 20})
     wait(page, "v.at[0] === 2 && Math.abs(v.links.diagrams[1].marked - 1.3) < 1e-12")
+
+
+def test_boundaries_are_drawn_over_their_map(
+    browser: object, results: dict[str, Path], tmp_path: Path, library: Path
+) -> None:
+    """The map beside the file opens with it; curves and saddles of its slice, none of others."""
+    stack = tmp_path / "stack.h5"
+    shutil.copy(results["stack"], stack)
+    desk = Desk([write_boundary(tmp_path / "boundary.h5", stack), results["map"]])
+    with Server(desk) as server:
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+        page = browser.new_page(viewport=SIZE)
+        said: list[str] = []
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(server.address)
+        page.wait_for_selector("canvas.map")
+        ready(page)
+        panel = page.locator("section[aria-label=Boundaries]")
+        assert look(page, "v.map.curves.length") == 0
+        assert "Open stack.h5 with it" in panel.inner_text()
+        page.get_by_label("Map").first.select_option("1")
+        ready(page)
+        assert look(page, "[v.at[0], v.map.curves.length, v.boundaries[0].saddles.length]") == [1, 0, 0]
+        slider = page.locator(".slider input")
+        slider.focus()
+        for key, piece, x in (("ArrowRight", 1, 0.25), ("Home", 0, 0.85)):
+            page.keyboard.press(key)
+            wait(page, f"v.map.marks.some((m) => m.kind === 'saddle' && m.x === {x}) && !v.map.pending")
+            assert look(page, "v.map.curves.length") == 1
+            assert look(page, "v.map.marks.filter((m) => m.kind === 'saddle').map((m) => [m.x, m.y])") == [
+                [x, 0]
+            ]
+            assert look(page, "v.map.curves[0].xs.length") == 41
+            page.wait_for_timeout(100)
+            place = look(page, "[v.map.px(v.map.curves[0].xs[10]), v.map.py(v.map.curves[0].ys[10])]")
+            dark = colour_at(page, *place)
+            assert max(dark) < 110 if piece == 0 else dark != colour_at(page, place[0], place[1] - 30)
+        assert panel.locator("tbody tr").count() == 2
+        panel.get_by_label("draw them over the map").uncheck()
+        assert look(page, "v.map.curves.length") == 0
+        assert said == []
+        page.close()
+        server.shutdown()
+    desk.close()
 
 
 def test_two_tabs_and_a_server_that_stops(browser: object, results: dict[str, Path], library: Path) -> None:

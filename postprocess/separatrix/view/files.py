@@ -16,7 +16,7 @@ from separatrix.words import decode_word
 __all__ = ["ResultFile"]
 
 STARTS = ("x0", "v0", "crank_angle")
-KINDS = ("basin", "sweep", "trajectory", "points", "branches")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary")
 _TABLES = ("catalogue", "limits")
 # of an axis whose values are sent one by one
 _SHORT = 4096
@@ -74,6 +74,7 @@ class ResultFile:
         if self.kind == "basin" and not (len(self.axes) >= 2 and self.variables):
             raise SeparatrixError(f"{self.path}: is damaged (no map over two axes)")
         self.variables.sort(key=lambda one: _order(one["name"]))
+        self.identity = str(_plain(file["provenance"].attrs.get("case_identity", "")))
         self.tables = {name: _table(file[name]) for name in _TABLES if name in file}
 
     def _read_axes(self, file: h5py.File) -> list[dict]:
@@ -121,6 +122,7 @@ class ResultFile:
             "kind": self.kind,
             "name": self.path.name,
             "title": self.attributes.get("title", ""),
+            "identity": self.identity,
             "axes": axes,
             "variables": self.variables,
             "catalogue": catalogue,
@@ -168,7 +170,10 @@ class ResultFile:
     def series(self) -> tuple[dict, dict[str, np.ndarray]]:
         """Return names, units and arrays of a file that is not a map, and its table of limits."""
         header, arrays = {}, {}
-        for name, item in self.file.items():
+        found = dict(self.file.items())
+        if "saddles" in found:
+            found |= {f"saddles_{name}": item for name, item in self.file["saddles"].items()}
+        for name, item in found.items():
             if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiu" or not item.ndim:
                 continue
             header[name] = {"label": _text(item, "long_name", name), "unit": _unit(item)}

@@ -3,6 +3,7 @@
 
 // The viewer: files, controls, the map and what belongs to it.
 import { Address, restored } from "./address.js";
+import { BoundaryPanel } from "./boundaries.js";
 import { BranchPanel } from "./branches.js";
 import { fill, h, quantity, save, words } from "./dom.js";
 import { attractorTable, classLegend, describeAttractor, scaleLegend, wordClass } from "./legend.js";
@@ -38,6 +39,7 @@ class Viewer {
     this.hidden = new Map();
     this.with = {};
     this.links = new Links(this);
+    this.boundaries = [];
     this.inspector = new Inspector(this);
     this.starter = new Starter(this);
     this.address = new Address(this);
@@ -91,6 +93,9 @@ class Viewer {
         this.right.append(this.links.add(new SweepPanel(file, answer, this.links)));
       } else if (file.kind === "branches") {
         this.right.append(this.links.add(new BranchPanel(file, answer, this.links)));
+      } else if (file.kind === "boundary") {
+        this.boundaries.push(new BoundaryPanel(file, answer, this));
+        this.right.append(this.boundaries.at(-1).element);
       } else if (file.kind === "points") {
         this.right.append(new PointsPanel(file, answer).element);
       } else {
@@ -338,6 +343,8 @@ class Viewer {
   }
 
   mark() {
+    if (!this.file) return;
+    this.map.curves = this.boundaries.flatMap((one) => one.curves());
     this.map.marks = marksOf(this);
     this.map.draw();
   }

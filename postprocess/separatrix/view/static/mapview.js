@@ -19,6 +19,7 @@ export class MapView {
     this.slow = null;
     this.painter = null;
     this.marks = [];
+    this.curves = [];
     this.live = null;
     this.cursor = null;
     this.pointers = new Map();
@@ -98,6 +99,7 @@ export class MapView {
     context.fillRect(...box);
     this.drawTiles(context);
     if (this.live) this.live.draw(context, this);
+    this.drawCurves(context);
     this.drawMarks(context);
     context.restore();
     const [a, b] = this.axes;
@@ -150,6 +152,23 @@ export class MapView {
     const y0 = Math.round(this.py(b[1] - 0.5)), y1 = Math.round(this.py(b[0] - 0.5));
     context.imageSmoothingEnabled = (x1 - x0) < sw;
     context.drawImage(picture, sx, Math.max(0, sy), sw, sh, x0, y0, x1 - x0, y1 - y0);
+  }
+
+  /** Curves in index coordinates, dark on a white edge. */
+  drawCurves(context) {
+    const [left, top, width, height] = this.box, v = this.view;
+    const across = width / (v.a1 - v.a0), up = height / (v.b1 - v.b0);
+    for (const { xs, ys, colour, dashes } of this.curves) {
+      context.beginPath();
+      for (let i = 0; i < xs.length; i++) context.lineTo(left + (xs[i] - v.a0) * across, top + height - (ys[i] - v.b0) * up);
+      for (const [stroke, thick, gaps] of [["#ffffff", 3.5, []], [colour, 1.6, dashes]]) {
+        context.strokeStyle = stroke;
+        context.lineWidth = thick;
+        context.setLineDash(gaps);
+        context.stroke();
+      }
+    }
+    context.setLineDash([]);
   }
 
   drawMarks(context) {
