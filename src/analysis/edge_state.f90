@@ -36,6 +36,8 @@ module edge_state
   integer, parameter :: most_periods = 300, longest = 12
   !> Distances in natural sizes: at which a pair is brought together again and to which, at which it has parted.
   real(wp), parameter :: apart = 1e-6_wp, together = 1e-10_wp, closest = 1e-13_wp, parted = 1e-2_wp
+  !> Growth of the distance within one period that is looked at more closely where one has an event that the other has not.
+  real(wp), parameter :: sudden = 1e3_wp
   !> A return so near is tried with Newton's method; a motion that never returns nearer than `far` is not periodic.
   real(wp), parameter :: near_return = 1e-3_wp, far = 2e-2_wp
   !> It has come to a saddle at this distance; it has not where the distance grows so many times, or after so many periods.
@@ -81,7 +83,7 @@ contains
       before = pair
       call advance_pair(body, pair, event, ok)
       if (.not. ok) return
-      if (gap_of(body, pair) > parted) then
+      if (gap_of(body, pair) > parted .or. (event /= 0 .and. gap_of(body, pair) > sudden*max(gap_of(body, before), together))) then
         call look_closer(body, catalogue, span, before, pair, event, ok)
         if (ok) edge = edge_of_event(event)
         if (ok .or. gap_of(body, pair) > parted) return
@@ -102,7 +104,7 @@ contains
     if (least > far) edge = edge_recurrent
   end subroutine track_edge
 
-  !> A pair has parted within one period: with its distance before made a thousandth, does it part as much? Then the map is
+  !> A pair has parted within one period: with its distance before made a thousandth, or less, does it part as much? Then the map is
   !> discontinuous there, and `event` is what only one of the two has.
   pure subroutine look_closer(body, catalogue, span, before, pair, event, discontinuous)
     type(one_body_t), intent(in) :: body

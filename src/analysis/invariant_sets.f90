@@ -27,6 +27,8 @@ module invariant_sets
   integer, parameter :: most_levels = 80, most_points = 6000, most_newton = 12
   !> Starts along each side of the window whose images are known, and how many of them are tried as guesses.
   integer, parameter :: scans = 40, most_tries = 4
+  !> Of natural sizes: how far the image of a guess may be from the target, and after five steps.
+  real(wp), parameter :: farthest_guess = 0.5_wp, hopeless = 1e-2_wp
   !> Of natural sizes: distance from the saddle at which a set begins, between neighbours, and of a preimage's image.
   real(wp), parameter :: first_step = 1e-6_wp, spacing = 1e-2_wp, accuracy = 1e-12_wp
   !> Largest angle between neighbouring chords [rad] where these are longer than the share of the spacing; least step of the place.
@@ -288,6 +290,7 @@ contains
     end do
     do i = 1, most_tries
       nearest = minloc(distance, 1)
+      if (distance(nearest) > farthest_guess) exit
       y = growth%starts(:, nearest)
       call find_preimage(machines, body, target, y, ok)
       if (ok) return
@@ -337,6 +340,8 @@ contains
       miss = section_distance(body, image, target)
       if (miss < least) best = y
       if (miss >= least .and. least < accuracy) exit
+      ! Newton's method is quick, or it leads nowhere.
+      if (i > 5 .and. least > hopeless) exit
       least = min(least, miss)
       if (.not. miss > 0) exit
       call solve(slopes, target - image, step, ok)

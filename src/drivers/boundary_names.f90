@@ -37,6 +37,7 @@ module boundary_names
   !> Names of the points of a plane, and its saddles; of how many points each saddle is the edge state.
   type, public :: names_t
     integer, allocatable :: edge(:), saddle(:), reached(:)
+    logical, allocatable :: tracked(:)
     type(saddle_t), allocatable :: saddles(:)
     !> Sides of the stable and unstable sets, and the saddle of each.
     type(set_t), allocatable :: sets(:)
@@ -59,6 +60,7 @@ contains
     type(error_t), allocatable :: error
     integer :: k
     allocate (names%edge(size(plane%points)), names%saddle(size(plane%points)), source=0)
+    allocate (names%tracked(size(plane%points)), source=.false.)
     allocate (names%saddles(0), names%reached(0), names%sets(0), names%saddle_of_set(0))
     family%laws = slice_laws(grid, point_slice(grid, plane%index))
     family%options = grid%options
@@ -68,11 +70,15 @@ contains
     if (allocated(error)) return
     select type (body => machines%centre)
     type is (one_body_t)
-      call track_samples(team, journal, grid, plane, machines, body, names)
+      call track_points(team, journal, grid, plane, machines, body, chosen_points(plane), names)
       associate (starts => slice_starts(grid, sought_starts, 0))
         call seek_saddles(machines, body, starts(:2, :), sought_periods, names%saddles)
       end associate
       call try_saddles(team, grid, plane, body, names)
+      ! What is left is mostly where one name ends and another begins.
+      k = size(names%saddles)
+      call track_points(team, journal, grid, plane, machines, body, points_left(plane, names), names)
+      if (size(names%saddles) > k) call try_saddles(team, grid, plane, body, names)
     end select
     do k = 1, size(plane%lines)
       call bridge(plane, plane%lines(k), names)
@@ -110,21 +116,38 @@ contains
     end do
   end function chosen_points
 
-  subroutine track_samples(team, journal, grid, plane, machines, body, names)
+  !> Points without a name that were not tracked, at most as many as are tracked at first, spread over all.
+  pure function points_left(plane, names) result(points)
+    type(plane_t), intent(in) :: plane
+    type(names_t), intent(in) :: names
+    integer, allocatable :: points(:)
+    logical :: left(size(plane%points))
+    integer :: i, n
+    do i = 1, size(left)
+      left(i) = names%edge(i) == edge_not_known .and. .not. names%tracked(i)
+      if (left(i)) left(i) = is_known(plane, i)
+    end do
+    points = pack([(i, i=1, size(left))], left)
+    n = min(most_tracked, size(points))
+    points = [(points(1 + ((2*i - 1)*size(points))/(2*n)), i=1, n)]
+  end function points_left
+
+  !> Names points by tracking them.
+  subroutine track_points(team, journal, grid, plane, machines, body, points, names)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(in) :: plane
     type(neighbourhood_t), intent(in) :: machines
     type(one_body_t), intent(in) :: body
+    integer, intent(in) :: points(:)
     type(names_t), intent(inout) :: names
-    integer, allocatable :: points(:)
     real(wp), allocatable :: own(:), found(:)
     type(saddle_t) :: saddle
     real(wp) :: starts(3 + size(grid%others), 2)
     integer :: k, edge, number
     logical :: ok
-    points = chosen_points(plane)
+    names%tracked(points) = .true.
     allocate (own(0))
     call journal%begin('edge states', int(size(points)/team%size(), int64), 0_int64)
     do k = 1 + team%rank(), size(points), team%size()
@@ -165,7 +188,7 @@ contains
       end do
     end function locate
 
-  end subroutine track_samples
+  end subroutine track_points
 
   !> Tries every point that was not tracked on the saddles.
   subroutine try_saddles(team, grid, plane, body, names)
