@@ -43,7 +43,7 @@ program separatrix
       case ('branches')
         call run_branches(command)
       case ('stability')
-        call run_stability(command)
+        call run_stability(command, error)
       case ('trajectory')
         call run_trajectory_command(command)
       case ('points')

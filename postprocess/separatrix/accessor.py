@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("separatrix")
 class Accessor:
-    """The result of `basin`, `sweep`, `points`, `branches` or `trajectory`, or of `open_result`."""
+    """The result of `basin`, `sweep`, `points`, `branches`, `trajectory`, `measures_along`, `open_result`."""
 
     def __init__(self, result: xr.Dataset) -> None:
         """Take any Dataset; what is no result is refused when it is asked."""
@@ -31,7 +31,7 @@ class Accessor:
 
     @property
     def kind(self) -> str:
-        """The kind of result: basin, sweep, points, branches or trajectory."""
+        """The kind of result: basin, sweep, points, branches, trajectory or measures."""
         kind = self._result.attrs.get("kind")
         if kind is None:
             raise SeparatrixError("this Dataset is no result of Separatrix (no attribute kind)", USAGE)
@@ -123,15 +123,15 @@ class Accessor:
 
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
-        "phase", "energy" and "contact", of points "regime", of branches "branches". Notebooks show
-        the figure; `savefig` writes it, `save` in several formats.
+        "phase", "energy" and "contact", of points "regime", of branches "branches", of measures along a
+        parameter "erosion". Notebooks show the figure; `savefig` writes it, `save` in several formats.
 
         `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
         slice={"drive.ratio": 1.2}, inset={"x0": (0, 0.1), "v0": (-1, 1)}, axes=("v0", "x0"), units=["mm"],
         shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
-        from separatrix.figures import basin, branches, points, sweep, trajectory
+        from separatrix.figures import basin, branches, erosion, points, sweep, trajectory
         from separatrix.labels import plain
 
         kind = self.kind
@@ -141,7 +141,10 @@ class Accessor:
             if kind == "basin":
                 made = basin.figures(None, self._result, name, heading, look)
             else:
-                modules = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
+                modules = {
+                    "sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches,
+                    "measures": erosion,
+                }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
         if name is not None and name not in made:
             raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)

@@ -17,7 +17,7 @@ from separatrix.version import __version__
 
 FORMAT = "separatrix"
 FORMAT_VERSION = 1
-KINDS = ("basin", "sweep", "trajectory", "points", "branches")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "measures")
 TABLES = ("catalogue", "limits")
 
 _WORD_SYMBOLS = {1: "R", 2: "L", 3: "S", 4: "C", 5: "D", 6: "+", 7: "."}

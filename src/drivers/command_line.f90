@@ -375,9 +375,10 @@ contains
         '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
         '  --searches N       values at which orbits are searched (default 12)'//nl
     case ('stability')
-      lines = 'separatrix stability CASE [--periods N]: Lyapunov exponents and the kind of one motion'//nl// &
+      lines = 'separatrix stability CASE|MAP [--periods N]: Lyapunov exponents and the kind of a motion'//nl// &
         '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
-        '  the 0-1 test, and what the motion is. One body. Writes no file.'//nl// &
+        '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period (chaotic, quasi-periodic,'//nl// &
+        '  long transient, period above the limit, not known). One body. Writes no file.'//nl// &
         '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl
     case ('trajectory')
       lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
