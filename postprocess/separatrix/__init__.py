@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from separatrix.measuring.along import measures_along as measures_along
     from separatrix.measuring.api import measures as measures
     from separatrix.measuring.api import tipping as tipping
+    from separatrix.measuring.survival import survival as survival
     from separatrix.motions import trajectory as trajectory
     from separatrix.open import decode_flags as decode_flags
     from separatrix.open import decode_word as decode_word
@@ -60,6 +61,7 @@ _HOME = {
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
     "stability": "separatrix.orbits",
+    "survival": "separatrix.measuring.survival",
     "sweep": "separatrix.maps",
     "table": "separatrix.open",
     "tipping": "separatrix.measuring.api",

@@ -124,14 +124,15 @@ class Accessor:
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
         "phase", "energy" and "contact", of points "regime", of branches "branches", of measures along a
-        parameter "erosion". Notebooks show the figure; `savefig` writes it, `save` in several formats.
+        parameter "erosion", of survival "survival". Notebooks show the figure; `savefig` writes it, `save`
+        in several formats.
 
         `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
         slice={"drive.ratio": 1.2}, inset={"x0": (0, 0.1), "v0": (-1, 1)}, axes=("v0", "x0"), units=["mm"],
         shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
-        from separatrix.figures import basin, branches, erosion, points, sweep, trajectory
+        from separatrix.figures import basin, branches, erosion, points, survival, sweep, trajectory
         from separatrix.labels import plain
 
         kind = self.kind
@@ -143,7 +144,7 @@ class Accessor:
             else:
                 modules = {
                     "sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches,
-                    "measures": erosion,
+                    "measures": erosion, "survival": survival,
                 }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
         if name is not None and name not in made:

@@ -105,22 +105,22 @@ def _make(path: Path, options: argparse.Namespace) -> list[Path]:
             return [_animated(path, result, folder / f"{stem}_animation", title, look, options)]
         return [
             written
-            for name, figure in _figures(path, result, options, title, look).items()
+            for name, figure in _figures(path, result, options.field, title, look, options.branches).items()
             for written in save(figure, folder / f"{stem}_{name}", options.formats, options.dpi)
         ]
 
 
 def _figures(
-    path: Path, result: object, options: argparse.Namespace, title: str, look: Look
+    path: Path, result: object, field: str | None, title: str, look: Look, orbits: Path | None = None
 ) -> dict[str, Figure]:
-    kind, field = result.attrs["kind"], options.field
+    kind = result.attrs["kind"]
     if kind == "basin":
         return basin.figures(path, result, field, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
-    if options.branches and kind == "measures":
-        with reading(options.branches), open_result(options.branches) as orbits:
-            return erosion.figures(result, title, look, orbits)
+    if orbits and kind == "measures":
+        with reading(orbits), open_result(orbits) as found:
+            return erosion.figures(result, title, look, found)
     return _BY_KIND[kind].figures(result, title, look)
 
 

@@ -232,3 +232,27 @@ def test_the_command_is_installed(separatrix: Path) -> None:
         check=True,
     )
     assert done.stdout.startswith("separatrix-measures ")
+
+
+def test_rare_blows_have_an_exponential_law_and_frequent_ones_do_worse(crank) -> None:
+    rare = sx.survival(crank, 1, rate=0.02, deviation=1.0, motions=400, horizon=1000)
+    assert rare["survival"].values[0] == 1
+    # the law's band and the band of the motions meet at every time
+    assert np.all(rare["survival_lower"] <= rare["law_upper"])
+    assert np.all(rare["law_lower"] <= rare["survival_upper"])
+    assert np.all(np.diff(rare["survival"].values) <= 0)
+    often = sx.survival(crank, 1, rate=1.0, deviation=1.0, motions=400, horizon=20)
+    # as many blows, but they meet motions that have not settled
+    assert often["survival_upper"].values[-1] < rare["survival"].values[-1]
+    assert often.separatrix.plot() is not None
+    with pytest.raises(sx.SeparatrixError, match="found attractor 9, allowed 1, 2"):
+        sx.survival(crank, 9, rate=1.0, deviation=1.0)
+    with pytest.raises(sx.SeparatrixError, match="rate > 0"):
+        sx.survival(crank, 1, rate=0.0, deviation=1.0)
+
+
+def test_survival_does_not_depend_on_threads(crank) -> None:
+    one, other = (
+        sx.survival(crank, 2, rate=0.5, deviation=2.0, motions=100, threads=threads) for threads in (1, 3)
+    )
+    assert np.array_equal(one["survival"].values, other["survival"].values)

@@ -48,7 +48,7 @@ def test_what_makes_no_sense_is_refused(run):
 
 
 def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp_path: Path):
-    """Chaos beside a cycle at a soft wall, and chaos at a rigid one with its exact sum; cycles are left out."""
+    """Chaos beside a cycle at a soft wall, chaos at a rigid one with its exact sum; cycles are left out."""
 
     def typed(case: str, *settings: str) -> tuple[dict, list[dict]]:
         target = tmp_path / f"{case}.h5"

@@ -3,6 +3,7 @@
 """The command `separatrix-measures`: how safe, how large and how entangled the basins of a map are."""
 
 import argparse
+import contextlib
 import json
 import sys
 from collections.abc import Sequence
@@ -29,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("separatrix-measures: stopped", file=sys.stderr)
         return 130
-    if text:
+    with contextlib.suppress(BrokenPipeError):
+        # who reads may have had enough
         print(text, flush=True)
     return 0
 

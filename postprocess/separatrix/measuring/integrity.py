@@ -12,8 +12,10 @@ from separatrix.measuring.maps import Slice
 from separatrix.measuring.report import Measure
 from separatrix.measuring.sampling import generator
 
-CELLS = "95 %: cells with corners of one label count as that label, new starts in the others (Clopper "
-"and Pearson)"
+CELLS = (
+    "95 %: cells with corners of one label count as that label, new starts in the others "
+    "(Clopper and Pearson)"
+)
 POINTS = "from none to all of the cells with corners of more than one label"
 RAY = "own starts up to the lower end, a start of another label at the upper end"
 

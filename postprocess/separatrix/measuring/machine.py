@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The machine of a map as a labelling function: new starts in threads, with the numbers of the map."""
 
+import functools
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
@@ -16,6 +17,11 @@ from separatrix.simulate import Attractor, Catalogue, section_points
 # Starts of one call, as in a map.
 _PIECE = 1024
 _COLUMNS = {"x0": 0, "v0": 1, "crank_angle": 2}
+
+
+@functools.cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads)
 
 
 class Machine:
@@ -37,7 +43,6 @@ class Machine:
         self.catalogue = Catalogue(case.model, self.values).search()
         self.numbers: dict[int, int] = {}
         self.counted = 0
-        self._pool = ThreadPoolExecutor(self.threads)
         self._take_own_numbers()
 
     def _take_own_numbers(self) -> None:
@@ -84,10 +89,12 @@ class Machine:
 
     def found(self, points: np.ndarray, angle: float | None = None) -> dict[str, np.ndarray]:
         """Return all that a map has of scaled points; `attractor` by the numbers of the map, -1: no start."""
-        starts = self.columns(points, angle)
+        return self._labelled(self.columns(points, angle))
+
+    def _labelled(self, starts: np.ndarray) -> dict[str, np.ndarray]:
         pieces = [starts[i : i + _PIECE] for i in range(0, len(starts), _PIECE)]
         parts = (
-            list(self._pool.map(self.catalogue.labels, pieces))
+            list(_pool(self.threads).map(self.catalogue.labels, pieces))
             if len(pieces) > 1
             else [self.catalogue.labels(piece) for piece in pieces]
         )
@@ -104,6 +111,10 @@ class Machine:
     def labels(self, points: np.ndarray, angle: float | None = None) -> np.ndarray:
         """Return the labels of scaled points."""
         return self.found(points, angle)["attractor"] if len(points) else np.empty(0, np.int32)
+
+    def labels_of(self, states: np.ndarray) -> np.ndarray:
+        """Return the labels of states x [m], v [m/s], crank angle [rad]."""
+        return self._labelled(states)["attractor"]
 
     def attractor(self, number: int) -> Attractor:
         """Return the attractor with a number of the map."""

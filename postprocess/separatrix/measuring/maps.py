@@ -87,14 +87,16 @@ def slice_of(
     turns = _turns(case, names, axes)
     grid, settle, axes = _closed(grid, settle, axes, turns)
     region = Region(np.array([axis.min() for axis in axes]), np.array([axis.max() for axis in axes]), turns)
-    units = tuple("rad" if _is_angle(case) and not name.endswith("v0") else "m" for name in names)
+    units = ("rad" if _is_angle(case) else "m",) * len(names)
     entries = _entries(result, place)
-    about = {"map": str(result.attrs.get("title", ""))}
+    title = str(result.attrs.get("title", ""))
+    about = {"map": title} if title else {}
     about |= {name: float(result[name].values[at]) for name, at in place.items()}
     about["window"] = "; ".join(
-        f"{name} {low:.6g} to {high:.6g} {'m/s' if one != 1 else unit}".replace("rad/s", "rad/s")
-        for name, low, high, one, unit in zip(
-            names, region.lower * scale, region.upper * scale, scale, units, strict=True
+        f"{name} {low:.6g} to {high:.6g} {'rad/s' if unit == 'rad' and 'v0' in name else unit}"
+        f"{'/s' if unit == 'm' and 'v0' in name else ''}"
+        for name, low, high, unit in zip(
+            names, region.lower * scale, region.upper * scale, units, strict=True
         )
     )
     about["distance"] = f"in {units[0]}; velocities are divided by {frequency:.9g} rad/s ({source})"

@@ -132,7 +132,7 @@ def _digits(value: float, width: float) -> int:
     """Digits that show the width of an interval."""
     if not (math.isfinite(width) and width > 0 and value != 0):
         return 6
-    return min(max(6, math.ceil(-math.log10(width / abs(value))) + 1), 13)
+    return min(max(6, math.ceil(-math.log10(width / abs(value))) + 1), 10)
 
 
 def _end(end: float, digits: int) -> str:
