@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import basin, branches, contact, erosion, points, sweep, trajectory
+from separatrix.figures import basin, boundary, branches, contact, erosion, points, sweep, trajectory
 from separatrix.figures.animation import animate
 from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
@@ -116,6 +116,8 @@ def _figures(
     kind = result.attrs["kind"]
     if kind == "basin":
         return basin.figures(path, result, field, title, look)
+    if kind == "boundary" and not field:
+        return boundary.figures(path, result, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
     if orbits and kind == "measures":
