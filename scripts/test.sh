@@ -26,7 +26,8 @@ ctest --test-dir build -E '^(python|faults)$' -j "$jobs" --output-on-failure --n
   --output-junit ctest.xml || status=1
 
 echo "test: building without MPI in build-serial/"
-cmake -S . -B build-serial -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=OFF
+cmake -S . -B build-serial -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=OFF -DSEPARATRIX_STATIC=ON \
+  -DSEPARATRIX_TESTS=ON
 cmake --build build-serial -j "$jobs"
 ctest --test-dir build-serial -L "$serial_layers" -j "$jobs" --output-on-failure --no-tests=error \
   --output-junit ctest.xml || status=1
@@ -35,6 +36,10 @@ echo "test: running the Python tests"
 export SEPARATRIX_BUILD=$PWD/build
 .venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile --durations=15 tests/python \
   --junit-xml=build/pytest.xml || status=1
+
+# The objects of the serial build, without its tests; in an empty environment and in a bare root.
+echo "test: building, installing and trying the wheel"
+scripts/wheel --check --build build-serial || status=1
 
 # Alone: they kill what runs, at times that they choose.
 echo "test: running the tests of faults"

@@ -15,6 +15,19 @@ INTERRUPTED = 130
 TERMINATED = 143
 
 
+# What the libraries raise when they read a damaged file.
+DAMAGE = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
+
 class SeparatrixError(Exception):
     """Something that the user can act on, in one line."""
 

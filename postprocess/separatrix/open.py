@@ -11,16 +11,15 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from separatrix.errors import BAD_DATA, NO_INPUT, SeparatrixError
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import try_first
 from separatrix.version import __version__
+from separatrix.words import decode_word
 
 FORMAT = "separatrix"
 FORMAT_VERSION = 1
-KINDS = ("basin", "sweep", "trajectory", "points", "branches")
-TABLES = ("catalogue", "limits")
-
-_WORD_SYMBOLS = {1: "R", 2: "L", 3: "S", 4: "C", 5: "D", 6: "+", 7: "."}
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary")
+TABLES = ("catalogue", "limits", "saddles")
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -44,6 +43,7 @@ def open_result(path: str | Path) -> xr.Dataset:
             _close(parts)
             raise
     result.attrs = attributes | texts
+    result.encoding["source"] = str(Path(path).absolute())
     # results have their accessor, however they were made
     importlib.import_module("separatrix.accessor")
     result.set_close(lambda: _close(parts))
@@ -59,16 +59,7 @@ def reading(path: str | Path) -> Iterator[None]:
         raise
     except KeyError as error:
         raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
-    except (
-        ArithmeticError,
-        AttributeError,
-        LookupError,
-        MemoryError,
-        OSError,
-        RuntimeError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except DAMAGE as error:
         raise SeparatrixError(f"{path}: is damaged ({_first_line(error)})") from error
 
 
@@ -98,15 +89,6 @@ def decode_flags(variable: xr.DataArray) -> xr.DataArray:
     codes, where = np.unique(variable.values, return_inverse=True)
     texts = np.array([names.get(code, str(code)) for code in codes.tolist()], dtype=object)
     return variable.copy(data=texts[where].reshape(variable.shape))
-
-
-def decode_word(word: int) -> str:
-    """Return the events of one period as text, first event first: 'R.' is one impact a drive period."""
-    symbols, rest = [], int(word)
-    while rest > 0:
-        symbols.append(_WORD_SYMBOLS.get(rest & 7, "?"))
-        rest >>= 3
-    return "".join(symbols)
 
 
 def decode_words(variable: xr.DataArray) -> xr.DataArray:

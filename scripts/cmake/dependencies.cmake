@@ -15,6 +15,17 @@ if(SEPARATRIX_MPI)
   target_compile_definitions(separatrix_mpi INTERFACE SEPARATRIX_MPI)
 endif()
 
+# What was found for the other kind of linking does not stay.
+if(DEFINED SEPARATRIX_STATIC_FOUND AND NOT SEPARATRIX_STATIC_FOUND STREQUAL SEPARATRIX_STATIC)
+  get_cmake_property(cached CACHE_VARIABLES)
+  list(FILTER cached INCLUDE REGEX "^(HDF5|GSL|ZLIB)_")
+  list(FILTER cached EXCLUDE REGEX "_(ROOT|DIR)$")
+  foreach(name IN LISTS cached)
+    unset(${name} CACHE)
+  endforeach()
+endif()
+set(SEPARATRIX_STATIC_FOUND ${SEPARATRIX_STATIC} CACHE INTERNAL "the kind of linking that the libraries were found for")
+
 # Debian's shared HDF5 brings in curl and Kerberos for a driver that nothing here uses; a static one leaves that out.
 if(SEPARATRIX_STATIC)
   set(HDF5_USE_STATIC_LIBRARIES ON)

@@ -7,41 +7,11 @@ import random
 import subprocess
 
 import life
+from program import FOLD
 
 SEED = 20261122
-# An impacting cycle beside the graze, with a basin so small that no start of the sample is in it.
-CASE = """\
-[body]
-mass = 1
-[restoring]
-law = "linear"
-stiffness = 1
-[friction]
-law = "viscous"
-damping = 0.1
-[contact]
-law = "newton"
-restitution = 0.8
-upper = 1
-[drive]
-law = "harmonic"
-ratio = 1
-amplitude = 0.099985
-[run]
-duration = 600
-[grid]
-tile = [10, 10]
-[[axis]]
-name = "x0"
-from = -2
-to = 1
-count = 60
-[[axis]]
-name = "v0"
-from = -2
-to = 2
-count = 60
-"""
+# The impacting cycle has a basin so small that no start of the sample is in it; several tiles.
+CASE = FOLD + "[grid]\ntile = [10, 10]\n"
 RUN = ["basin", "case.toml", "-o", life.NAME]
 
 

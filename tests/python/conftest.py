@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from program import make_results
+from program import make_results, succeed
 
 
 @pytest.fixture(scope="session")
@@ -63,3 +63,14 @@ def library(build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def results(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Files of every kind, beside the case and the list that they are made from. Not to be changed."""
     return make_results(separatrix, tmp_path_factory.mktemp("results"))
+
+
+@pytest.fixture(scope="session")
+def branch_file(separatrix: Path, results: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Branches of the same machine over the drive's ratio."""
+    path = tmp_path_factory.mktemp("branches") / "branches.h5"
+    over = ["--parameter", "drive.ratio", "--from", "0.9", "--to", "1.4", "--searches", "2"]
+    succeed(
+        separatrix, "branches", results["map"].parent / "case.toml", *over, "-o", path, folder=path.parent
+    )
+    return path

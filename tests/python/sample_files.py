@@ -197,6 +197,39 @@ def write_points(path: Path, number: int = 300) -> Path:
     return path
 
 
+def write_boundary(path: Path, stack: Path) -> Path:
+    """Write a boundary with a saddle for the first and the last slice of a stack over drive.ratio, x0, v0."""
+    with h5py.File(stack) as source, h5py.File(path, "w") as file:
+        file.attrs.update(dict(source.attrs) | {"kind": "boundary", "map": stack.name, "axes": "x0 v0"})
+        file.attrs["map_identity"] = source["provenance"].attrs["case_identity"]
+        source.copy("provenance", file)
+        ratios = source["drive_ratio"][[0, -1]]
+    file = h5py.File(path, "a")
+    turn = 2 * np.pi * np.arange(40) / 40
+    round_it = {"x0": 0.55 + 0.3 * np.cos(turn), "v0": 3 * np.sin(turn)}
+    with file:
+        for name, values in round_it.items():
+            file[name] = np.tile(values, 2)
+        for name, value in (("across", 0), ("below", 1), ("above", 2)):
+            file[name] = np.full(80, value, "i4")
+        for name, values in (
+            ("first", [0, 40]), ("points", [40, 40]), ("closed", [1, 1]), ("label_one", [1, 0]),
+            ("label_two", [2, 2]), ("piece_name", [1, 1]), ("piece_saddle", [1, 2]),
+        ):  # fmt: skip
+            file[name] = np.array(values, "i4")
+        file["piece_name"].attrs.update(
+            flag_values=np.array([0, 1], "i1"), flag_meanings="not_known stable_set"
+        )
+        file["piece_drive_ratio"] = ratios
+        group = file.create_group("saddles")
+        for name, values in (("period", [1, 1]), ("event_word", [WORD_IMPACT] * 2), ("saddle", [1, 2]),
+                             ("boundary_points", [40, 40])):  # fmt: skip
+            group[name] = np.array(values)
+        group["multipliers"] = np.array([[3.0, 0.1], [4.0, 0.2]])
+        group["x"], group["v"], group["drive_ratio"] = np.array([0.85, 0.25]), np.zeros(2), ratios
+    return path
+
+
 def _create(path: Path, kind: str) -> h5py.File:
     file = h5py.File(path, "w", libver=("earliest", "v110"))
     file.attrs.update(

@@ -9,39 +9,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import differences
+from program import FOLD, differences
 
-# Graze at amplitude 0.1, fold of the impacting orbit at 0.099970753628: in between both motions attract.
-FOLD = """\
-[body]
-mass = 1
-[restoring]
-law = "linear"
-stiffness = 1
-[friction]
-law = "viscous"
-damping = 0.1
-[contact]
-law = "newton"
-restitution = 0.8
-upper = 1
-[drive]
-law = "harmonic"
-ratio = 1
-amplitude = 0.099985
-[run]
-duration = 600
-[[axis]]
-name = "x0"
-from = -2
-to = 1
-count = 60
-[[axis]]
-name = "v0"
-from = -2
-to = 2
-count = 60
-"""
 WEAK = (
     FOLD.replace("0.099985", "0.5")
     .replace("ratio = 1", "ratio = 1.5")

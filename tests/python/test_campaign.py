@@ -151,6 +151,12 @@ JUDGED = [
         (False, True, False, False),
         "not-in-catalogue",
     ),
+    (
+        truth(["second_mode"], "outside"),
+        verdict("characterised"),
+        (False, True, False, False),
+        "not-in-catalogue",
+    ),
     (truth(["second_mode"], "outside"), verdict("named", ["dahl"]), (True, False, False, True), "dahl"),
     (
         truth(["viscous", "offset_force"], "pair"),
@@ -375,8 +381,10 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
         found = sorted((folder / "out" / f"seed_{SEED}" / "results").glob("*.json"))
         assert [json.loads(path.read_text())["number"] for path in found] == list(range(CASES))
         assert (folder / "figures" / "discovery_confusion.png").is_file()
-    # processor times are measured
-    untimed = {name: re.sub(r"(mean|median) [0-9.]+ s", "", page) for name, page in results.items()}
+    # one sentence tells a measured time
+    measured = re.compile(r"median [0-9]+ s(?= of\s+processor time)")
+    assert all(len(measured.findall(page)) == 1 for page in results.values())
+    untimed = {name: measured.sub("", page) for name, page in results.items()}
     assert untimed["whole"] == untimed["killed"]
 
 

@@ -143,6 +143,20 @@ def test_coarse_tiles_of_numbers(results: dict[str, Path], tmp_path: Path) -> No
             assert cells[r, c] == pytest.approx(expected, rel=1e-6)
 
 
+def test_branches_as_a_page_asks_for_them(branch_file: Path) -> None:
+    """Every array of the file, with the names of the labels and the parameter."""
+    desk = Desk([branch_file])
+    described, _ = ask(desk, "describe")
+    assert described["files"][0]["kind"] == "branches"
+    assert described["files"][0]["attributes"]["parameter"] == "drive.ratio"
+    header, arrays = ask(desk, "series", file=0)
+    with h5py.File(branch_file) as file:
+        for name in ("parameter", "x", "v", "stable", "label", "multiplier_real"):
+            np.testing.assert_array_equal(arrays[name], file[name][()])
+    assert "SN" in header["variables"]["label"]["codes"].values()
+    desk.close()
+
+
 def test_values_and_slices(desk: Desk, results: dict[str, Path]) -> None:
     """All variables of a point of a stack, in words; tiles of each slice."""
     answer, _ = ask(desk, "values", file=1, at="2,3,5")

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from program import succeed
+from sample_files import write_boundary
 from separatrix.view.export import export_page
 from separatrix.view.protocol import Desk
 from separatrix.view.server import Server
@@ -48,10 +49,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def server(results: dict[str, Path], folder: Path, build_dir: Path) -> Iterator[Server]:
-    """A viewer of a map, a stack, a sweep and a map over parameters."""
+def server(results: dict[str, Path], branch_file: Path, folder: Path, build_dir: Path) -> Iterator[Server]:
+    """A viewer of a map, a stack, a sweep, a map over parameters, and branches."""
     os.environ.setdefault("SEPARATRIX_LIBRARY", str(build_dir / "lib" / "libseparatrix.so"))
-    desk = Desk([results[kind] for kind in ("map", "stack", "sweep", "plane")], folder)
+    files = [results[kind] for kind in ("map", "stack", "sweep", "plane")]
+    desk = Desk([*files, branch_file], folder)
     with Server(desk) as server:
         threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
         yield server
@@ -215,20 +217,109 @@ def test_variables_slices_legend_and_sweep(page: object) -> None:
     before = look(page, "v.at.join()")
     page.keyboard.press("ArrowRight")
     wait(page, f"v.at.join() !== '{before}'")
-    sweep = page.locator("canvas.sweep")
+    sweep = page.locator("section[aria-label=Sweep] canvas")
     sweep.scroll_into_view_if_needed()
-    place = look(page, "[v.sweeps[0].plot.x(1.1), v.sweeps[0].plot.box[1] + 40]")
+    place = look(page, "[v.links.diagrams[0].plot.x(1.1), v.links.diagrams[0].plot.box[1] + 40]")
     sweep.click(position={"x": place[0], "y": place[1]})
     wait(page, "v.at[0] === 0")
-    assert look(page, "v.sweeps[0].marked") == pytest.approx(1.1)
+    assert look(page, "v.links.diagrams[0].marked") == pytest.approx(1.1)
     page.get_by_label("Map").first.select_option("0")
     ready(page)
-    place = look(page, "[v.sweeps[0].plot.x(1.0), v.sweeps[0].plot.box[1] + 40]")
+    place = look(page, "[v.links.diagrams[0].plot.x(1.0), v.links.diagrams[0].plot.box[1] + 40]")
     sweep.click(position={"x": place[0], "y": place[1]})
     wait(page, "v.with['drive.ratio'] !== undefined && v.live.picture && v.live.picture.stride > 0")
     page.get_by_label("Map").first.select_option("2")
     ready(page)
     assert look(page, "v.variable.name") == "regime"
+
+
+def test_branches_are_linked_with_the_map(page: object, branch_file: Path) -> None:
+    """The saddle at the ratio of the map is drawn in it; a click on a branch shows that ratio."""
+    with h5py.File(branch_file) as file:
+        over, x, v, branch, stable = (file[name][()] for name in ("parameter", "x", "v", "branch", "stable"))
+    joined = (branch[1:] == branch[:-1]) & ((over[1:] - 1.2) * (over[:-1] - 1.2) < 0)
+    pieces = np.flatnonzero(joined & (stable[1:] & stable[:-1] == 0))
+    share = (1.2 - over[pieces]) / (over[pieces + 1] - over[pieces])
+    expected = [(1 - share) * one[pieces] + share * one[pieces + 1] for one in (x, v)]
+    assert len(pieces) == 1
+    wait(page, "v.map.marks.some((m) => m.kind === 'saddle')")
+    marks = look(page, "v.map.marks.filter((m) => m.kind === 'saddle').map((m) => [m.x, m.y])")
+    np.testing.assert_allclose(marks, np.transpose(expected), rtol=1e-12)
+    assert colour_at(page, *at_point(page, marks[0][0] / 1.1 * 18, (marks[0][1] + 6) / 12 * 30)) == [255] * 3
+    # the motion from a saddle returns to it, as far as the line between two points of the branch allows
+    x0, v0 = marks[0]
+    asked = f"{{file: 0, at: '0,0', x: {x0}, v: {v0}, angle: 0, periods: 1, samples: 0}}"
+    answer = look(page, f"v.transport.ask('motion', {asked})")
+    assert [answer["summary"]["x"], answer["summary"]["v"]] == pytest.approx(marks[0], abs=2e-3)
+    table = page.locator("section[aria-label=Branches] tbody tr")
+    assert table.count() == np.count_nonzero(joined)
+    assert "period 1, unstable" in " ".join(table.all_inner_texts())
+    diagram = page.locator("section[aria-label=Branches] canvas")
+    diagram.scroll_into_view_if_needed()
+    point = int(np.flatnonzero((stable == 0) & (over > 1.13) & (over < 1.17))[0])
+    place = look(page, f"((d) => [d.plot.x({over[point]}), d.plot.y(d.answer.arrays.amplitude[{point}])])"
+                 "(v.links.diagrams[1])")  # fmt: skip
+    diagram.click(position={"x": place[0], "y": place[1]})
+    wait(page, "v.with['drive.ratio'] && v.live.picture && v.map.marks.some((m) => m.kind === 'saddle')")
+    assert look(page, "v.with['drive.ratio']") == pytest.approx(over[point], abs=0.01)
+    assert look(page, "v.links.diagrams[1].marked") == look(page, "v.links.diagrams[0].marked")
+    before = look(page, "v.with['drive.ratio']")
+    diagram.focus()
+    page.keyboard.press("ArrowRight")
+    wait(page, f"v.with['drive.ratio'] > {before}")
+    assert look(page, "v.links.differs(v.links.diagrams[1])") == ""
+    look(page, "v.with = { 'contact.restitution': 0.6 }")
+    assert look(page, "v.links.differs(v.links.diagrams[1])") == "contact.restitution"
+    assert look(page, "v.links.saddles.length") == 0
+    # a stack of maps shows its slice
+    page.get_by_label("Map").first.select_option("1")
+    ready(page)
+    diagram.click(position={"x": look(page, "v.links.diagrams[1].plot.x(1.29)"), "y": 20})
+    wait(page, "v.at[0] === 2 && Math.abs(v.links.diagrams[1].marked - 1.3) < 1e-12")
+
+
+def test_boundaries_are_drawn_over_their_map(
+    browser: object, results: dict[str, Path], tmp_path: Path, library: Path
+) -> None:
+    """The map beside the file opens with it; curves and saddles of its slice, none of others."""
+    stack = tmp_path / "stack.h5"
+    shutil.copy(results["stack"], stack)
+    desk = Desk([write_boundary(tmp_path / "boundary.h5", stack), results["map"]])
+    with Server(desk) as server:
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+        page = browser.new_page(viewport=SIZE)
+        said: list[str] = []
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(server.address)
+        page.wait_for_selector("canvas.map")
+        ready(page)
+        panel = page.locator("section[aria-label=Boundaries]")
+        assert look(page, "v.map.curves.length") == 0
+        assert "Open stack.h5 with it" in panel.inner_text()
+        page.get_by_label("Map").first.select_option("1")
+        ready(page)
+        assert look(page, "[v.at[0], v.map.curves.length, v.boundaries[0].saddles.length]") == [1, 0, 0]
+        slider = page.locator(".slider input")
+        slider.focus()
+        for key, piece, x in (("ArrowRight", 1, 0.25), ("Home", 0, 0.85)):
+            page.keyboard.press(key)
+            wait(page, f"v.map.marks.some((m) => m.kind === 'saddle' && m.x === {x}) && !v.map.pending")
+            assert look(page, "v.map.curves.length") == 1
+            assert look(page, "v.map.marks.filter((m) => m.kind === 'saddle').map((m) => [m.x, m.y])") == [
+                [x, 0]
+            ]
+            assert look(page, "v.map.curves[0].xs.length") == 41
+            page.wait_for_timeout(100)
+            place = look(page, "[v.map.px(v.map.curves[0].xs[10]), v.map.py(v.map.curves[0].ys[10])]")
+            dark = colour_at(page, *place)
+            assert max(dark) < 110 if piece == 0 else dark != colour_at(page, place[0], place[1] - 30)
+        assert panel.locator("tbody tr").count() == 2
+        panel.get_by_label("draw them over the map").uncheck()
+        assert look(page, "v.map.curves.length") == 0
+        assert said == []
+        page.close()
+        server.shutdown()
+    desk.close()
 
 
 def test_two_tabs_and_a_server_that_stops(browser: object, results: dict[str, Path], library: Path) -> None:
@@ -259,10 +350,12 @@ def test_two_tabs_and_a_server_that_stops(browser: object, results: dict[str, Pa
     context.close()
 
 
-def test_the_exported_page_works_offline(browser: object, results: dict[str, Path], tmp_path: Path) -> None:
-    """One file, no network, no outside address: map, table, sweep, stored motions, empty console."""
+def test_the_exported_page_works_offline(
+    browser: object, results: dict[str, Path], branch_file: Path, tmp_path: Path
+) -> None:
+    """One file, no network, no outside address: map, table, diagrams, stored motions, empty console."""
     path = tmp_path / "page.html"
-    size = export_page([results["map"], results["stack"], results["sweep"]], path, 36)
+    size = export_page([results["map"], results["stack"], results["sweep"], branch_file], path, 36)
     assert size < 3e6
     text = path.read_text()
     assert re.findall(r"https?://[^\s\"'<]+", text) == []
@@ -280,6 +373,7 @@ def test_the_exported_page_works_offline(browser: object, results: dict[str, Pat
     wait(page, "v.panel.motion")
     assert look(page, "v.panel.motion.arrays.x.length") > 1000
     assert page.locator("table tbody tr").count() >= 2
+    wait(page, "v.map.marks.some((m) => m.kind === 'saddle')")
     page.get_by_label("Map").first.select_option("1")
     ready(page)
     assert said == []

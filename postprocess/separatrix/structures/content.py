@@ -56,6 +56,18 @@ class Matrices:
         """Number of coordinates."""
         return self.mass.shape[0]
 
+    def without(self, held: np.ndarray) -> "Matrices":
+        """Return the structure with coordinates (their numbers) held at zero."""
+        free = np.setdiff1d(np.arange(self.size), held)
+        damping = None if self.damping is None else self.damping[free][:, free]
+        return Matrices(
+            self.mass[free][:, free],
+            self.stiffness[free][:, free],
+            damping,
+            [self.labels[number] for number in free],
+            {name: row[free] for name, row in self.points.items()},
+        )
+
     def row_of(self, place: str) -> Row:
         """Return the row of a place: a coordinate, or a weighted sum "0.5*12:y+0.5*13:y"."""
         return _row(place, {label: number for number, label in enumerate(self.labels)}, np.eye, self.size)

@@ -50,7 +50,9 @@ def read_matrices(
     for role in ("mass", "stiffness"):
         if role not in found:
             raise SeparatrixError(f"no {role} matrix is given; see separatrix-structure --help")
-    return _without_held(Matrices(**found, labels=labels))
+    structure = Matrices(**found, labels=labels)
+    # Abaqus holds by a very large stiffness.
+    return structure.without(np.flatnonzero(structure.stiffness.diagonal() >= _HELD))
 
 
 def sorted_labels(one: list[str], other: list[str]) -> list[str]:
@@ -64,20 +66,6 @@ def _placed(matrix: sparse.csr_array, labels: list[str], wanted: list[str]) -> s
     entries = sparse.coo_array(matrix)
     return sparse.csr_array(
         (entries.data, (places[entries.row], places[entries.col])), shape=(len(wanted), len(wanted))
-    )
-
-
-def _without_held(structure: Matrices) -> Matrices:
-    """Leave out what Abaqus holds by a very large stiffness."""
-    free = np.flatnonzero(structure.stiffness.diagonal() < _HELD)
-    if len(free) == structure.size:
-        return structure
-    damping = None if structure.damping is None else structure.damping[free][:, free]
-    return Matrices(
-        structure.mass[free][:, free],
-        structure.stiffness[free][:, free],
-        damping,
-        [structure.labels[number] for number in free],
     )
 
 

@@ -31,21 +31,9 @@ def hold(structure: Matrices, places: list[str]) -> Matrices:
     held = set()
     for place in places:
         held |= set(np.flatnonzero(structure.row_of(place)))
-    free = np.array([number for number in range(structure.size) if number not in held], dtype=int)
-    if not len(free):
+    if len(held) == structure.size:
         raise SeparatrixError("--hold: nothing is left that moves")
-    return _chosen(structure, free)
-
-
-def _chosen(structure: Matrices, free: np.ndarray) -> Matrices:
-    damping = None if structure.damping is None else structure.damping[free][:, free]
-    return Matrices(
-        structure.mass[free][:, free],
-        structure.stiffness[free][:, free],
-        damping,
-        [structure.labels[number] for number in free],
-        {name: row[free] for name, row in structure.points.items()},
-    )
+    return structure.without(np.array(sorted(held), dtype=int))
 
 
 def condense(structure: Matrices) -> Matrices:
@@ -150,7 +138,7 @@ def craig_bampton(structure: Matrices, count: int) -> Matrices:
                 "--reduce craig-bampton: the structure moves freely with its points held; give more points"
             ) from None
         change[inner, : len(boundary)] = follow
-        rest = _chosen(Matrices(structure.mass, structure.stiffness, None, structure.labels), inner)
+        rest = Matrices(structure.mass, structure.stiffness, None, structure.labels).without(boundary)
         change[inner, len(boundary) :] = undamped_modes(rest, count)[1][:, : min(count, len(inner))]
     labels = [structure.labels[number] for number in boundary]
     labels += [f"mode{number + 1}" for number in range(change.shape[1] - len(boundary))]

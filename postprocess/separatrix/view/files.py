@@ -8,28 +8,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.errors import DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import try_first
 from separatrix.view.packing import clean
+from separatrix.words import decode_word
 
 __all__ = ["ResultFile"]
 
 STARTS = ("x0", "v0", "crank_angle")
-KINDS = ("basin", "sweep", "trajectory", "points")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary")
 _TABLES = ("catalogue", "limits")
-_SYMBOLS = {1: "R", 2: "L", 3: "S", 4: "C", 5: "D", 6: "+", 7: "."}
 # of an axis whose values are sent one by one
 _SHORT = 4096
-_ERRORS = (
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
 
 
 class ResultFile:
@@ -46,7 +36,7 @@ class ResultFile:
             self._read_header(self.file)
         except SeparatrixError:
             raise
-        except _ERRORS as error:
+        except DAMAGE as error:
             raise SeparatrixError(f"{path}: is damaged ({str(error).splitlines()[0]})") from error
 
     def _try(self, file: h5py.File) -> None:
@@ -84,6 +74,7 @@ class ResultFile:
         if self.kind == "basin" and not (len(self.axes) >= 2 and self.variables):
             raise SeparatrixError(f"{self.path}: is damaged (no map over two axes)")
         self.variables.sort(key=lambda one: _order(one["name"]))
+        self.identity = str(_plain(file["provenance"].attrs.get("case_identity", "")))
         self.tables = {name: _table(file[name]) for name in _TABLES if name in file}
 
     def _read_axes(self, file: h5py.File) -> list[dict]:
@@ -126,11 +117,12 @@ class ResultFile:
             for row in zip(*(entries[key] for key in entries), strict=True)
         ]
         for one in catalogue:
-            one["word"] = word_text(one.get("event_word", 0))
+            one["word"] = decode_word(one.get("event_word") or 0)
         description = {
             "kind": self.kind,
             "name": self.path.name,
             "title": self.attributes.get("title", ""),
+            "identity": self.identity,
             "axes": axes,
             "variables": self.variables,
             "catalogue": catalogue,
@@ -158,7 +150,7 @@ class ResultFile:
             value = self.file[one["name"]][index]
             text = one["codes"].get(int(value)) if one["classes"] else None
             if one["name"] == "event_word":
-                text = word_text(value)
+                text = decode_word(value)
             found[one["name"]] = text if text is not None else value
         return found
 
@@ -178,7 +170,10 @@ class ResultFile:
     def series(self) -> tuple[dict, dict[str, np.ndarray]]:
         """Return names, units and arrays of a file that is not a map, and its table of limits."""
         header, arrays = {}, {}
-        for name, item in self.file.items():
+        found = dict(self.file.items())
+        if "saddles" in found:
+            found |= {f"saddles_{name}": item for name, item in self.file["saddles"].items()}
+        for name, item in found.items():
             if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiu" or not item.ndim:
                 continue
             header[name] = {"label": _text(item, "long_name", name), "unit": _unit(item)}
@@ -187,15 +182,6 @@ class ResultFile:
             values = item[()]
             arrays[name] = values.astype(np.float64) if values.dtype == np.int64 else values
         return {"variables": header, "limits": self.tables.get("limits", {})}, arrays
-
-
-def word_text(word: int) -> str:
-    """Return the events of one period of a motion as text: 'R.' is one impact a drive period."""
-    rest, symbols = int(word or 0), ""
-    while rest > 0:
-        symbols += _SYMBOLS.get(rest & 7, "?")
-        rest >>= 3
-    return symbols
 
 
 def _order(name: str) -> tuple[int, str]:

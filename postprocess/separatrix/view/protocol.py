@@ -101,6 +101,7 @@ class Desk:
     def __init__(self, paths: list[Path], folder: Path | None = None) -> None:
         """Open all files; kept views are written into `folder`, nowhere if it is None."""
         self.files = [ResultFile(path, i) for i, path in enumerate(paths)]
+        self._open_maps()
         self.views = live.Views()
         self.folder = folder
         self._planes: OrderedDict[tuple, Plane] = OrderedDict()
@@ -133,6 +134,14 @@ class Desk:
         self.views.stop_all()
         for plane in list(self._planes.values()):
             plane.close()
+
+    def _open_maps(self) -> None:
+        """Open the maps of boundaries where they lie beside them."""
+        for source in [one for one in self.files if one.kind == "boundary"]:
+            beside = source.path.parent / Path(str(source.attributes["map"])).name
+            known = any(one.identity == source.attributes["map_identity"] for one in self.files if one.axes)
+            if not known and beside.is_file():
+                self.files.append(ResultFile(beside, len(self.files)))
 
     def file(self, parameters: Parameters, kind: str = "") -> ResultFile:
         """Return the file that a request is about."""

@@ -15,7 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from separatrix.view.files import ResultFile, word_text
+from separatrix.view.files import ResultFile
+from separatrix.words import decode_word
 
 __all__ = ["TILE", "Plane"]
 
@@ -121,7 +122,7 @@ class Plane:
     def class_names(self) -> dict[int, str]:
         """Return the names of classes that are not plain numbers."""
         if self.words is not None:
-            return {number: word_text(word) or "none" for word, number in list(self.words.items())}
+            return {number: decode_word(word) or "none" for word, number in list(self.words.items())}
         return {int(code): name for code, name in self.described["codes"].items()}
 
     def _numbers(self, values: np.ndarray) -> np.ndarray:

@@ -3,12 +3,15 @@
 
 // The viewer: files, controls, the map and what belongs to it.
 import { Address, restored } from "./address.js";
-import { fill, h, number, quantity, save, words } from "./dom.js";
+import { BoundaryPanel } from "./boundaries.js";
+import { BranchPanel } from "./branches.js";
+import { fill, h, quantity, save, words } from "./dom.js";
 import { attractorTable, classLegend, describeAttractor, scaleLegend, wordClass } from "./legend.js";
 import { Inspector } from "./inspector.js";
+import { Links } from "./links.js";
 import { LiveLayer } from "./live.js";
 import { marksOf } from "./marks.js";
-import { MapView, axisLabel, indexOf, valueAt } from "./mapview.js";
+import { MapView, axisLabel, valueAt } from "./mapview.js";
 import { MotionPanel, units } from "./motion.js";
 import { Painter, rangeOf } from "./palette.js";
 import { PointsPanel, SweepPanel } from "./series.js";
@@ -35,6 +38,8 @@ class Viewer {
     root.replaceChildren(this.problem);
     this.hidden = new Map();
     this.with = {};
+    this.links = new Links(this);
+    this.boundaries = [];
     this.inspector = new Inspector(this);
     this.starter = new Starter(this);
     this.address = new Address(this);
@@ -54,7 +59,7 @@ class Viewer {
     this.build();
     for (const [index, file] of files.entries()) if (file.kind !== "basin") await this.addSeries(file, index);
     if (this.maps.length) this.openMap(restored());
-    for (const sweep of this.sweeps || []) sweep.mark(this.valueOf(sweep.key));
+    this.links.show();
   }
 
   build() {
@@ -85,9 +90,12 @@ class Viewer {
     try {
       const answer = await this.transport.ask("series", { file: index });
       if (file.kind === "sweep") {
-        const panel = new SweepPanel(file, answer, (key, value) => this.chooseParameter(key, value));
-        this.sweeps = [...(this.sweeps || []), panel];
-        this.right.append(panel.element);
+        this.right.append(this.links.add(new SweepPanel(file, answer, this.links)));
+      } else if (file.kind === "branches") {
+        this.right.append(this.links.add(new BranchPanel(file, answer, this.links)));
+      } else if (file.kind === "boundary") {
+        this.boundaries.push(new BoundaryPanel(file, answer, this));
+        this.right.append(this.boundaries.at(-1).element);
       } else if (file.kind === "points") {
         this.right.append(new PointsPanel(file, answer).element);
       } else {
@@ -176,7 +184,6 @@ class Viewer {
     row.querySelector("input").value = String(position);
     row.querySelector("input").setAttribute("aria-valuetext", this.slicePlace(axis, i));
     fill(row.querySelector("output"), this.slicePlace(axis, i));
-    for (const sweep of this.sweeps || []) if (sweep.key === axis.key) sweep.mark(valueAt(axis, position));
     this.with = {};
     clearTimeout(this.sliding);
     this.sliding = setTimeout(() => this.show(true), 30);
@@ -189,31 +196,6 @@ class Viewer {
     this.buildControls();
     this.map.view = null;
     this.show(false);
-  }
-
-  /** A value of a parameter was picked in a sweep: its slice, or the machine with that value, computed now. */
-  chooseParameter(key, value) {
-    if (!this.file) return "";
-    const axis = this.file.axes.findIndex((one) => one.key === key);
-    if (axis >= 0 && axis !== this.across && axis !== this.up) {
-      const position = Math.round(indexOf(this.file.axes[axis], value));
-      this.setSlice(axis, Math.min(Math.max(position, 0), this.file.axes[axis].count - 1));
-      return `The map shows its slice at ${this.slicePlace(this.file.axes[axis], axis)}.`;
-    }
-    const path = Object.keys(this.file.parameters || {}).find((one) => one.replaceAll(".", "_") === key);
-    if (!path || !this.transport.live || axis >= 0) return "No map of this parameter is open.";
-    this.with = value === this.file.parameters[path][0] ? {} : { [path]: value };
-    this.show(true);
-    return Object.keys(this.with).length ? `The map is computed now for ${path} = ${number(value)}.` : "The map is that of the file.";
-  }
-
-  /** The value of a parameter that the picture is for; null if it has none. */
-  valueOf(key) {
-    if (!this.file) return null;
-    const axis = this.file.axes.findIndex((one) => one.key === key);
-    if (axis >= 0) return axis === this.across || axis === this.up ? null : valueAt(this.file.axes[axis], this.at[axis]);
-    const path = Object.keys(this.file.parameters || {}).find((one) => one.replaceAll(".", "_") === key);
-    return path ? this.with[path] ?? this.file.parameters[path][0] : null;
   }
 
   get withText() { return Object.entries(this.with).map(([path, value]) => `${path}:${value}`).join(";"); }
@@ -245,6 +227,7 @@ class Viewer {
     this.map.show([axes[this.across], axes[this.up]], make(this.variable), slow, keepView);
     this.paint();
     this.listAttractors();
+    this.links.show();
     this.moved();
     if (this.variable.name === "event_word") {
       const answer = await this.transport.ask("classes", { ...plane, variable: variables.indexOf(this.variable) }).catch(() => null);
@@ -360,6 +343,8 @@ class Viewer {
   }
 
   mark() {
+    if (!this.file) return;
+    this.map.curves = this.boundaries.flatMap((one) => one.curves());
     this.map.marks = marksOf(this);
     this.map.draw();
   }

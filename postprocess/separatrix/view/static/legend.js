@@ -55,10 +55,16 @@ export function classLegend({ values, names, offset, hidden, toggle }) {
   return h("div", { class: "legend", role: "group", "aria-label": "Legend" }, ...buttons, more);
 }
 
-/** The class of an event word that was computed now: that of the file, or a new one in `names`. */
-export function wordClass(names, word) {
+/** The events of one period as text: 'R.' is one impact a drive period. */
+export function wordText(word) {
   let text = "";
   for (let rest = word; rest > 0; rest = Math.floor(rest / 8)) text += ["", "R", "L", "S", "C", "D", "+", "."][rest % 8];
+  return text;
+}
+
+/** The class of an event word that was computed now: that of the file, or a new one in `names`. */
+export function wordClass(names, word) {
+  const text = wordText(word);
   const found = Object.entries(names).find(([, name]) => name === (text || "none"));
   if (found) return Number(found[0]);
   const next = Object.keys(names).length;

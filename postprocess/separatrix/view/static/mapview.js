@@ -19,6 +19,7 @@ export class MapView {
     this.slow = null;
     this.painter = null;
     this.marks = [];
+    this.curves = [];
     this.live = null;
     this.cursor = null;
     this.pointers = new Map();
@@ -98,6 +99,7 @@ export class MapView {
     context.fillRect(...box);
     this.drawTiles(context);
     if (this.live) this.live.draw(context, this);
+    this.drawCurves(context);
     this.drawMarks(context);
     context.restore();
     const [a, b] = this.axes;
@@ -152,6 +154,23 @@ export class MapView {
     context.drawImage(picture, sx, Math.max(0, sy), sw, sh, x0, y0, x1 - x0, y1 - y0);
   }
 
+  /** Curves in index coordinates, dark on a white edge. */
+  drawCurves(context) {
+    const [left, top, width, height] = this.box, v = this.view;
+    const across = width / (v.a1 - v.a0), up = height / (v.b1 - v.b0);
+    for (const { xs, ys, colour, dashes } of this.curves) {
+      context.beginPath();
+      for (let i = 0; i < xs.length; i++) context.lineTo(left + (xs[i] - v.a0) * across, top + height - (ys[i] - v.b0) * up);
+      for (const [stroke, thick, gaps] of [["#ffffff", 3.5, []], [colour, 1.6, dashes]]) {
+        context.strokeStyle = stroke;
+        context.lineWidth = thick;
+        context.setLineDash(gaps);
+        context.stroke();
+      }
+    }
+    context.setLineDash([]);
+  }
+
   drawMarks(context) {
     for (const mark of this.marks) {
       const x = this.px(indexOf(this.axes[0], mark.x)), y = this.py(indexOf(this.axes[1], mark.y));
@@ -166,6 +185,10 @@ export class MapView {
           context.moveTo(x, y - 8); context.lineTo(x, y + 8);
           context.stroke();
         }
+        continue;
+      }
+      if (mark.kind === "saddle") {
+        diamond(context, x, y);
         continue;
       }
       context.arc(x, y, mark.kind === "section" ? 2 : 5, 0, 2 * Math.PI);
@@ -282,6 +305,20 @@ export class MapView {
     this.draw();
     this.callbacks.hover(this.cursor, true);
   }
+}
+
+/** A saddle: a white diamond with a dark edge. */
+function diamond(context, x, y) {
+  context.beginPath();
+  context.moveTo(x - 6, y);
+  context.lineTo(x, y - 6);
+  context.lineTo(x + 6, y);
+  context.lineTo(x, y + 6);
+  context.closePath();
+  context.fillStyle = "#ffffff";
+  context.fill();
+  context.strokeStyle = "#000000";
+  context.stroke();
 }
 
 /** Value of an axis at an index coordinate: lines between the values of the file, and beyond. */

@@ -2,14 +2,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // Marks in the map: attractors with all their points on the section, the start of a motion and its points there.
-// Where files have boundary curves, saddles and branches, these are marks too.
+// Saddles are those of the branches that are open, at the value of their parameter that the picture is for, and those of boundaries.
 import { valueAt } from "./mapview.js";
 import { classColour, css } from "./palette.js";
 
-export function marksOf({ file, across, up, at, starter, attractorPoints }) {
+export function marksOf({ file, across, up, at, starter, attractorPoints, links, boundaries }) {
   const marks = [], phase = phasePlane(file, across, up);
   if (phase && crankAngle(file, at) === 0) {
     for (const point of starter.points) marks.push({ kind: "section", x: point[phase[0]], y: point[phase[1]], colour: "#000000" });
+    for (const one of [...links.saddles, ...boundaries.flatMap((one) => one.saddles)]) {
+      const point = [one.x, one.v];
+      marks.push({ kind: "saddle", x: point[phase[0]], y: point[phase[1]] });
+    }
     for (const one of attractorPoints || []) {
       if (one.period === 0 || one.two_bodies) continue;
       for (const point of one.points) marks.push({ kind: "attractor", x: point[phase[0]], y: point[phase[1]], colour: css(classColour(one.attractor)) });

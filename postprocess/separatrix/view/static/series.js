@@ -2,41 +2,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // Files that are no maps: diagrams of sweeps, linked with maps, and points of lists.
-import { fill, h, prepare, words } from "./dom.js";
+import { h, prepare, words } from "./dom.js";
+import { Diagram, nearest } from "./diagram.js";
 import { classColour, css } from "./palette.js";
 import { INK, Plot, extent, line } from "./plot.js";
 
 const UP = "#0072B2", DOWN = "#E69F00", MANY = "#B9C0C6";
 
-export class SweepPanel {
-  /** `chosen(path, value)` is called when a value of the swept parameter is picked. */
-  constructor(file, answer, chosen) {
-    Object.assign(this, { file, answer, chosen, marked: null });
+export class SweepPanel extends Diagram {
+  constructor(file, answer, links) {
     const { arrays, shapes } = answer;
-    this.key = Object.keys(arrays).find((name) => shapes[name].length === 1 && shapes.amplitude && shapes[name][0] === shapes.amplitude[1] && answer.variables[name] && name !== "amplitude");
+    const key = Object.keys(arrays).find((name) => shapes[name].length === 1 && shapes.amplitude && shapes[name][0] === shapes.amplitude[1] && answer.variables[name] && name !== "amplitude");
     const names = ["strobe_x", "strobe_v", "x_max", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period"].filter((name) => name in arrays);
-    this.select = h("select", { onchange: () => this.draw() }, ...names.map((name) => h("option", { value: name }, this.text(name))));
-    this.canvas = h("canvas", { class: "sweep", tabindex: "0", role: "application", "aria-roledescription": "diagram" });
-    this.told = h("p", { class: "note", "aria-live": "polite" });
-    this.element = h("section", { "aria-label": "Sweep" }, h("h2", {}, file.title || file.name),
-      h("div", { class: "bar" }, h("label", {}, "Show", this.select), h("span", { class: "note" }, "blue: run up, orange: run down, grey: many starts; click: this value in the map")), this.canvas, this.told);
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
-    const pick = (event) => event.buttons && this.pick(event.offsetX);
-    this.canvas.addEventListener("pointerdown", pick);
-    this.canvas.addEventListener("pointermove", pick);
-    this.canvas.addEventListener("keydown", (event) => this.keyed(event));
-  }
-
-  text(name) {
-    return { strobe_x: "stroboscopic x", strobe_v: "stroboscopic v", x_max: "largest and smallest x" }[name] || (this.answer.variables[name] || {}).label || name;
+    super({ file, answer, key, kind: "Sweep", names, note: "blue: run up, orange: run down, grey: many starts; click: this value in the map", links });
   }
 
   get values() { return this.answer.arrays[this.key]; }
-
-  mark(value) {
-    this.marked = value;
-    this.draw();
-  }
 
   draw() {
     if (!this.canvas.isConnected) return;
@@ -60,13 +41,10 @@ export class SweepPanel {
       context.setLineDash([2, 3]);
       for (const limit of (limits.lower || [])) line(context, plot.x(limit), plot.box[1], plot.x(limit), plot.box[1] + plot.box[3]);
       context.setLineDash([]);
-      if (this.marked !== null) {
-        context.lineWidth = 2;
-        line(context, plot.x(this.marked), plot.box[1], plot.x(this.marked), plot.box[1] + plot.box[3]);
-      }
+      this.drawMarked(plot);
     });
     plot.frame();
-    this.canvas.setAttribute("aria-label", `Sweep diagram: ${this.text(name)} over ${words(this.key)}; arrow keys move the marked value, Enter shows it in the map`);
+    this.name();
   }
 
   dots(plot, values, samples, colour, radius) {
@@ -78,31 +56,12 @@ export class SweepPanel {
     }
   }
 
-  pick(pixel) {
-    const [left, , width] = this.plot.box;
-    this.choose(this.plot.xs[0] + ((pixel - left) / width) * (this.plot.xs[1] - this.plot.xs[0]));
+  beside(value, step) {
+    const now = value === null ? 0 : nearest(this.values, value);
+    return this.values[Math.min(Math.max(now + step, 0), this.values.length - 1)];
   }
 
-  keyed(event) {
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (!step && event.key !== "Enter") return;
-    event.preventDefault();
-    const now = this.marked === null ? 0 : nearest(this.values, this.marked);
-    this.choose(this.values[Math.min(Math.max(now + (step || 0), 0), this.values.length - 1)]);
-  }
-
-  choose(value) {
-    const found = this.values[nearest(this.values, value)];
-    if (found === this.marked) return;
-    this.mark(found);
-    fill(this.told, this.chosen(this.key, found) || "");
-  }
-}
-
-function nearest(values, value) {
-  let best = 0;
-  for (let i = 1; i < values.length; i++) if (Math.abs(values[i] - value) < Math.abs(values[best] - value)) best = i;
-  return best;
+  choose(value) { super.choose(this.values[nearest(this.values, value)]); }
 }
 
 /** Final states of a list of starts. */
