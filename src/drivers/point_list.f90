@@ -135,7 +135,7 @@ contains
           return
         end if
         if (any(names == name)) then
-          call take(3 + findloc(names, name, 1))
+          call take(3 + findloc(names == name, .true., 1))
         else
           names = [character(len=name_length) :: names, name]
           columns = [columns, column]
