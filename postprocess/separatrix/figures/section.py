@@ -16,18 +16,22 @@ from separatrix.variables import is_start
 
 # Attractors of a slice, and points of one, beyond which marks hide the map.
 _MOST, _LONGEST = 12, 64
+# Coordinates that the plane of x0 and v0 shows all of.
+_PLANE = 2
 
 
 def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Yield label, positions and velocities of each periodic attractor of one slice.
 
     They are those at the crank angle of the starts. `place`: the position on the axes that are not x0 and v0.
-    Nothing comes of two bodies, whose section has more coordinates, of a file without a case, and without the
-    library.
+    Nothing comes of several bodies, whose section has more coordinates, of a file without a case, and without
+    the library.
     """
+    if coordinates(result) > _PLANE:
+        return
     catalogue = table(result, "catalogue")
     case = resolved_case(result)
-    if "attractor" not in catalogue or not case or "driven_mass" in case.get("body", {}):
+    if "attractor" not in catalogue or not case:
         return
     parameters = [name for name in result["regime"].dims if not is_start(name)]
     shape = tuple(result.sizes[name] for name in parameters)
@@ -48,3 +52,10 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
                 yield (int(entry["attractor"]), *found.T)
     except (CaseError, KeyError):
         return
+
+
+def coordinates(result: xr.Dataset) -> int:
+    """Return the number of coordinates of the section: 2 of one body."""
+    if "driven_mass" in resolved_case(result).get("body", {}):
+        return 2 * _PLANE
+    return int(result.sizes.get("coordinate", _PLANE))
