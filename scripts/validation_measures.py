@@ -75,7 +75,7 @@ def spheres() -> list[Row]:
     return [
         Row(KNOWN, "ellipse: LIM, its minor semi-axis", 0.3, 1e-9, radius(sets.ellipse((0.7, 0.3)), (0, 0))),
         Row(KNOWN, "half plane: LIM", 0.5, 1e-9, radius(sets.half_plane((0.6, 0.8), 0.5), (0, 0))),
-        Row(KNOWN, "annulus: IF, its half width", 0.3, 1e-5, balls.inscribed_ball(ring, grid, axes, 1, wide)[0].inner),
+        Row(KNOWN, "annulus: IF, its half width", 0.3, 1e-5, largest.inner),
         Row(PEERS, "Newton's method for z^3 = 1: least shock out of the basin of 1", 0.622, 5e-4,
             radius(sets.newton, (1, 0))),
     ]  # fmt: skip
