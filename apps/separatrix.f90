@@ -4,6 +4,7 @@
 !> One executable with subcommands: reads the arguments, calls the command, returns the exit code.
 program separatrix
   use basin_driver, only: run_basin
+  use boundary_driver, only: run_boundary
   use branches_driver, only: run_branches
   use command_line, only: command_t, help_text, read_command_line
   use errors, only: error_t
@@ -42,6 +43,8 @@ program separatrix
         call run_sweep(command)
       case ('branches')
         call run_branches(command)
+      case ('boundary')
+        call run_boundary(command)
       case ('stability')
         call run_stability(command)
       case ('trajectory')

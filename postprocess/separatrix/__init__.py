@@ -18,6 +18,7 @@ from separatrix.errors import CaseError, Interrupted, SeparatrixError, Separatri
 from separatrix.version import __version__
 
 if TYPE_CHECKING:
+    from separatrix.boundaries import boundary as boundary
     from separatrix.cases import Case as Case
     from separatrix.cases import linspace as linspace
     from separatrix.cases import load as load
@@ -43,6 +44,7 @@ _HOME = {
     "Discovery": "separatrix.discovery.api",
     "Stability": "separatrix.orbits",
     "basin": "separatrix.maps",
+    "boundary": "separatrix.boundaries",
     "branches": "separatrix.orbits",
     "decode_flags": "separatrix.open",
     "decode_word": "separatrix.open",

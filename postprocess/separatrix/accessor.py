@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("separatrix")
 class Accessor:
-    """The result of `basin`, `sweep`, `points`, `branches` or `trajectory`, or of `open_result`."""
+    """The result of `basin`, `boundary`, `sweep`, `points`, `branches`, `trajectory` or `open_result`."""
 
     def __init__(self, result: xr.Dataset) -> None:
         """Take any Dataset; what is no result is refused when it is asked."""
@@ -31,7 +31,7 @@ class Accessor:
 
     @property
     def kind(self) -> str:
-        """The kind of result: basin, sweep, points, branches or trajectory."""
+        """The kind of result: basin, boundary, sweep, points, branches or trajectory."""
         kind = self._result.attrs.get("kind")
         if kind is None:
             raise SeparatrixError("this Dataset is no result of Separatrix (no attribute kind)", USAGE)
@@ -117,29 +117,36 @@ class Accessor:
         *,
         title: str | None = None,
         style_sheet: str | Path | None = None,
+        over: xr.Dataset | None = None,
         **wishes: object,
     ) -> "Figure":
         """Return a figure of this result, the first if no `name` is given.
 
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
-        "phase", "energy" and "contact", of points "regime", of branches "branches". Notebooks show
-        the figure; `savefig` writes it, `save` in several formats.
+        "phase", "energy" and "contact", of points "regime", of branches "branches", of boundaries
+        "boundary". Notebooks show the figure; `savefig` writes it, `save` in several formats.
+
+        `over`: of boundaries, the map to draw them over.
 
         `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
         slice={"drive.ratio": 1.2}, inset={"x0": (0, 0.1), "v0": (-1, 1)}, axes=("v0", "x0"), units=["mm"],
         shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
-        from separatrix.figures import basin, branches, points, sweep, trajectory
+        from separatrix.figures import basin, boundary, branches, points, sweep, trajectory
         from separatrix.labels import plain
 
         kind = self.kind
         heading = plain(title or str(self._result.attrs.get("title", "")))
         look = _look(wishes)
+        if over is not None and kind != "boundary":
+            raise SeparatrixError(f"over: belongs to the figure of boundaries, this is a {kind}", USAGE)
         with style.context(style_sheet):
             if kind == "basin":
                 made = basin.figures(None, self._result, name, heading, look)
+            elif kind == "boundary":
+                made = boundary.figures(None, self._result, heading, look, over)
             else:
                 modules = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
                 made = modules[kind].figures(self._result, heading, look)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import basin, branches, contact, points, sweep, trajectory
+from separatrix.figures import basin, boundary, branches, contact, points, sweep, trajectory
 from separatrix.figures.animation import animate
 from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
@@ -108,6 +108,8 @@ def _figures(path: Path, result: object, field: str | None, title: str, look: Lo
     kind = result.attrs["kind"]
     if kind == "basin":
         return basin.figures(path, result, field, title, look)
+    if kind == "boundary" and not field:
+        return boundary.figures(path, result, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
     return _BY_KIND[kind].figures(result, title, look)

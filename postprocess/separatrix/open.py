@@ -18,8 +18,8 @@ from separatrix.words import decode_word
 
 FORMAT = "separatrix"
 FORMAT_VERSION = 1
-KINDS = ("basin", "sweep", "trajectory", "points", "branches")
-TABLES = ("catalogue", "limits")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary")
+TABLES = ("catalogue", "limits", "saddles")
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -43,6 +43,7 @@ def open_result(path: str | Path) -> xr.Dataset:
             _close(parts)
             raise
     result.attrs = attributes | texts
+    result.encoding["source"] = str(Path(path).absolute())
     # results have their accessor, however they were made
     importlib.import_module("separatrix.accessor")
     result.set_close(lambda: _close(parts))

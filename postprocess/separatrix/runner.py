@@ -113,7 +113,7 @@ def _start(
 ) -> _Process:
     command = [*_launcher(ranks), str(program_path()), *arguments]
     # These compute and say how far they are.
-    if arguments[0] in ("basin", "sweep", "points", "branches") and progress.wanted:
+    if arguments[0] in ("basin", "sweep", "points", "branches", "boundary") and progress.wanted:
         command += ["--progress", "0.2"]
     log.debug("run: %s", " ".join(command))
     process = subprocess.Popen(

@@ -38,7 +38,17 @@ def bars(found: list[Score]) -> list[list[str]]:
         at_least("outside the catalogue, recognised", 0.80, [o.right for o in outside]),
         at_most("outside the catalogue, wrongly named", 0.10, [o.wrong_name for o in outside]),
     ]
+    told = [one.depends_rightly is True for one in outside]
+    closes = [one.character_closes for one in outside if one.depends_rightly]
+    share = statistics.median(closes) if closes else math.nan
     rows += [
+        at_least("outside the catalogue, rightly told on what it depends", 0.60, told),
+        [
+            "held-out gap that those would close",
+            ">= 80 %",
+            f"{100 * share:.1f} % (median of {len(closes)})",
+            met(rate([one >= 0.8 for one in closes]), 0.5, 1),
+        ],
         at_most("a decoy could be named, all cases", 0.02, [o.decoy for o in found]),
         at_least(
             "region of the effect, d' >= 5, rightly named",

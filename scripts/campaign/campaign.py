@@ -31,7 +31,7 @@ CI_SEED, CI_CASES = 1, (0, 4, 6, 8, 11, 14)
 """Nothing hidden, one effect, an effect that is one of a set; quick ones."""
 KEPT = (
     "outcome effects alternatives equivalent parameters gap gates p_value reasons detectable d_prime decoys"
-    " where warnings records seed version runtime_s"
+    " character where warnings records seed version runtime_s"
 ).split()
 UNREACHABLE = "unreachable"
 

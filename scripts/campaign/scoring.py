@@ -22,7 +22,18 @@ STRONG = 5.0
 SEPARABLE = 3.0
 """d' that has to be left beside any one other effect for a name to be possible."""
 PRECISE = 10.0
-ANSWERS = ("named", "ambiguous", "none", "not-in-catalogue")
+UNNAMED = ("not-in-catalogue", "characterised")
+"""A gap that no effect closes; where the force is known to depend on something, that is told."""
+ANSWERS = ("named", "ambiguous", "none", *UNNAMED)
+DEPENDS_ON = {
+    "parametric_stiffness": {"oscillating time", "place"},
+    "drifting_friction": {"slow time", "direction of motion"},
+    "second_mode": {"memory"},
+    "delayed_force": {"memory"},
+    "maxwell_element": {"memory"},
+    "drifting_restitution": {"oscillating time", "impacts"},
+}
+"""On what an effect outside of the catalogue depends."""
 
 
 SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
@@ -60,7 +71,7 @@ class Score:
     d_prime: float
     beyond: float
     answer: str
-    """named, ambiguous, none, not-in-catalogue, or failed."""
+    """named, ambiguous, none, characterised, not-in-catalogue, or failed."""
     column: str
     """Where it stands in the confusion matrix."""
     decided: bool
@@ -77,6 +88,10 @@ class Score:
     """A decoy could have been named."""
     region: bool | None
     """The clearest region is one where the effect acts; None without region or rule."""
+    depends_rightly: bool | None
+    """What a force without a name is said to depend on is right; None where nothing is said."""
+    character_closes: float
+    """Share of the held-out gap that it would close; NaN where nothing is said."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -89,7 +104,7 @@ class Score:
     @property
     def alarm(self) -> bool:
         """Whether anything was said to be missing."""
-        return self.answer in ("named", "ambiguous", "not-in-catalogue")
+        return self.answer in ("named", "ambiguous", *UNNAMED)
 
     @property
     def strong(self) -> bool:
@@ -131,7 +146,7 @@ def score(truth: dict, result: dict) -> Score:
     contains = names in sets
     right = {
         "none": answer == "none",
-        "outside": answer == "not-in-catalogue",
+        "outside": answer in UNNAMED,
     }.get(truth["kind"], one_answer and contains)
     in_catalogue = truth["kind"] in ("single", "pair")
     # one name only is a name, also where the verdict doubts it
@@ -162,6 +177,10 @@ def score(truth: dict, result: dict) -> Score:
         removed=removed(held_out) if one_answer else math.nan,
         decoy=bool(verdict.get("decoys", {}).get("accepted")),
         region=region(truth["names"], verdict.get("where", [])) if one_answer and right else None,
+        depends_rightly=depends_rightly(truth, verdict),
+        character_closes=verdict["character"][0]["closed"]["held_out"]
+        if verdict.get("character")
+        else math.nan,
         seconds=result["seconds"],
         baselines=result.get("baselines", {}),
         baselines_right={
@@ -171,6 +190,14 @@ def score(truth: dict, result: dict) -> Score:
             for method, named in result.get("baselines", {}).items()
         },
     )
+
+
+def depends_rightly(truth: dict, verdict: dict) -> bool | None:
+    """Whether the likeliest of what a missing force is said to depend on is right."""
+    if not verdict.get("character"):
+        return None
+    wanted = [DEPENDS_ON[name] for name in truth["names"] if name in DEPENDS_ON]
+    return any(set(verdict["character"][0]["depends_on"]) == one for one in wanted)
 
 
 def region(names: list[str], where: list[dict]) -> bool | None:
@@ -185,8 +212,8 @@ def column(answer: str, sets: set[frozenset[str]], one_answer: bool, contains: b
     """Column of the confusion matrix."""
     if answer == "failed":
         return "no verdict"
-    if answer in ("none", "not-in-catalogue"):
-        return answer
+    if answer in ("none", *UNNAMED):
+        return "not-in-catalogue" if answer in UNNAMED else answer
     if contains:
         return "right name" if answer == "named" else "equivalent set" if one_answer else "set with the truth"
     if len(sets) != 1:

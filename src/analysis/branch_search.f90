@@ -6,7 +6,8 @@
 !> all.
 module branch_search
   use body_family, only: body_neighbourhood, family_t
-  use branch, only: branch_t, label_pd, plan_t, point_t, set_sizes, trace_branch
+  use branch, only: trace_branch
+  use branch_point, only: branch_t, label_pd, plan_t, point_t, set_sizes
   use errors, only: error_t
   use kinds, only: wp
   use one_body, only: one_body_t

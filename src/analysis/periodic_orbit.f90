@@ -6,15 +6,13 @@
 !> section, and one linear condition. All are smooth functions, also where an impact becomes a graze or an instant passes
 !> another, so that an orbit can be followed up to and beyond the end of its event sequence.
 module periodic_orbit
-  use body_events, only: events_of_body
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: body_neighbourhood, family_t, fly_periods
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use matrices, only: eigenvalues, solve
-  use motion, only: advance_period, start_state
-  use motion_state, only: log_t, open_log, reset_tally, state_t, tally_t
-  use one_body, only: mode_of_body, one_body_t, rests_on_barrier
+  use motion_state, only: tally_t
+  use one_body, only: one_body_t, rests_on_barrier
   use variations, only: by_difference, neighbourhood_t, vary
   implicit none
   private
@@ -52,28 +50,16 @@ contains
     integer, intent(in) :: periods
     type(orbit_t), intent(out) :: orbit
     logical, intent(out) :: ok
-    type(state_t) :: start, state
     type(tally_t) :: tally
-    type(log_t) :: log
-    integer :: i, reason, mode
+    real(wp) :: image(states)
     orbit%periods = periods
     orbit%parameter = parameter
     orbit%y = y
     ok = .false.
     select type (body => machines%centre)
     type is (one_body_t)
-      call open_log(log, 0.0_wp)
-      log%book%kept = .false.
-      start = start_state(body%moving, y(1), y(2), 0.0_wp)
-      state = start
-      call reset_tally(tally, state, .false.)
-      do i = 1, periods
-        call advance_period(body%moving, state, tally, reason, log)
-        if (reason /= 0) return
-      end do
-      call events_of_body(body, start, log, state, .true., orbit%events, mode)
-      orbit%mode = mode_of_body(body, start)
-      ok = size(orbit%events) <= most_events
+      call fly_periods(body, y, periods, .true., image, orbit%events, orbit%mode, tally, ok)
+      if (ok) ok = size(orbit%events) <= most_events
     end select
   end subroutine orbit_of_motion
 

@@ -112,17 +112,8 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     real(wp) :: memory(2)
-    logical :: has(2)
-    has = remembers(moving)
-    memory = 0
-    if (any(has)) memory = unpack(point(3:2 + count(has)), has, memory)
-    if (has(1)) then
-      state = start_state(moving, point(1), point(2), 0.0_wp, z=memory(1), touch_speed=abs(memory(2)))
-    else if (has(2)) then
-      state = start_state(moving, point(1), point(2), 0.0_wp, touch_speed=abs(memory(2)))
-    else
-      state = start_state(moving, point(1), point(2), 0.0_wp)
-    end if
+    memory = unpack(point(3:), remembers(moving), [0.0_wp, abs(point(2))])
+    state = start_state(moving, point(1), point(2), 0.0_wp, z=memory(1), touch_speed=abs(memory(2)))
     call take_turns(moving%machine%turn, state)
   end function body_at
 
@@ -185,10 +176,7 @@ contains
       strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
       if (allocated(moving%pair) .or. allocated(moving%jointed) .or. before%state%mode == 0) return
       associate (state => before%state)
-        strobe%state = start_state(moving, state%x, state%v, angle, touch_speed=state%touch_speed)
-        if (moving%machine%effects%dahl_stiffness > 0) then
-          strobe%state = start_state(moving, state%x, state%v, angle, z=state%z, touch_speed=state%touch_speed)
-        end if
+        strobe%state = start_state(moving, state%x, state%v, angle, z=state%z, touch_speed=state%touch_speed)
       end associate
       call take_turns(moving%machine%turn, strobe%state)
       return

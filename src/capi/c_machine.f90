@@ -14,7 +14,7 @@ module c_machine
   use jointed_section, only: start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: int64, wp
-  use lanes, only: prepare_lanes
+  use lane_preparation, only: prepare_lanes
   use model_type, only: check_values, model_t
   use parameter_list, only: put_values
   use span_check, only: check_periods

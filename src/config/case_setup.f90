@@ -7,7 +7,7 @@ module case_setup
   use case_type, only: case_t
   use grid, only: grid_t, make_grid, sample_axis, two_axes
   use kinds, only: int64, wp
-  use lanes, only: widest_lanes
+  use lane_types, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
   use refinement, only: refine_t
   use trajectory, only: span_t

@@ -197,7 +197,7 @@ contains
   subroutine report_catalogue(session, work)
     type(session_t), intent(inout) :: session
     type(basin_work_t), intent(in) :: work
-    character(len=:), allocatable :: source
+    character(len=:), allocatable :: source, not_known, missed
     integer :: i, k, last
     if (size(work%catalogues) == 0) then
       call session%journal%line('catalogue', 'no start is an axis: every point has its own attractor, unlabelled')
@@ -211,10 +211,10 @@ contains
     if (len(session%command%catalogue) > 0) source = ' taken from '//session%command%catalogue
     call session%journal%line('catalogue', counted(last, 'attractor')//' in '//counted(size(work%catalogues), 'slice')// &
       source, '"attractors": '//to_text(last))
-    if (len(not_known_text(work%catalogues, work%span%extension)) > 0) call session%journal%line('warning', &
-      not_known_text(work%catalogues, work%span%extension))
-    if (len(missed_text(work%catalogues, session%the_case%attractors%sample)) > 0) call session%journal%line('missed', &
-      missed_text(work%catalogues, session%the_case%attractors%sample))
+    not_known = not_known_text(work%catalogues, work%span%extension)
+    if (len(not_known) > 0) call session%journal%line('warning', not_known)
+    missed = missed_text(work%catalogues, session%the_case%attractors%sample)
+    if (len(missed) > 0) call session%journal%line('missed', missed)
     if (size(work%catalogues) > 1) return
     do k = 1, size(work%catalogues(1)%attractors)
       call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k), &

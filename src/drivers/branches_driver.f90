@@ -3,7 +3,7 @@
 
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
-  use branch, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
+  use branch_point, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
   use case_setup, only: options_of, output_path

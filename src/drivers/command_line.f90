@@ -14,8 +14,8 @@ module command_line
 
   integer, parameter :: longest_argument = 4096
 
-  character(len=*), parameter, public :: commands(10) = [character(len=10) :: 'basin', 'sweep', &
-    'branches', 'stability', 'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
+  character(len=*), parameter, public :: commands(11) = [character(len=10) :: 'basin', 'sweep', &
+    'branches', 'boundary', 'stability', 'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
 
   !> The commands that keep what is done when they are stopped.
   character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
@@ -143,8 +143,11 @@ contains
       call fail(error, exit_usage, '--record belongs to the command trajectory')
     else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--tile-times belongs to the commands '//join(resumable, ', '))
-    else if (len(command%draw) > 0 .and. any(command%name == [character(len=10) :: 'merge', 'laws', 'info', 'verify'])) then
+    else if (len(command%draw) > 0 .and. any(command%name == [character(len=10) :: 'merge', 'boundary', 'laws', 'info', &
+                                                                               'verify'])) then
       call fail(error, exit_usage, '--draw belongs to the commands that read a case')
+    else if (size(command%overrides) > 0 .and. command%name == 'boundary') then
+      call fail(error, exit_usage, '--set belongs to the commands that read a case: boundary takes that of its map')
     else if (command%resume .and. .not. any(command%name == resumable)) then
       call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
     else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
@@ -374,6 +377,11 @@ contains
         '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
         '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
         '  --searches N       values at which orbits are searched (default 12)'//nl
+    case ('boundary')
+      lines = 'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
+        '  Every edge between neighbours of different attractors is halved until its boundary point is known to 1e-10'//nl// &
+        '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
+        '  takes a small part of the time of the map.'//nl
     case ('stability')
       lines = 'separatrix stability CASE [--periods N]: Lyapunov exponents and the kind of one motion'//nl// &
         '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
@@ -414,6 +422,7 @@ contains
         '  basin CASE       where every point of a grid of starts or parameters ends up'//nl// &
         '  sweep CASE       amplitude-frequency and bifurcation diagram, run up, run down and from many starts'//nl// &
         '  branches CASE    periodic orbits over a parameter, stable and unstable, with their bifurcations'//nl// &
+        '  boundary MAP     the boundaries between the basins of a map, as curves'//nl// &
         '  stability CASE   Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic'//nl// &
         '  trajectory CASE  one motion with all its events'//nl// &
         '  points CASE      a list of starts'//nl// &
@@ -424,7 +433,7 @@ contains
         'separatrix COMMAND --help tells more. CASE is a TOML file, see docs/case-file.md.'//nl
     end select
     lines = lines//nl//'Options:'//nl// &
-      '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case)'//nl// &
+      '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'//nl// &
       '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'//nl// &
       '  --validate         checks the case and stops'//nl// &
       '  --draw FILE.svg    draws the machine as it was understood and stops'//nl// &

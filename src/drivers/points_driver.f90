@@ -13,7 +13,7 @@ module points_driver
   use file_layout, only: add_reason, add_regime
   use grid, only: grid_t, machine_with, slice_motion
   use kinds, only: int64, int8, wp
-  use lanes, only: prepare_lanes
+  use lane_preparation, only: prepare_lanes
   use map_file, only: map_file_t
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t, type_float64, type_int32

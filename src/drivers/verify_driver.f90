@@ -11,7 +11,6 @@ module verify_driver
   use case_reader, only: load_case_text
   use case_setup, only: grid_of, options_of, span_of
   use case_type, only: case_t
-  use catalogue_search, only: search_catalogues
   use command_line, only: command_t
   use errors, only: error_t, fail
   use file_layout, only: map_variables
@@ -27,11 +26,11 @@ module verify_driver
   use reference, only: run_reference
   use refinement, only: origin_contradicted
   use restoring_law, only: position_is_angle
-  use second_look, only: recall_second_look
   use serial_team, only: serial_team_t
   use span_check, only: check_periods
   use statistics, only: share_upper_limit
   use status, only: exit_io, exit_uncertain, reason_settled
+  use stored_map, only: restore_catalogues
   use sweep_driver, only: sweep_axes
   use text, only: to_text
   use trajectories, only: journey_t, run_trajectories
@@ -151,9 +150,7 @@ contains
     integer(int64) :: points
     integer :: i, before
     grid = grid_of(the_case, axes)
-    call search_catalogues(alone, journal, grid, span_of(the_case), the_case%attractors, 0.0_wp, catalogues, &
-                           error)
-    if (.not. allocated(error)) call recall(reader, alone, journal, grid, the_case, catalogues, error)
+    call restore_catalogues(reader, alone, journal, grid, the_case, catalogues, error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
@@ -182,25 +179,6 @@ contains
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
-
-  !> Adds to the catalogues what a second look of the file found.
-  subroutine recall(reader, alone, journal, grid, the_case, catalogues, error)
-    type(reader_t), intent(in) :: reader
-    type(serial_team_t), intent(in) :: alone
-    type(journal_t), intent(in) :: journal
-    type(grid_t), intent(in) :: grid
-    type(case_t), intent(in) :: the_case
-    type(catalogue_t), intent(inout) :: catalogues(:)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: values(:)
-    integer(int64), allocatable :: lengths(:)
-    if (.not. reader%has('/second_look/start')) return
-    call reader%read_values('/second_look/start', values, error)
-    if (.not. allocated(error)) call reader%lengths('/second_look/start', lengths, error)
-    if (allocated(error)) return
-    call recall_second_look(alone, journal, grid, span_of(the_case), the_case%attractors%max_period, values, int(lengths(2)), &
-                            catalogues, error)
-  end subroutine recall
 
   !> Indices of point `i` of the sample: each point once where the sample is the `whole`, else a random one.
   pure function sampled(shape, whole, seed, i) result(index)

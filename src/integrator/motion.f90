@@ -85,8 +85,8 @@ contains
     end if
   end subroutine prepare_motion
 
-  !> State of a body set off at `x` [m], `v` [m/s] with the crank at `crank_angle` [rad]. Dahl's friction is `z` [N], or what
-  !> it is after a long slip this way; a contact that lasts has begun with `touch_speed` [m/s], or with |v|.
+  !> State of a body set off at `x` [m], `v` [m/s] with the crank at `crank_angle` [rad]. Dahl's friction, if it has that, is
+  !> `z` [N], or what it is after a long slip this way; a contact that lasts has begun with `touch_speed` [m/s], or with |v|.
   pure function start_state(moving, x, v, crank_angle, z, touch_speed) result(state)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, crank_angle
@@ -97,7 +97,7 @@ contains
     state%time = modulo(crank_angle, two_pi)/moving%machine%drive_frequency
     if (v < 0) state%mode = mode_slip_minus
     if (abs(v) > 0) state%z = dahl_level(moving%machine%effects, sign(1.0_wp, v))
-    if (present(z)) state%z = z
+    if (present(z) .and. moving%machine%effects%dahl_stiffness > 0) state%z = z
     if (v == 0) state%mode = mode_from_rest(moving%machine, state)
   end function start_state
 

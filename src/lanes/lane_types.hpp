@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// What the kernel and its caller share. `lanes.f90` mirrors these structures member by member.
+// What the kernel and its caller share. `lane_types.f90` mirrors these structures member by member.
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 

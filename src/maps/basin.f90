@@ -9,7 +9,7 @@ module basin
   use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
   use kinds, only: int64, wp
   use match, only: carry_labels, number_new, remember
-  use lanes, only: prepare_lanes
+  use lane_preparation, only: prepare_lanes
   use motion, only: motion_t
   use pair, only: is_pair
   use span_check, only: check_periods

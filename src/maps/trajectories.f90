@@ -6,8 +6,8 @@
 module trajectories
   use attractors, only: attractor_t
   use kinds, only: wp
-  use lanes, only: add_region, fly_lanes, lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_state, &
-    lane_stopped, occupy_lane, take_counts
+  use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
+  use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus
   use status, only: reason_left_domain

@@ -17,7 +17,7 @@ module body_family
   implicit none
   private
 
-  public :: body_neighbourhood, body_of_family, map_with_variation, size_of_motion, vary_period
+  public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, size_of_motion, vary_period
 
   !> Distance of the neighbours, as a share of the parameter's size.
   real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
@@ -119,34 +119,54 @@ contains
     type(tally_t), intent(out) :: tally
     logical, intent(out) :: ok
     real(wp), intent(out), optional :: by_parameter(2)
-    type(state_t) :: start, state
     type(event_t), allocatable :: events(:)
-    type(log_t) :: log
-    integer :: i, reason, mode
+    integer :: mode
     by_start = 0
     if (present(by_parameter)) by_parameter = 0
     image = point
     ok = .false.
     select type (body => machines%centre)
     type is (one_body_t)
-      call open_log(log, 0.0_wp)
-      log%book%kept = .false.
-      start = start_state(body%moving, point(1), point(2), 0.0_wp)
-      state = start
-      call reset_tally(tally, state, .false.)
-      do i = 1, periods
-        call advance_period(body%moving, state, tally, reason, log)
-        if (reason /= 0) return
-      end do
-      image = [state%x, state%v]
-      call events_of_body(body, start, log, state, .false., events, mode)
-      call vary(machines, mode_of_body(body, start), point, events, periods*body%period, likeness*body%size_of*max(1, periods), &
-                by_start, ok, by_parameter)
+      call fly_periods(body, point, periods, .false., image, events, mode, tally, ok)
+      if (.not. ok) return
+      call vary(machines, mode, point, events, periods*body%period, likeness*body%size_of*max(1, periods), by_start, ok, &
+                by_parameter)
       ! The section comes when the drive has turned, and that may depend on the parameter.
       if (present(by_parameter)) by_parameter = by_parameter + periods*period_slope(machines)* &
-        body%slope(mode, periods*body%period, image)
+        body%slope(mode_at_end(mode, events), periods*body%period, image)
     end select
   end subroutine map_with_variation
+
+  !> Flies a body from a section point over `periods` drive periods: where it then is, the mode in which it began, and the events
+  !> on the way, with `collapsed` a completed chatter as one. `ok` is false if the trajectory had to be given up.
+  pure subroutine fly_periods(body, point, periods, collapsed, image, events, mode, tally, ok)
+    type(one_body_t), intent(in) :: body
+    real(wp), intent(in) :: point(2)
+    integer, intent(in) :: periods
+    logical, intent(in) :: collapsed
+    real(wp), intent(out) :: image(2)
+    type(event_t), allocatable, intent(out) :: events(:)
+    integer, intent(out) :: mode
+    type(tally_t), intent(out) :: tally
+    logical, intent(out) :: ok
+    type(state_t) :: start, state
+    type(log_t) :: log
+    integer :: i, reason, last_mode
+    image = point
+    call open_log(log, 0.0_wp)
+    log%book%kept = .false.
+    start = start_state(body%moving, point(1), point(2), 0.0_wp)
+    mode = mode_of_body(body, start)
+    state = start
+    call reset_tally(tally, state, .false.)
+    do i = 1, periods
+      call advance_period(body%moving, state, tally, reason, log)
+      ok = reason == 0
+      if (.not. ok) return
+    end do
+    image = [state%x, state%v]
+    call events_of_body(body, start, log, state, collapsed, events, last_mode)
+  end subroutine fly_periods
 
   !> Moves a body from one section to the next: derivatives of its state there by that before, and the events on the way. `log` is
   !> the caller's, opened once, and holds them too. `ok` is false if the trajectory had to be given up or the derivatives
@@ -172,6 +192,14 @@ contains
     call events_of_body(body, start, log, state, .false., events, mode)
     call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok)
   end subroutine vary_period
+
+  !> Mode after the last event of a motion that began in `mode`.
+  pure integer function mode_at_end(mode, events)
+    integer, intent(in) :: mode
+    type(event_t), intent(in) :: events(:)
+    mode_at_end = mode
+    if (size(events) > 0) mode_at_end = events(size(events))%after
+  end function mode_at_end
 
   !> Derivative of the period by the parameter.
   pure real(wp) function period_slope(machines) result(slope)

@@ -151,6 +151,12 @@ JUDGED = [
         (False, True, False, False),
         "not-in-catalogue",
     ),
+    (
+        truth(["second_mode"], "outside"),
+        verdict("characterised"),
+        (False, True, False, False),
+        "not-in-catalogue",
+    ),
     (truth(["second_mode"], "outside"), verdict("named", ["dahl"]), (True, False, False, True), "dahl"),
     (
         truth(["viscous", "offset_force"], "pair"),

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.base import fit_base
-from separatrix.discovery.fitting.curves import MEMBERS, fit_member, function_of, knots_at, seen_values
+from separatrix.discovery.fitting.curves import fit_member, function_of, knots_at
 from separatrix.discovery.fitting.data import gather, scales_of
+from separatrix.discovery.fitting.members import MEMBERS
 from separatrix.discovery.fitting.shapes import closed_forms, through
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -164,7 +165,7 @@ def test_friction_of_a_shape_that_no_effect_has_is_fitted_as_a_function():
     known = first = fit_base(data, base, scales_of(data, base).mass)
     assert first.fit.reduced_chi2 > 5
     for count in (3, 5, 8):
-        knots = knots_at(MEMBERS[1], seen_values(MEMBERS[1], first), count)
+        knots = knots_at(MEMBERS[1], MEMBERS[1].seen(first), count)
         known = fit_member(data, first, MEMBERS[1], known, knots, alike=True)
     assert known.fit.converged
     assert known.fit.reduced_chi2 < 1.1
@@ -174,3 +175,22 @@ def test_friction_of_a_shape_that_no_effect_has_is_fitted_as_a_function():
     assert np.all(np.abs(off[part.at < 1.4]) < 0.05)
     # both directions have one value, which the case has twice
     assert all(known.problem.free[i].also for i in known.added)
+
+
+def test_friction_that_varies_over_the_place_as_a_sine_is_found_as_a_function():
+    """Coefficient 0.08 (1 + 0.6 sin(9 x)): no effect has that shape, the family as a table has."""
+    case = CASE.format(contact=NEWTON).replace("0.05", "0.08")
+    places = np.linspace(-0.2, 0.72, 16)
+    table = {f"place[{i}]": one for i, one in enumerate(places, start=1)}
+    table |= {f"change[{i}]": 0.6 * np.sin(9 * one) for i, one in enumerate(places, start=1)}
+    base = Model.from_text(case)
+    records = records_of(base.with_effect("friction_place_curve", table), seconds=8.0)
+    options = Options(quick=True, most_effects=1, candidates=("position_dependent_friction",))
+    verdict = discover(base, records[:2], records[2:], options)
+    assert verdict["effects"] == ["friction_place_curve"]
+    part = verdict["function"]["parts"][0]
+    at, value, band = (np.array(part[key]) for key in ("at", "value", "band_95"))
+    right = 0.08 * (1 + 0.6 * np.sin(9 * at))
+    off = np.maximum(band[0] - right, right - band[1])
+    assert np.mean(off < 0.02 * right) >= 0.9
+    assert min(one["closed"] for one in verdict["remains"]) > 0.98

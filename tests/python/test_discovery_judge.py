@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from separatrix.discovery.decision.decide import foremost
-from separatrix.discovery.decision.judge import Judged, stable
+from separatrix.discovery.decision.judge import Judged, held_out_bounds, stable
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.refit import Fitted
@@ -47,6 +47,32 @@ def test_an_effect_that_a_few_segments_carry_needs_the_held_out_record():
     assert stable(judged(few, even), base, OPTIONS) > OPTIONS.inclusion
     # a record that was never fitted makes no name by itself
     assert stable(judged(0.05 * few, even), base, OPTIONS) < OPTIONS.inclusion
+
+
+def foretold(gains: np.ndarray, information: np.ndarray) -> Judged:
+    """A candidate that gains so much by held-out segment, each with so much information on it."""
+    one = judged(np.full(COUNT, 2.0), gains)
+    one.prediction.record = np.zeros(gains.size, int)
+    one.prediction.fit = SimpleNamespace(reduced=SimpleNamespace(matrix=information[:, None, None]))
+    return one
+
+
+def test_segments_that_say_nothing_of_an_effect_do_not_spoil_its_bounds():
+    everywhere, ones = np.repeat([4.0, 6.0], 8), np.ones(16)
+    low, high = held_out_bounds(foretold(everywhere, ones), OPTIONS)[0]
+    assert 64 <= low < 80 < high <= 96
+    # without an impact restitution cannot show; a segment that the base cannot follow was not compared
+    quiet = np.concatenate([everywhere, np.full(10, 1e-4)])
+    silent = np.concatenate([ones, np.full(10, 1e-9)])
+    assert held_out_bounds(foretold(quiet, silent), OPTIONS)[0] == (low, high)
+    lost = np.concatenate([everywhere, np.zeros(10)])
+    assert held_out_bounds(foretold(lost, np.ones(26)), OPTIONS)[0] == (low, high)
+    # one segment that tells, of many: odds of 20 to 1, either way
+    for gain, helps in ((50.0, True), (2.9, False), (-50.0, False)):
+        one = np.array([gain, *12 * [0.0]])
+        low, high = held_out_bounds(foretold(one, np.ones(13)), OPTIONS)[0]
+        assert (low > 0) == helps
+        assert (high > OPTIONS.harm) == (gain > -6)
 
 
 def contender(name: str, evidence: float) -> Judged:

@@ -82,6 +82,26 @@ class Page(HTMLParser):
             self._rows[-1][-1] += data
 
 
+CHARACTER = [
+    {
+        "depends_on": ["memory"],
+        "formula": "-a z, z' = v - z/tau",
+        "constant": {"name": "time constant tau", "value": 0.2034, "unit": "s"},
+        "size": {"value": 3.42, "standard_error": 0.08},
+        "closed": {"training": 0.92, "held_out": 0.97},
+        "text": "a force that depends on memory, -a z, with a time constant tau of about 0.203 s",
+    },
+    {
+        "depends_on": ["speed", "place"],
+        "formula": "",
+        "constant": None,
+        "size": None,
+        "closed": {"training": 0.91, "held_out": 0.95},
+        "text": "a force that depends on speed and place: it would close 91 % of the gap",
+    },
+]
+
+
 def verdict(outcome: str) -> dict:
     """A verdict like those of the workflow."""
     found = outcome in ("named", "ambiguous")
@@ -112,6 +132,7 @@ def verdict(outcome: str) -> dict:
             "training": {"before": 7.25, "after": after, "noise_floor": 1.0},
             "held_out": {"before": 41234.5, "after": 1.0093 if found else 41234.5, "noise_floor": 1.0},
         },
+        "character": CHARACTER if outcome == "characterised" else [],
         "gates": {"converged": True, "detect": True, "separate": outcome == "named"} if found else {},
         "p_value": 5.8e-74 if found else None,
         "reasons": [] if outcome in ("named", "none") else ["gate 'separate' was not passed"],
@@ -205,7 +226,7 @@ def make(folder: Path, outcome: str) -> dict:
     return told
 
 
-@pytest.fixture(scope="module", params=["named", "ambiguous", "none", "not-in-catalogue"])
+@pytest.fixture(scope="module", params=["named", "ambiguous", "none", "not-in-catalogue", "characterised"])
 def report(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[dict, Page, bytes]:
@@ -276,7 +297,8 @@ def test_the_words_fit_the_outcome(report: tuple) -> None:
         "named": "The base machine lacks: cubic spring",
         "ambiguous": "but offset force, offset force with sensor bias would do about as well",
         "none": "No effect is missing that these records could show",
-        "not-in-catalogue": "no effect of the catalogue explains it",
+        "not-in-catalogue": "no effect of the catalogue explains it.",
+        "characterised": "on what it depends: memory, or speed and place.",
     }
     present = [outcome for outcome, text in said.items() if text in page.text]
     assert present == [told["outcome"]]

@@ -22,9 +22,9 @@ from separatrix.progress import Progress, Report
 class Discovery:
     """The verdict on records of a machine.
 
-    `outcome` is "named", "ambiguous", "none" or "not-in-catalogue"; `effects` are the names; `verdict` is
-    all of it, as in verdict.json (docs/discovery-guide.md). `case` is the case with the effects found, None
-    without any; `files` are what was written.
+    `outcome` is "named", "ambiguous", "none", "characterised" or "not-in-catalogue"; `effects` are the names;
+    `verdict` is all of it, as in verdict.json (docs/discovery-guide.md). `case` is the case with the effects
+    found, None without any; `files` are what was written.
     """
 
     verdict: dict
@@ -33,7 +33,7 @@ class Discovery:
 
     @property
     def outcome(self) -> str:
-        """What was found: named, ambiguous, none, not-in-catalogue."""
+        """What was found: named, ambiguous, none, characterised, not-in-catalogue."""
         return str(self.verdict["outcome"])
 
     @property

@@ -123,6 +123,10 @@ def summary(verdict: dict) -> list[str]:
         "ambiguous": [f"missing: {names}" + (f", or {others}" if others else ", not beyond doubt")],
         "none": ["no missing effect"],
         "not-in-catalogue": [f"something is missing that {searched(verdict)} does not name"],
+        "characterised": [
+            f"something is missing that {searched(verdict)} does not name:",
+            *(f"  {'or ' if number else ''}{one['text']}" for number, one in enumerate(verdict["character"])),
+        ],
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():
         if path.startswith("effect."):

@@ -57,6 +57,9 @@ class Options:
     # share of the gap, in training and on held-out records, that may remain of one that is closed but for so
     # little: what it leaves has another reason
     remaining: float = 1e-2
+    # share of the gap, in training and on held-out records, that a force must close, linearised, for what it
+    # depends on to be told of a gap without a name
+    characterised: float = 0.5
     # size of what counts as visible, in standard errors
     visible: float = 5.0
     bootstraps: int = 400

@@ -16,9 +16,9 @@ import numpy as np
 
 from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.catalogue import within_barriers
-from separatrix.discovery.fitting.ceiling import sample_times
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.response import sample_times
 from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.wording import units_of, with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError

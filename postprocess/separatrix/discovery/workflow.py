@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from separatrix.discovery.decision.characterise import characterised
 from separatrix.discovery.decision.decide import decide
 from separatrix.discovery.decision.partial import decide_in_part, nearest
 from separatrix.discovery.decision.rounds import Bench
@@ -74,6 +75,8 @@ def investigate(
     else:
         decision = decide(bench, fitted)
         decision.reasons += nearest(bench, decision)
+        options.progress("asking what the rest of the gap depends on", 0.97)
+        decision = characterised(bench, decision)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)

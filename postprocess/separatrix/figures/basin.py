@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Basin maps: which motion each starting point leads to."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
@@ -78,11 +79,14 @@ def basin_map(
     look: Look = DEFAULT,
     totals: dict[int, int] | None = None,
     over: str | None = None,
+    curves: Callable[[list[Axes], list[dict[str, float]]], list[Line2D]] | None = None,
+    notes: Sequence[str] = (),
 ) -> Figure:
     """Return the map of one field over the initial conditions, one panel per value of the other axes.
 
     `totals`: the points of each class in the legend, where it is to be that of more than is drawn. `over`: a
-    variable of 0 and 1, black where it is 1.
+    variable of 0 and 1, black where it is 1. `curves` draws more into the panels, given their places on the
+    other axes, and returns what the legend needs of it; `notes` are for the caption.
     """
     whole, result = result, look.selected(result)
     path = path if look.whole else None
@@ -121,6 +125,14 @@ def basin_map(
         black = _read_panels(None, result, over, axes, others, chosen)
         closer = [] if part is None else _read_panels(None, part, over, axes, others, [(0,) * len(others)])
         handles.append(_draw_over(grid, black, closer))
+    if curves is not None:
+        places = chosen + chosen[: len(grid) - len(panels)]
+        at = [
+            {name: float(result[name].values[k]) for name, k in zip(others, place, strict=True)}
+            for place in places
+        ]
+        handles += curves(grid, at)
+    caption += notes
     compose(figure, title, shown([*caption, plain(version_text(result))], look), handles)
     return figure
 

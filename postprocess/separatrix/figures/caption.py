@@ -201,8 +201,9 @@ def start_pieces(result: xr.Dataset) -> list[str]:
     restoring = resolved_case(result).get("restoring")
     if isinstance(restoring, dict) and restoring.get("law") == "pendulum":
         symbols = {key: (symbol, unit.replace("m", "rad")) for key, (symbol, unit) in _START.items()}
-    pieces = _values(start, symbols, "", set(result.dims))
-    if start.get("crank_angle") and "crank_angle" not in result.dims:
+    varying = {str(name) for name in result.dims} | set(str(result.attrs.get("axes", "")).split())
+    pieces = _values(start, symbols, "", varying)
+    if start.get("crank_angle") and "crank_angle" not in varying:
         pieces += _values(start, {"crank_angle": (r"$\varphi_0$", "rad")}, "", set())
     return [", ".join(pieces)] if pieces else []
 
@@ -217,6 +218,9 @@ def version_text(result: xr.Dataset) -> str:
 def _axes(result: xr.Dataset, case: dict) -> set[str]:
     """Names of what varies in a file."""
     axes = {str(name) for name in result.dims}
+    if result.attrs.get("kind") == "boundary":
+        axes.update(str(result.attrs.get("axes", "")).split())
+        axes.update(str(name).removeprefix("piece_") for name in result.data_vars)
     if result.attrs.get("kind") == "branches":
         axes.add(str(result.attrs.get("parameter", "")).replace(".", "_"))
     if "ratio" in result and np.ptp(result["ratio"].values) > 0:

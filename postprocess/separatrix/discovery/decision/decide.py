@@ -55,6 +55,8 @@ class Decision:
     equivalent: bool = False
     # whether nothing is left to name
     complete: bool = True
+    # of a gap without a name: on what the missing force depends, likeliest first
+    characters: list = field(default_factory=list)
 
 
 def decide(bench: Bench, base: Fitted) -> Decision:

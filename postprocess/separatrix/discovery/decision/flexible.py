@@ -7,15 +7,8 @@ from collections.abc import Iterator
 from separatrix.discovery.decision.judge import Judged, admissible, lead, margin
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.ceiling import Ceiling
-from separatrix.discovery.fitting.curves import (
-    KNOTS,
-    MEMBERS,
-    Member,
-    fit_member,
-    fits_machine,
-    knots_at,
-    seen_values,
-)
+from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
+from separatrix.discovery.fitting.members import MEMBERS, Member
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.library import effects
 
@@ -59,7 +52,7 @@ def _best(bench: Bench, found: Round, member: Member) -> Iterator[Judged]:
     """The table of a family on as many knots as the evidence pays for; nothing where none converges."""
     known = _begun(found, member.family)
     best = None
-    seen = seen_values(member, known)
+    seen = member.seen(known)
     for alike in (True, False) if len(member.values) > 1 else (False,):
         for count in KNOTS:
             knots = knots_at(member, seen, count)

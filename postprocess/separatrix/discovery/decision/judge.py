@@ -15,6 +15,10 @@ from separatrix.discovery.options import Options
 from separatrix.library import effects
 
 _BLOCKS = 2
+# fewer segments than this have no distribution of their own to draw from
+_FEW = 5
+# share of the mean information on an effect below which a segment says nothing of it
+_SILENT = 0.01
 
 
 @dataclass
@@ -74,14 +78,40 @@ def family_wise(gain: float, parameters: int, tested: float) -> float:
 
 
 def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
-    """Lower and upper 5 % bound of the gain in each held-out record, over the misfit, by block bootstrap."""
+    """Lower and upper 5 % bound of the gain in each held-out record, over the misfit, by block bootstrap.
+
+    Segments that one of the machines cannot follow are not drawn, nor those in which the effect does not act,
+    such as those without an impact for one of restitution. Where few are left, the bounds are the odds of a
+    name away from what they gained.
+    """
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
+    tells = _telling(one)
     for number in np.unique(one.prediction.record):
-        parts = one.held_out_parts[one.prediction.record == number]
-        sums = _block_sums(parts / one.prediction.misfit, random, options.bootstraps)
+        here = one.prediction.record == number
+        parts = one.held_out_parts[here & tells] / one.prediction.misfit
+        if parts.size < _FEW:
+            whole = float(one.held_out_parts[here].sum()) / one.prediction.misfit
+            bounds[int(number)] = (whole - options.separation, whole + options.separation)
+            continue
+        sums = _block_sums(parts, random, options.bootstraps)
         bounds[int(number)] = (float(np.quantile(sums, 0.05)), float(np.quantile(sums, 0.95)))
     return bounds
+
+
+def _telling(one: Judged) -> np.ndarray:
+    """Whether both machines follow a held-out segment and it has information on what was added."""
+    fitted, prediction = one.fitted, one.prediction
+    shared = [i for i, free in enumerate(fitted.problem.free) if free.record is None]
+    added = [shared.index(i) for i in fitted.added if i in shared]
+    sizes = np.array([_size(fitted, shared[i]) for i in added])
+    matrix = prediction.fit.reduced.matrix[:, added, added] * sizes**2
+    information = matrix.max(axis=1, initial=0.0)
+    tells = np.zeros(information.size, bool)
+    for number in np.unique(prediction.record):
+        here = prediction.record == number
+        tells[here] = information[here] > _SILENT * information[here].mean()
+    return tells & (one.held_out_parts != 0)
 
 
 def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> np.ndarray:
@@ -117,8 +147,12 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
 def differs_from_nothing(fitted: Fitted, i: int) -> bool:
     """Whether the 95 % interval of a parameter is without zero, or the number behind a logarithm is known."""
     error = float(np.sqrt(fitted.covariance[i, i]))
-    size = 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
-    return size > 1.96 * error > 0
+    return _size(fitted, i) > 1.96 * error > 0
+
+
+def _size(fitted: Fitted, i: int) -> float:
+    """Distance of a parameter from no effect; 1 of the logarithm where it is one."""
+    return 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
 
 
 def margin(best: Judged, other: Judged, options: Options) -> float:

@@ -58,6 +58,7 @@ def verdict_of(findings: Findings) -> dict:
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
         "families": [effects()[name].family for name in final.names],
         "function": _function(final),
+        "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
         "p_value": best.p if best else None,
         "reasons": decision.reasons,
@@ -158,7 +159,7 @@ def _warnings(findings: Findings) -> list[str]:
     for _, data, fitted in fits:
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
     notes += other_machine(bench.training, fits[0][2], bench.options)
-    if findings.decision.outcome == "not-in-catalogue":
+    if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(bench.training, findings.base)
     fit = findings.base.fit
     if not fit.converged:

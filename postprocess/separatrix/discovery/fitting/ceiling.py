@@ -11,12 +11,12 @@ own and so sees what no function of the state can say.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.stats import chi2
 
 from separatrix.discovery.fitting.fit import Fit, blocks_of, eliminate
+from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knots_of, scaled_motion, splines
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.response import force_columns, kick_columns, sample_times
+from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project
 
 _PIECES = 5
@@ -108,9 +108,11 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     sign = np.sign(v)
     one = np.ones_like(x)
     forces = {
-        "speed": _splines(v, good, 7),
-        "place": _splines(x, good, 7),
-        "speed and place": _products(_splines(v, good, 4), _splines(x, good, 4)),
+        "speed": splines(v, knots_of(v[good], 7), good),
+        "place": splines(x, knots_of(x[good], 7), good),
+        "speed and place": _products(
+            splines(v, knots_of(v[good], 4), good), splines(x, knots_of(x[good], 4), good)
+        ),
         "time": np.stack(
             [time * f for f in (one, x, v, sign)] + [time**2 * f for f in (one, x, sign)], axis=2
         ),
@@ -124,7 +126,7 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     since = after_impacts(problem, fit)
     known = good & np.isfinite(since)
     if known.sum() > 100:
-        forces["time since impact"] = _splines(since, known, 12)
+        forces["time since impact"] = splines(since, knots_of(since[known], 12), known)
     made = {name: force_columns(problem, fit, values, mass) for name, values in forces.items()}
     kicks = impact_kicks(problem, fit, state)
     if kicks is not None:
@@ -132,28 +134,9 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     return made
 
 
-def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
-    """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
-    inside = problem.segments.inside
-    x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
-    good = inside & fit.good[:, None]
-    middle, size = np.mean(x[good]), np.std(x[good])
-    speed = np.sqrt(np.mean(v[good] ** 2))
-    time, phase = np.zeros(inside.shape), None
-    for number, prepared in enumerate(problem.prepared):
-        rows = np.flatnonzero(problem.segments.record == number)
-        t = prepared.samples.t
-        stamps = t[problem.segments.index[rows]]
-        time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
-        if prepared.frequency is not None:
-            phase = np.zeros(inside.shape) if phase is None else phase
-            phase[rows] = problem.crank_angle(number, fit.values, stamps)
-    return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
-
-
 def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
     """Changes of the speed after an impact: a cubic of the speed before, and with time and its square."""
-    before, at = _impacts(problem, fit)
+    before, at = impacts_at(problem, fit)
     if np.count_nonzero(at) < 4:
         return None
     speed = before / state["speed"]
@@ -163,42 +146,5 @@ def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
     )
 
 
-def _impacts(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Speed before the impact, and its direction after it, at the first sample after each impact."""
-    inside = problem.segments.inside
-    before, at = np.zeros(inside.shape), np.zeros(inside.shape)
-    for number, impacts in enumerate(fit.evaluation.impacts):
-        rows = np.flatnonzero(problem.segments.record == number)
-        if impacts is None or not rows.size:
-            continue
-        stamps = problem.prepared[number].samples.t[problem.segments.index[rows]]
-        times = stamps - stamps[:, :1]
-        for segment, time, speed, _, side in impacts:
-            i = int(segment)
-            j = int(np.searchsorted(times[i][inside[rows[i]]], time))
-            if j < inside[rows[i]].sum():
-                before[rows[i], j] = abs(speed)
-                at[rows[i], j] = -side
-    return before, at
-
-
-def _splines(values: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
-    """Cubic B-splines over the middle 98 % of the `known` values, knots at their quantiles; 0 elsewhere."""
-    inner = np.quantile(values[known], np.linspace(0.01, 0.99, count - 2))
-    inner += np.arange(inner.size) * 1e-9
-    knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    clipped = np.clip(np.where(known, values, knots[0]), knots[0], knots[-1])
-    table = BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
-    return table * known[:, :, None]
-
-
 def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
-
-
-def after_impacts(problem: Problem, fit: Fit) -> np.ndarray:
-    """Time since the last impact of the segment at each sample [s], not a number before the first."""
-    _, at = _impacts(problem, fit)
-    times = sample_times(problem)
-    last = np.maximum.accumulate(np.where(at != 0, times, -np.inf), axis=1)
-    return np.where(np.isfinite(last), times - last, np.nan)

@@ -13,6 +13,7 @@ import numpy as np
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.shapes import closed_forms, through
@@ -23,48 +24,10 @@ KNOTS = (3, 5, 8, 12)
 """Numbers of knots that are tried, one after the other."""
 # impacts that a knot takes
 _IMPACTS = 3
-# share of the largest impact speed below which bounces die out and say little
-_SLOW = 0.03
+# least range of the variable beside its largest value
+_NARROW = 0.05
 # share of the range in which knots lie evenly; the rest of them goes where the motion is
 _EVEN = 0.5
-# time over which a force is measured, in natural periods or seconds
-_INSTANT = 1e-5
-
-
-@dataclass(frozen=True)
-class Member:
-    """An effect that is a table: the key of its knots and those of its values."""
-
-    effect: str
-    knots: str
-    values: tuple[str, ...]
-    # what the function is of, in which unit, and what it gives
-    variable: str
-    unit: str
-    quantity: str
-    # free parameter of the machine that a constant in the table would only repeat
-    anchor: str | None
-    # parameters of the machine that the table takes the place of
-    replaces: str | None
-    # force that it explains, by the names of the ceiling
-    explains: str
-
-    @property
-    def family(self) -> str:
-        """The function that it is one shape of."""
-        return effects()[self.effect].family
-
-
-MEMBERS = (
-    Member(
-        "restitution_curve", "speed", ("change",), "impact speed", "m/s", "restitution",
-        "contact.restitution", None, "impacts",
-    ),
-    Member(
-        "friction_curve", "speed", ("upwards", "downwards"), "speed", "m/s", "friction (N)",
-        None, "friction.", "speed",
-    ),
-)  # fmt: skip
 
 
 @dataclass
@@ -102,27 +65,11 @@ def fits_machine(member: Member, model) -> bool:
     return has and not any(path.startswith(f"effect.{member.effect}.") for path in model.parameters)
 
 
-def seen_values(member: Member, fitted: Fitted) -> np.ndarray:
-    """Values of the variable in the fitted motion: speeds of its impacts, its speeds, its places."""
-    fit = fitted.fit
-    if member.effect == "restitution_curve":
-        found = [
-            np.abs(impacts[fit.good[np.flatnonzero(fitted.problem.segments.record == number)][rows], 2])
-            for number, impacts in enumerate(fit.evaluation.impacts)
-            if impacts is not None and len(impacts)
-            for rows in [impacts[:, 0].astype(int)]
-        ]
-        speeds = np.sort(np.concatenate(found)) if found else np.zeros(0)
-        return speeds[speeds > _SLOW * speeds.max(initial=0)]
-    inside = fitted.problem.segments.inside & fit.good[:, None]
-    return np.sort(np.abs(fit.evaluation.v[inside]))
-
-
 def knots_at(member: Member, seen: np.ndarray, count: int) -> np.ndarray | None:
     """Knots over the seen values, half of the way from even ones to their quantiles; None for too few."""
-    if seen.size < _IMPACTS * count or not seen[-1] > 1.05 * seen[0]:
+    if seen.size < _IMPACTS * count or not np.ptp(seen) > _NARROW * np.max(np.abs(seen)):
         return None
-    first = 0.0 if member.effect == "friction_curve" else seen[0]
+    first = 0.0 if member.from_zero else seen[0]
     even = np.linspace(first, seen[-1], count)
     return _EVEN * even + (1 - _EVEN) * np.quantile(np.append(first, seen), np.linspace(0, 1, count))
 
@@ -134,7 +81,7 @@ def fit_member(
 
     Where the table has values of both directions and they are `alike`, they are fitted as one.
     """
-    begun = _begun(member, base, known, knots)
+    begun = member.known(known, base, knots)
     if begun is None:
         return None
     values = {f"{member.knots}[{i}]": float(one) for i, one in enumerate(knots, start=1)}
@@ -162,11 +109,13 @@ def fit_member(
 def _table(member: Member, begun: list[np.ndarray], alike: bool) -> tuple[list[Free], list[float]]:
     """The free values of a table, and those to start from."""
     added, start = [], []
-    bound = (-1.0, 1.0) if member.anchor else (-np.inf, np.inf)
+    bound = (-1.0, np.inf if member.by_share else 1.0) if member.anchor else (-np.inf, np.inf)
     for key, whole in zip(member.values[:1] if alike else member.values, begun, strict=False):
         table, size = whole, 0.05 * max(float(np.max(np.abs(whole))), 1e-6)
         if member.anchor:
             table, size = whole - whole[0], 0.05
+        if member.by_share:
+            table = table / whole[0]
         for i in range(1 if member.anchor else 0, table.size):
             path = f"effect.{member.effect}.{key}[{i + 1}]"
             also = path.replace(f".{key}[", f".{member.values[1]}[") if alike else None
@@ -175,84 +124,8 @@ def _table(member: Member, begun: list[np.ndarray], alike: bool) -> tuple[list[F
     return added, start
 
 
-def _begun(member: Member, base: Fitted, known: Fitted, knots: np.ndarray) -> list[np.ndarray] | None:
-    """Functions to begin with, one for each direction: what the known machine does at the knots."""
-    if member.effect == "restitution_curve":
-        table = restitution_at(known.model, _values(known), knots)
-        return None if table is None else [table]
-    return [friction_at(known, knots, direction, base) for direction in (1.0, -1.0)]
-
-
 def _through(part: Part, x: np.ndarray) -> np.ndarray:
     return through(part.at, part.value)(np.clip(x, part.at[0], part.at[-1]))
-
-
-def _values(fitted: Fitted) -> dict[str, float]:
-    """Values of the machine as fitted, nuisances aside."""
-    return {
-        path: one.physical(value)
-        for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
-        if not one.is_nuisance
-        for path in one.paths
-    }
-
-
-def restitution_at(model, values: dict[str, float], speeds: np.ndarray) -> np.ndarray | None:
-    """Restitution at speeds of impact: what the simulator does with a body just before its barrier."""
-    there = {path: values.get(path, model.parameters[path].value) for path in model.parameters if path in
-             ("contact.upper", "contact.lower")}  # fmt: skip
-    side = 1.0 if abs(there.get("contact.upper", np.inf)) < 1e100 else -1.0
-    barrier = there.get("contact.upper" if side > 0 else "contact.lower", np.inf)
-    if abs(barrier) >= 1e100:
-        return None
-    time = _INSTANT / max(1.0, model.drive_frequency({}))
-    start = np.column_stack([barrier - side * speeds * time, side * speeds, 0 * speeds])
-    times = np.tile([0.0, 2 * time], speeds.size)
-    flown = model.segments(
-        list(values), np.array(list(values.values())), start, 2 * np.arange(speeds.size + 1), times,
-        derivatives=False,
-    )  # fmt: skip
-    hit, first = np.unique(flown.impact.segment, return_index=True)
-    if hit.size < speeds.size:
-        return None
-    return np.abs(flown.impact.speed_after[first] / flown.impact.speed_before[first])
-
-
-def friction_at(
-    known: Fitted, speeds: np.ndarray, direction: float, base: Fitted | None = None
-) -> np.ndarray:
-    """Friction [N] against the motion in a direction: what slows a body down in the simulator.
-
-    That of the known machine beyond that of the base with the numbers of its case; without `base` all of it.
-    """
-    values = _values(known)
-    model = known.model if base is None else base.model
-    without = {path: value for path, value in values.items() if path in model.parameters}
-    if base is None:
-        without |= {path: 0.0 for path in model.parameters if _is_friction(path)}
-    else:
-        without = {path: value for path, value in without.items() if not _is_friction(path)}
-    mass = values.get("body.mass", known.model.parameters["body.mass"].value)
-    x = np.median(known.fit.evaluation.x[known.problem.segments.inside & known.fit.good[:, None]])
-    # at rest there is no direction
-    v = direction * np.maximum(speeds, 1e-3 * np.max(speeds))
-    time = _INSTANT / max(1.0, known.model.drive_frequency({}))
-    start = np.column_stack([np.full(v.size, x), v, 0 * v])
-    first, times = 2 * np.arange(v.size + 1), np.tile([0.0, time], v.size)
-    ends = [
-        machine.segments(
-            list(chosen), np.array(list(chosen.values())), start, first, times,
-            derivatives=False, tolerance=1e-12,
-        ).v[1::2]
-        for machine, chosen in ((known.model, values), (model, without))
-    ]  # fmt: skip
-    return -direction * mass * (ends[0] - ends[1]) / time
-
-
-def _is_friction(path: str) -> bool:
-    """Whether a parameter is a size of friction over speed."""
-    law = path.startswith("friction.") and path.endswith(("coefficient", "damping"))
-    return law or path.startswith(("effect.friction_curve.upwards", "effect.friction_curve.downwards"))
 
 
 def function_values(fitted: Fitted) -> tuple[Member, list[Part]] | None:
@@ -273,15 +146,18 @@ def function_values(fitted: Fitted) -> tuple[Member, list[Part]] | None:
         if member.anchor:
             places = [paths.index(member.anchor), *places]
         value = fitted.fit.values[places]
-        sums = np.eye(len(places))
-        if member.anchor:
-            # each value is the restitution at low speed and a change
-            sums[1:, 0] = 1
-        covariance = sums @ fitted.covariance[np.ix_(places, places)] @ sums.T
-        if member.anchor:
-            value = sums @ value
+        slopes = np.eye(len(places))
+        if member.by_share:
+            anchor, shares = value[0], np.append(1.0, 1 + value[1:])
+            slopes = np.diag(np.append(1.0, np.full(value.size - 1, anchor)))
+            slopes[:, 0] = shares
+            value = anchor * shares
+        elif member.anchor:
+            slopes[1:, 0] = 1
+            value = slopes @ value
         else:
             value = friction_at(fitted, knots, -1.0 if key == "downwards" else 1.0)
+        covariance = slopes @ fitted.covariance[np.ix_(places, places)] @ slopes.T
         name = "" if len(member.values) == 1 or alike else key
         parts.append(Part(name, knots, value, covariance))
     finer = None if fitted.finer is None else function_values(fitted.finer)

@@ -165,7 +165,7 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
             squares = np.sum((draws[:, first:last] @ root.T) ** 2, axis=1)
             lowest = np.minimum(lowest, chi2.sf(squares, root.shape[0]))
     # signatures that all but vanish are rounding; there are never more tests than parameters
-    least = max(float(np.quantile(lowest, _TAIL)), np.finfo(float).tiny)
+    least = float(np.clip(np.quantile(lowest, _TAIL), np.finfo(float).tiny, 1 - np.finfo(float).epsneg))
     return float(np.clip(np.log1p(-_TAIL) / np.log1p(-least), 1.0, edges[-1]))
 
 

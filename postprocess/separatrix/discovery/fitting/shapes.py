@@ -52,6 +52,15 @@ FORMS: dict[str, dict[str, Form]] = {
             lambda x: [[0.5, 0.2, share * x[-1]] for share in (0.1, 0.3, 0.6)],
         ),
     },
+    "friction_place_curve": {
+        "constant": _CONSTANT,
+        "linear": _LINEAR,
+        "quadratic": _SQUARE,
+        "sine": Form(
+            lambda x, a, b, c, d: a + b * np.sin(d * x) + c * np.cos(d * x),
+            lambda x: [[0.1, 0.01, 0.01, turns * np.pi / np.ptp(x)] for turns in (0.5, 1, 2, 3, 4, 6)],
+        ),
+    },
 }
 """By effect: the function over its variable."""
 

@@ -13,7 +13,7 @@ from separatrix.discovery.options import Options
 from separatrix.discovery.report import figures, where_figures
 from separatrix.discovery.report.comparison import compare
 from separatrix.discovery.report.pages import Beside, Picture, Section, page_of, write_pdf
-from separatrix.discovery.report.story import names, sections
+from separatrix.discovery.report.story import depends_on, names, sections
 from separatrix.open import reading
 
 
@@ -51,6 +51,7 @@ def _title(verdict: dict) -> str:
         "ambiguous": f"{names(verdict)}, not beyond doubt",
         "none": "none",
         "not-in-catalogue": "not in the catalogue",
+        "characterised": f"not in the catalogue: a force that depends on {depends_on(verdict)}",
     }[verdict["outcome"]]
 
 

@@ -42,6 +42,11 @@ def names(verdict: dict) -> str:
     return " and ".join(words(name) for name in verdict["effects"]) or "none"
 
 
+def depends_on(verdict: dict) -> str:
+    """What a missing force without a name depends on, as words."""
+    return ", or ".join(" and ".join(one["depends_on"]) for one in verdict["character"])
+
+
 def _summary(verdict: dict) -> Section:
     others = ", ".join(_pair(name) for name in verdict["alternatives"])
     said = {
@@ -55,8 +60,12 @@ def _summary(verdict: dict) -> Section:
         + (f"but {others} would do about as well." if others else "but not every gate is passed."),
         "none": "No effect is missing that these records could show.",
         "not-in-catalogue": f"Something is missing, and no effect of {searched(verdict)} explains it.",
+        "characterised": f"Something is missing, and no effect of {searched(verdict)} explains it; "
+        f"it is known on what it depends: {depends_on(verdict)}.",
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {said}"]
+    for place, one in enumerate(verdict["character"]):
+        lines.append(f"{'Or ' if place else 'Most likely '}{one['text']}.")
     for path, one in verdict["parameters"].items():
         if path.startswith("effect."):
             digits = digits_of(one["value"], one["standard_error"])
@@ -319,7 +328,7 @@ def _experiment(verdict: dict) -> Section:
         said = f"To tell apart what remains: {verdict['separating_experiment']}."
     elif verdict["outcome"] == "ambiguous":
         said = "No experiment with this machine was found that would tell the candidates apart."
-    elif verdict["outcome"] == "not-in-catalogue":
+    elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
         said = "The maps above show where to look for a law that the catalogue lacks."
     else:
         said = "Nothing stays ambiguous."

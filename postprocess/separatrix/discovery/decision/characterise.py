@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of a gap that no effect of the catalogue closes: on what the missing force depends.
+
+Hypotheses are fitted to what the base machine leaves over in training, linearised, together with the
+parameters of the machine; then they foretell the held-out records. No hypothesis is a name: nothing is added
+to the machine.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from separatrix.discovery.decision.decide import Decision
+from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, motion_of
+from separatrix.discovery.decision.judge import family_wise
+from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.fitting.fit import blocks_of, eliminate
+
+_USABLE = 1e-6
+# of the distance of the values of a constant that are tried, towards the best
+_HALVINGS = 3
+# factor of the lowest value of a constant below which a hidden state is none
+_FADED = 1.3
+
+
+@dataclass
+class Character:
+    """One hypothesis: what it closes of the gap in training and on held-out records, and its evidence."""
+
+    hypothesis: Hypothesis
+    # of what is not linear, where it has that
+    constant: float
+    closed: float
+    held_out_closed: float
+    evidence: float
+    p: float
+    # coefficient of the law [SI units of the formula] and its standard error; None without a formula
+    size: tuple[float, float] | None
+
+    def text(self) -> str:
+        """In words."""
+        what = " and ".join(self.hypothesis.depends_on)
+        law = f", {self.hypothesis.formula}" if self.hypothesis.formula else ""
+        if self.hypothesis.constant is not None:
+            name, unit = self.hypothesis.constant
+            law += f", with a {name} of about {self.constant:.3g} {unit}"
+        training, held_out = (100 * min(1, one) for one in (self.closed, self.held_out_closed))
+        return (
+            f"a force that depends on {what}{law}: it would close {training:.0f} % of the gap in training "
+            f"and {held_out:.0f} % on held-out records (linearised)"
+        )
+
+    def told(self) -> dict:
+        """What the verdict says of it."""
+        name, unit = self.hypothesis.constant or ("", "")
+        value, error = self.size or (None, None)
+        return {
+            "depends_on": list(self.hypothesis.depends_on),
+            "formula": self.hypothesis.formula,
+            "constant": {"name": name, "value": self.constant, "unit": unit} if name else None,
+            "size": None if value is None else {"value": value, "standard_error": error},
+            "closed": {"training": self.closed, "held_out": self.held_out_closed},
+            "text": self.text(),
+        }
+
+
+def characterised(bench: Bench, decision: Decision) -> Decision:
+    """The decision with what is known of a gap without a name; as it was where nothing is known for sure."""
+    base, foretold = decision.rounds[0].base, decision.foretold
+    if decision.outcome != "not-in-catalogue" or foretold is None or foretold.fit.excess <= 0:
+        return decision
+    natural = _natural_frequency(bench)
+    training, held_out = (motion_of(one, bench.scales.mass, natural) for one in (base, foretold))
+    found = [_best(training, held_out, one) for one in hypotheses(training)]
+    best = max(found, key=lambda one: one.evidence)
+    if not _known(best, bench):
+        return decision
+    others: dict[tuple[str, ...], Character] = {}
+    for one in sorted(found, key=lambda one: -one.evidence):
+        close = one.evidence > best.evidence - bench.options.separation * _left(best, base.fit)
+        if close and one.hypothesis.depends_on != best.hypothesis.depends_on:
+            others.setdefault(one.hypothesis.depends_on, one)
+    return replace(decision, outcome="characterised", characters=[best, *others.values()])
+
+
+def _known(best: Character, bench: Bench) -> bool:
+    """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
+    options = bench.options
+    return best.p < options.detection_level and min(best.closed, best.held_out_closed) > options.characterised
+
+
+def _left(one: Character, fit) -> float:
+    """Reduced chi^2 of the samples that a hypothesis leaves in training, at least 1."""
+    return max(1.0, 1 + (1 - one.closed) * fit.excess / max(1.0, fit.samples))
+
+
+def _best(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Character:
+    """A hypothesis with its constant where it closes most, to a fraction of the distance of those tried."""
+    values = hypothesis.values
+    tried = {float(one): _gain(training, hypothesis, one) for one in values}
+    best = max(tried, key=tried.get)
+    if values.size > 1:
+        place = int(np.searchsorted(values, best))
+        step = np.diff(values)[max(0, min(place, values.size - 2))]
+        for _ in range(_HALVINGS):
+            step /= 2
+            tried |= {one: _gain(training, hypothesis, one) for one in (best - step, best + step)}
+            best = max(tried, key=tried.get)
+    found = _judged(training, held_out, hypothesis, best)
+    if hypothesis.fades and best < _FADED * values[0]:
+        found.evidence = -np.inf
+    return found
+
+
+def _gain(training: Motion, hypothesis: Hypothesis, constant: float) -> float:
+    """Fall of chi^2 in training with a value of the constant, up to one number for all."""
+    columns = _columns(hypothesis, training, constant)
+    matrix, gradient = _normal(training, columns)
+    p = training.fit.evaluation.by_parameter.shape[2]
+    open_ = np.concatenate([~training.fit.at_bound, np.ones(matrix.shape[0] - p, bool)])
+    return _solved(matrix, gradient, open_)[1]
+
+
+def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant: float) -> Character:
+    """Fit a hypothesis to the training records and hold it against the others."""
+    columns = [_columns(hypothesis, one, constant) for one in (training, held_out)]
+    count = columns[0][0].shape[2]
+    fit, p = training.fit, training.fit.evaluation.by_parameter.shape[2]
+    matrix, gradient = _normal(training, columns[0])
+    open_ = np.concatenate([~fit.at_bound, np.ones(matrix.shape[0] - p, bool)])
+    _, before, first = _solved(matrix[:p, :p], gradient[:p], open_[:p])
+    values, after, rank = _solved(matrix, gradient, open_)
+    gain, rank = after - before, rank - first
+    excess, excess_held = max(fit.excess, 1.0), max(held_out.fit.excess, 1.0)
+    foretold = _foretold(training, held_out, columns[1], values, count)
+    closed, closed_held = (gain - rank) / excess, foretold / excess_held
+    noise = max(1.0, 1 + (excess - gain) / max(1.0, fit.samples))
+    evidence = (0.5 * gain + 0.5 * foretold) / noise - rank - np.log(hypothesis.values.size)
+    size = None
+    if hypothesis.formula and count:
+        scaled, sizes = _scaled(matrix)
+        variance = noise * np.diag(np.linalg.pinv(scaled, hermitian=True)) / sizes**2
+        size = (float(values[p]), float(np.sqrt(variance[p])))
+    chance = family_wise((gain + max(0.0, foretold)) / noise, max(1, rank), hypothesis.values.size)
+    return Character(hypothesis, constant, closed, closed_held, evidence, chance, size)
+
+
+def _columns(hypothesis: Hypothesis, motion: Motion, constant: float) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of the machine and those of the records' own."""
+    shape = (motion.x.shape[0], motion.fit.evaluation.residual.shape[1], 0)
+    common, own = hypothesis.columns(motion, constant)
+    return np.zeros(shape) if common is None else common, np.zeros(shape) if own is None else own
+
+
+def _normal(motion: Motion, columns: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Normal equations of the parameters and the columns, starts eliminated."""
+    evaluation = motion.fit.evaluation
+    weights = evaluation.used * motion.fit.good[:, None]
+    whole = np.concatenate([evaluation.by_parameter, *columns], axis=2)
+    return eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0].total()
+
+
+def _solved(matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray) -> tuple[np.ndarray, float, int]:
+    """Solution (0 where closed), the decrease of chi^2, and the rank."""
+    scaled, size = _scaled(matrix[np.ix_(open_, open_)])
+    values, vectors = np.linalg.eigh(scaled)
+    usable = values > _USABLE
+    parts = vectors[:, usable].T @ (gradient[open_] / size)
+    found = np.zeros(open_.size)
+    found[open_] = vectors[:, usable] @ (parts / values[usable]) / size
+    return found, float(np.sum(parts**2 / values[usable])), int(usable.sum())
+
+
+def _scaled(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return matrix / np.outer(size, size), size
+
+
+def _foretold(
+    training: Motion, held_out: Motion, columns: tuple[np.ndarray, np.ndarray], values: np.ndarray, count: int
+) -> float:
+    """Fall of chi^2 on held-out records, less what their own coefficients gain by chance."""
+    matrix, gradient = _normal(held_out, columns)
+    free = held_out.problem.free
+    p = len(free)
+    shared, own = (
+        [i for i, one in enumerate(free) if (one.record is None) == which] for which in (True, False)
+    )
+    known = [i for i, one in enumerate(training.problem.free) if one.record is None]
+    first = training.fit.evaluation.by_parameter.shape[2]
+    fixed = np.array([*shared, *range(p, p + count)], int)
+    told = np.concatenate([values[known], values[first : first + count]])
+    movable = np.array([*own, *range(p + count, matrix.shape[0])], int)
+    open_ = np.ones(movable.size, bool)
+    _, before, rank_before = _solved(matrix[np.ix_(own, own)], gradient[own], open_[: len(own)])
+    fall = 2 * told @ gradient[fixed] - told @ matrix[np.ix_(fixed, fixed)] @ told
+    left = gradient[movable] - matrix[np.ix_(movable, fixed)] @ told
+    _, after, rank = _solved(matrix[np.ix_(movable, movable)], left, open_)
+    return float(fall + after - before) - (rank - rank_before)
+
+
+def _natural_frequency(bench: Bench) -> float:
+    """That of the machine of the case [rad/s], or where it has none, of its motion in the records."""
+    stated = next((one.natural for one in bench.training.prepared if one.natural), None)
+    return stated or bench.scales.speed / bench.scales.length

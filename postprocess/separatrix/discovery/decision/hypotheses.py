@@ -1,0 +1,313 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a missing force may depend on beyond the catalogue, as columns of a linear fit along the motion.
+
+Every hypothesis has columns whose coefficients belong to the machine and are foretold on other records, and
+columns whose coefficients each stretch of a record has for itself: an oscillation of unknown phase, what a
+hidden state began with.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter, ss2tf
+
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knots_of, scaled_motion, splines
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.response import force_columns, kick_columns
+
+# drive periods, or periods of the natural frequency, over which an oscillation keeps its phase
+_STRETCH = 12
+# frequencies of an oscillation over the natural frequency: of stiffness, friction or force; of restitution
+_WAVES, _SLOW_WAVES = (0.3, 4.0), (0.08, 0.6)
+# time constants, delays over the natural period; frequencies of an attached mass over the natural frequency
+_RELAXATIONS, _DELAYS, _ATTACHED = (0.02, 1.5), (0.05, 0.6), (1.6, 7.0)
+_GRID = 20
+# damping ratios of an attached mass that are tried
+_DAMPINGS = (0.005, 0.02, 0.08)
+# parts of a delay at the beginning of a record, before which the motion is not known
+_BEGINNINGS = 4
+# steps of a natural period in which a hidden state is integrated
+_STEPS = 100
+_FEWEST_IMPACTS, _FEWEST_AFTER = 4, 100
+
+Columns = np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A fitted motion of training or held-out records; times are from the start of each record [s]."""
+
+    problem: Problem
+    fit: Fit
+    mass: float
+    # natural frequency [rad/s]
+    natural: float
+    # time over which an oscillation keeps its phase [s]
+    stretch: float
+    t: np.ndarray
+    phase: np.ndarray | None
+    good: np.ndarray
+
+    @property
+    def x(self) -> np.ndarray:
+        """Position at the samples [m], (segments, length)."""
+        return self.fit.evaluation.x
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity at the samples [m/s], (segments, length)."""
+        return self.fit.evaluation.v
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What a missing force depends on.
+
+    `columns` gives those of the machine and those of the records' own, for a value of the `constant` where
+    there is one that is not linear.
+    """
+
+    depends_on: tuple[str, ...]
+    columns: Callable[[Motion, float], tuple[Columns, Columns]]
+    # the law in symbols, with the size a; '' for a function without a short one
+    formula: str = ""
+    # the constant: its name and unit, and the values that are tried
+    constant: tuple[str, str] | None = None
+    # whether it becomes another hypothesis below the lowest value: a hidden state without memory
+    fades: bool = False
+    values: np.ndarray = field(default_factory=lambda: np.zeros(1))
+
+
+def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
+    """The motion of a fit."""
+    problem, fit = one.problem, one.fit
+    t = np.zeros(problem.segments.inside.shape)
+    frequency = natural
+    for number, prepared in enumerate(problem.prepared):
+        rows = problem.segments.record == number
+        t[rows] = prepared.samples.t[problem.segments.index[rows]] - prepared.samples.t[0]
+        frequency = prepared.frequency or frequency
+    phase = scaled_motion(problem, fit)["phase"]
+    stretch = _STRETCH * 2 * np.pi / frequency
+    return Motion(problem, fit, mass, natural, stretch, t, phase, problem.segments.inside & fit.good[:, None])
+
+
+def hypotheses(training: Motion) -> Iterator[Hypothesis]:
+    """All that are tried; knots and scales are those of the training records."""
+    yield from _smooth(training)
+    yield from _times(training)
+    yield from _memories(training)
+    if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= _FEWEST_IMPACTS:
+        yield from _at_impacts(training)
+
+
+def _smooth(training: Motion) -> Iterator[Hypothesis]:
+    """Functions of place, speed and phase of the drive."""
+    x, v = training.x[training.good], training.v[training.good]
+    over_x, over_v, few_x, few_v = (
+        knots_of(values, count) for values, count in ((x, 7), (v, 7), (x, 5), (v, 5))
+    )
+    for power, formula in enumerate(("-a sign(v)", "-a v", "-a v |v|")):
+        yield _function(
+            ("speed",), lambda m, n=power: -(np.sign(m.v) * np.abs(m.v) ** n)[:, :, None], formula
+        )
+    yield _function(("speed",), lambda m: splines(m.v, over_v, m.good))
+    yield _function(("place",), lambda m: splines(m.x, over_x, m.good))
+    yield _function(
+        ("speed", "place"), lambda m: _products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
+    )
+    if training.phase is not None:
+        middle, size = x.mean(), x.std()
+        yield _function(("drive phase",), lambda m: _harmonics(m, 6))
+        yield _function(
+            ("drive phase", "place"), lambda m: _harmonics(m, 2) * ((m.x - middle) / size)[:, :, None]
+        )
+
+
+def _times(training: Motion) -> Iterator[Hypothesis]:
+    """What drifts, and what oscillates at a frequency of its own."""
+    middle = training.x[training.good].mean()
+    factors = (
+        ((), lambda m: np.ones_like(m.x)[:, :, None], ""),
+        (("direction of motion",), lambda m: np.sign(m.v)[:, :, None], " sign(v)"),
+        (("place",), lambda m: np.stack([m.x - middle, np.ones_like(m.x)], axis=2), " (x - x0)"),
+    )
+    waves = _frequencies(training, _WAVES)
+    for names, factor, text in factors:
+        yield _function(("slow time", *names), lambda m, f=factor: m.t[:, :, None] * f(m), f"a t{text}")
+        yield Hypothesis(
+            ("oscillating time", *names),
+            lambda m, w, f=factor: (None, _force(m, _in_stretches(m, _wave(m, w, f(m))))),
+            f"a cos(w t + c){text}", ("frequency w", "rad/s"), values=waves,
+        )  # fmt: skip
+
+
+def _memories(training: Motion) -> Iterator[Hypothesis]:
+    """Hidden states: one that relaxes, one that is late, a mass on a spring of its own."""
+    period = 2 * np.pi / training.natural
+    yield Hypothesis(
+        ("memory",),
+        lambda m, tau: (
+            _force(m, -_by_record(m, lambda t, x: _relaxed(t, x, tau))),
+            _force(m, _in_records(m, _by_record(m, lambda t, x: np.exp(-t / tau)[:, None]))),
+        ),
+        "-a z, z' = v - z/tau", ("time constant tau", "s"), True, period * np.geomspace(*_RELAXATIONS, _GRID),
+    )  # fmt: skip
+    yield Hypothesis(
+        ("memory",),
+        lambda m, tau: (
+            _force(m, -_by_record(m, lambda t, x: _late(t, x, tau))),
+            _force(m, _in_records(m, _beginning(m, tau))),
+        ),
+        "-a (x(t - tau) - x0)", ("delay tau", "s"), True, period * np.linspace(*_DELAYS, _GRID),
+    )  # fmt: skip
+    for zeta in _DAMPINGS:
+        yield Hypothesis(
+            ("memory",),
+            lambda m, w, zeta=zeta: (
+                _force(m, _by_record(m, lambda t, x: _attached(t, x, w, zeta))),
+                _force(m, _in_records(m, _by_record(m, lambda t, x: _rings(t, w, zeta)))),
+            ),
+            "a (z - x), z'' + 2 zeta w z' + w^2 z = w^2 x",
+            (f"damping ratio zeta near {zeta:g} and a frequency w", "rad/s"),
+            values=training.natural * np.geomspace(*_ATTACHED, 2 * _GRID),
+        )  # fmt: skip
+
+
+def _at_impacts(training: Motion) -> Iterator[Hypothesis]:
+    """Changes of the speed after an impact, and forces after it."""
+    speed = np.sqrt(np.mean(training.v[training.good] ** 2))
+
+    def rebounds(m: Motion, power: int = 1) -> np.ndarray:
+        before, at = impacts_at(m.problem, m.fit)
+        return (at * speed * (before / speed) ** power)[:, :, None]
+
+    def kick(m: Motion, changes: np.ndarray) -> np.ndarray:
+        return kick_columns(m.problem, m.fit, changes)
+
+    yield Hypothesis(
+        ("impact speed",),
+        lambda m, _: (kick(m, np.concatenate([rebounds(m, n) for n in (2, 3, 4)], axis=2)), None),
+    )
+    yield Hypothesis(
+        ("slow time", "impacts"), lambda m, _: (kick(m, m.t[:, :, None] * rebounds(m)), None), "a t V"
+    )
+    since = after_impacts(training.problem, training.fit)
+    known = training.good & np.isfinite(since)
+    if np.count_nonzero(known) > _FEWEST_AFTER:
+        knots = knots_of(since[known], 12)
+
+        def after(m: Motion) -> np.ndarray:
+            passed = after_impacts(m.problem, m.fit)
+            return splines(passed, knots, m.good & np.isfinite(passed))
+
+        yield _function(("time since impact",), after)
+    yield Hypothesis(
+        ("oscillating time", "impacts"),
+        lambda m, w: (None, kick(m, _in_stretches(m, _wave(m, w, rebounds(m))))),
+        "a cos(w t + c) V", ("frequency w", "rad/s"),
+        values=_frequencies(training, _SLOW_WAVES),
+    )  # fmt: skip
+
+
+def _function(depends_on: tuple[str, ...], values: Callable, formula: str = "") -> Hypothesis:
+    """A force without a constant that is not linear."""
+    return Hypothesis(depends_on, lambda m, _: (_force(m, values(m)), None), formula)
+
+
+def _force(m: Motion, values: np.ndarray) -> np.ndarray:
+    return force_columns(m.problem, m.fit, values, m.mass)
+
+
+def _frequencies(m: Motion, ends: tuple[float, float]) -> np.ndarray:
+    """As close as a stretch can tell apart."""
+    return np.arange(ends[0] * m.natural, ends[1] * m.natural, np.pi / (2 * m.stretch))
+
+
+def _wave(m: Motion, w: float, factors: np.ndarray) -> np.ndarray:
+    angle = w * m.t[:, :, None]
+    return np.concatenate([factors * np.cos(angle), factors * np.sin(angle)], axis=2)
+
+
+def _harmonics(m: Motion, count: int) -> np.ndarray:
+    return np.stack([f(n * m.phase) for n in range(1, count + 1) for f in (np.sin, np.cos)], axis=2)
+
+
+def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
+
+
+def _in_records(m: Motion, columns: np.ndarray) -> np.ndarray:
+    """Columns of each record by itself."""
+    return _apart(columns, m.problem.segments.record)
+
+
+def _in_stretches(m: Motion, columns: np.ndarray) -> np.ndarray:
+    """Columns of each stretch of each record by itself."""
+    part = np.floor(m.t[:, 0] / m.stretch).astype(int)
+    _, number = np.unique(np.stack([m.problem.segments.record, part]), axis=1, return_inverse=True)
+    return _apart(columns, number)
+
+
+def _apart(columns: np.ndarray, group: np.ndarray) -> np.ndarray:
+    groups = np.unique(group)
+    parts = [columns * (group == one)[:, None, None] for one in groups]
+    return np.concatenate(parts, axis=2)
+
+
+def _by_record(m: Motion, make: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """Functions of the whole past: `make` gets even times of a record and its fitted position there."""
+    found = None
+    segments = m.problem.segments
+    for number, prepared in enumerate(m.problem.prepared):
+        rows = np.flatnonzero(segments.record == number)
+        usable = m.good[rows]
+        t = m.t[rows][usable]
+        if t.size < 2:
+            continue
+        t, first = np.unique(t, return_index=True)
+        even = np.arange(0.0, prepared.samples.t[-1] - prepared.samples.t[0], 2 * np.pi / m.natural / _STEPS)
+        values = make(even, np.interp(even, t, m.x[rows][usable][first]))
+        if found is None:
+            found = np.zeros((*m.x.shape, values.shape[1]))
+        for column in range(values.shape[1]):
+            found[rows, :, column] = np.interp(m.t[rows], even, values[:, column])
+    return found
+
+
+def _relaxed(t: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
+    """z' = x' - z/tau from z = 0."""
+    forgets = np.exp(-(t[1] - t[0]) / tau)
+    # exact for a speed that is constant over a step
+    gain = tau * (1 - forgets) / (t[1] - t[0])
+    return lfilter([gain], [1, -forgets], np.diff(x, prepend=x[0]))[:, None]
+
+
+def _late(t: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
+    """With the position at which it vanishes, which nobody knows."""
+    return np.stack([np.interp(t - tau, t, x) - x.mean(), np.ones_like(x)], axis=1)
+
+
+def _beginning(m: Motion, tau: float) -> np.ndarray:
+    """Tents over the first `tau` of a record, of which the delayed motion is not known."""
+    place = np.arange(_BEGINNINGS) * tau / (_BEGINNINGS - 1)
+    tents = np.maximum(0, 1 - np.abs(m.t[:, :, None] - place) * (_BEGINNINGS - 1) / tau)
+    return tents * (m.t <= tau)[:, :, None]
+
+
+def _attached(t: np.ndarray, x: np.ndarray, w: float, zeta: float) -> np.ndarray:
+    """Stretch of the spring of a mass that hangs on the body."""
+    system = (np.array([[0, 1], [-w * w, -2 * zeta * w]]), np.array([[0], [w * w]]), np.array([[1.0, 0]]))
+    a, b, c, d, _ = cont2discrete((*system, np.zeros((1, 1))), t[1] - t[0], method="foh")
+    numerator, denominator = ss2tf(a, b, c, d)
+    from_middle = x - x.mean()
+    return (lfilter(numerator[0], denominator, from_middle) - from_middle)[:, None]
+
+
+def _rings(t: np.ndarray, w: float, zeta: float) -> np.ndarray:
+    return np.exp(-zeta * w * t)[:, None] * np.stack([np.cos(w * t), np.sin(w * t)], axis=1)

@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The families of effects that may be functions: what each is over, what a fitted machine says it is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.library import effects
+
+# share of the largest speed below which bounces die out and say little
+_SLOW = 0.03
+# time over which a force is measured, in natural periods or seconds
+_INSTANT = 1e-5
+
+
+@dataclass(frozen=True)
+class Member:
+    """An effect that is a table: the key of its knots and those of its values."""
+
+    effect: str
+    knots: str
+    values: tuple[str, ...]
+    # what the function is of, in which unit, and what it gives
+    variable: str
+    unit: str
+    quantity: str
+    # free parameter of the machine that a constant in the table would only repeat, and whether the table
+    # changes it by a share of it
+    anchor: str | None
+    by_share: bool
+    # parameters of the machine that the table takes the place of
+    replaces: str | None
+    # force that it explains, by the names of the ceiling
+    explains: str
+    # values of the variable in a fitted motion, ascending
+    seen: Callable[[Fitted], np.ndarray]
+    # the function in a known machine beside a base at the knots, one for each of `values`, or None
+    known: Callable[[Fitted, Fitted, np.ndarray], list[np.ndarray] | None]
+    # whether the knots begin at zero
+    from_zero: bool = False
+
+    @property
+    def family(self) -> str:
+        """The function that it is one shape of."""
+        return effects()[self.effect].family
+
+
+def _impact_speeds(fitted: Fitted) -> np.ndarray:
+    """Speeds of the impacts of the fitted motion [m/s], those of bounces that die out aside."""
+    fit = fitted.fit
+    found = [
+        np.abs(impacts[fit.good[np.flatnonzero(fitted.problem.segments.record == number)][rows], 2])
+        for number, impacts in enumerate(fit.evaluation.impacts)
+        if impacts is not None and len(impacts)
+        for rows in [impacts[:, 0].astype(int)]
+    ]
+    speeds = np.sort(np.concatenate(found)) if found else np.zeros(0)
+    return speeds[speeds > _SLOW * speeds.max(initial=0)]
+
+
+def _speeds(fitted: Fitted) -> np.ndarray:
+    """Speeds of the fitted motion at the samples [m/s]."""
+    return np.sort(np.abs(fitted.fit.evaluation.v[_inside(fitted)]))
+
+
+def _places(fitted: Fitted) -> np.ndarray:
+    """Places of the fitted motion at the samples [m] at which it slides."""
+    inside = _inside(fitted)
+    x, speed = fitted.fit.evaluation.x[inside], np.abs(fitted.fit.evaluation.v[inside])
+    return np.sort(x[speed > _SLOW * speed.max(initial=0)])
+
+
+def _inside(fitted: Fitted) -> np.ndarray:
+    return fitted.problem.segments.inside & fitted.fit.good[:, None]
+
+
+def _known_restitution(known: Fitted, base: Fitted, speeds: np.ndarray) -> list[np.ndarray] | None:
+    table = restitution_at(known.model, _values(known), speeds)
+    return None if table is None else [table]
+
+
+def _known_friction(known: Fitted, base: Fitted, speeds: np.ndarray) -> list[np.ndarray]:
+    return [friction_at(known, speeds, direction, base) for direction in (1.0, -1.0)]
+
+
+def _known_over_place(known: Fitted, base: Fitted, places: np.ndarray) -> list[np.ndarray]:
+    values = _values(known)
+    slope = values.get("effect.position_dependent_friction.slope", 0.0)
+    return [values["friction.kinetic_coefficient"] * np.maximum(1 + slope * places, 0)]
+
+
+def _values(fitted: Fitted) -> dict[str, float]:
+    """Values of the machine as fitted, nuisances aside."""
+    return {
+        path: one.physical(value)
+        for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
+        if not one.is_nuisance
+        for path in one.paths
+    }
+
+
+def restitution_at(model, values: dict[str, float], speeds: np.ndarray) -> np.ndarray | None:
+    """Restitution at speeds of impact: what the simulator does with a body just before its barrier."""
+    there = {path: values.get(path, model.parameters[path].value) for path in model.parameters if path in
+             ("contact.upper", "contact.lower")}  # fmt: skip
+    side = 1.0 if abs(there.get("contact.upper", np.inf)) < 1e100 else -1.0
+    barrier = there.get("contact.upper" if side > 0 else "contact.lower", np.inf)
+    if abs(barrier) >= 1e100:
+        return None
+    time = _INSTANT / max(1.0, model.drive_frequency({}))
+    start = np.column_stack([barrier - side * speeds * time, side * speeds, 0 * speeds])
+    times = np.tile([0.0, 2 * time], speeds.size)
+    flown = model.segments(
+        list(values), np.array(list(values.values())), start, 2 * np.arange(speeds.size + 1), times,
+        derivatives=False,
+    )  # fmt: skip
+    hit, first = np.unique(flown.impact.segment, return_index=True)
+    if hit.size < speeds.size:
+        return None
+    return np.abs(flown.impact.speed_after[first] / flown.impact.speed_before[first])
+
+
+def friction_at(
+    known: Fitted, speeds: np.ndarray, direction: float, base: Fitted | None = None
+) -> np.ndarray:
+    """Friction [N] against the motion in a direction: what slows a body down in the simulator.
+
+    That of the known machine beyond that of the base with the numbers of its case; without `base` all of it.
+    """
+    values = _values(known)
+    model = known.model if base is None else base.model
+    without = {path: value for path, value in values.items() if path in model.parameters}
+    if base is None:
+        without |= {path: 0.0 for path in model.parameters if _is_friction(path)}
+    else:
+        without = {path: value for path, value in without.items() if not _is_friction(path)}
+    mass = values.get("body.mass", known.model.parameters["body.mass"].value)
+    x = np.median(known.fit.evaluation.x[known.problem.segments.inside & known.fit.good[:, None]])
+    # at rest there is no direction
+    v = direction * np.maximum(speeds, 1e-3 * np.max(speeds))
+    time = _INSTANT / max(1.0, known.model.drive_frequency({}))
+    start = np.column_stack([np.full(v.size, x), v, 0 * v])
+    first, times = 2 * np.arange(v.size + 1), np.tile([0.0, time], v.size)
+    ends = [
+        machine.segments(
+            list(chosen), np.array(list(chosen.values())), start, first, times,
+            derivatives=False, tolerance=1e-12,
+        ).v[1::2]
+        for machine, chosen in ((known.model, values), (model, without))
+    ]  # fmt: skip
+    return -direction * mass * (ends[0] - ends[1]) / time
+
+
+def _is_friction(path: str) -> bool:
+    """Whether a parameter is a size of friction over speed."""
+    law = path.startswith("friction.") and path.endswith(("coefficient", "damping"))
+    return law or path.startswith(("effect.friction_curve.upwards", "effect.friction_curve.downwards"))
+
+
+MEMBERS = (
+    Member(
+        "restitution_curve", "speed", ("change",), "impact speed", "m/s", "restitution",
+        "contact.restitution", False, None, "impacts", _impact_speeds, _known_restitution,
+    ),
+    Member(
+        "friction_curve", "speed", ("upwards", "downwards"), "speed", "m/s", "friction (N)",
+        None, False, "friction.", "speed", _speeds, _known_friction, from_zero=True,
+    ),
+    Member(
+        "friction_place_curve", "place", ("change",), "place", "m", "coefficient of kinetic friction",
+        "friction.kinetic_coefficient", True, None, "speed and place", _places, _known_over_place,
+    ),
+)  # fmt: skip

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a missing force may be a function of, along a fitted motion: place, speed, phase, time, impacts."""
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.response import sample_times
+
+
+def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
+    """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
+    inside = problem.segments.inside
+    x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
+    good = inside & fit.good[:, None]
+    middle, size = np.mean(x[good]), np.std(x[good])
+    speed = np.sqrt(np.mean(v[good] ** 2))
+    time, phase = np.zeros(inside.shape), None
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        t = prepared.samples.t
+        stamps = t[problem.segments.index[rows]]
+        time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
+        if prepared.frequency is not None:
+            phase = np.zeros(inside.shape) if phase is None else phase
+            phase[rows] = problem.crank_angle(number, fit.values, stamps)
+    return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
+
+
+def impacts_at(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Speed before the impact, and its direction after it, at the first sample after each impact."""
+    inside = problem.segments.inside
+    before, at = np.zeros(inside.shape), np.zeros(inside.shape)
+    for number, impacts in enumerate(fit.evaluation.impacts):
+        rows = np.flatnonzero(problem.segments.record == number)
+        if impacts is None or not rows.size:
+            continue
+        stamps = problem.prepared[number].samples.t[problem.segments.index[rows]]
+        times = stamps - stamps[:, :1]
+        for segment, time, speed, _, side in impacts:
+            i = int(segment)
+            j = int(np.searchsorted(times[i][inside[rows[i]]], time))
+            if j < inside[rows[i]].sum():
+                before[rows[i], j] = abs(speed)
+                at[rows[i], j] = -side
+    return before, at
+
+
+def after_impacts(problem: Problem, fit: Fit) -> np.ndarray:
+    """Time since the last impact of the segment at each sample [s], not a number before the first."""
+    _, at = impacts_at(problem, fit)
+    times = sample_times(problem)
+    last = np.maximum.accumulate(np.where(at != 0, times, -np.inf), axis=1)
+    return np.where(np.isfinite(last), times - last, np.nan)
+
+
+def knots_of(values: np.ndarray, count: int) -> np.ndarray:
+    """Knots of `count` cubic B-splines over the middle 98 % of the values, at their quantiles."""
+    inner = np.quantile(values, np.linspace(0.01, 0.99, count - 2))
+    inner += np.arange(inner.size) * 1e-9
+    return np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+
+
+def splines(values: np.ndarray, knots: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Cubic B-splines at the `known` values, constant beyond the knots; 0 elsewhere."""
+    clipped = np.clip(np.where(known, values, knots[0]), knots[0], knots[-1])
+    table = BSpline.design_matrix(clipped.ravel(), knots, 3).toarray().reshape(*values.shape, -1)
+    return table * known[:, :, None]

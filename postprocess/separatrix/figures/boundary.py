@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Boundaries between basins as curves, over the map that they were found from where it is at hand."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from separatrix import style
+from separatrix.errors import SeparatrixError
+from separatrix.figures import basin
+from separatrix.figures.caption import (
+    caption_pieces,
+    describe_case,
+    resolved_case,
+    shown,
+    start_pieces,
+    version_text,
+)
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.labels import axis_label, count_text, plain
+from separatrix.layout import compose
+from separatrix.open import decode_flags, decode_word, open_result
+
+# Text of the legend, colour and line of each name of a piece.
+_LINES = {
+    "stable_set": ("boundary: stable set of saddle", "black", "-"),
+    "recurrent": ("boundary: recurrent edge state", style.OKABE_ITO[0], "-"),
+    "graze": ("boundary: edge of a graze", style.OKABE_ITO[1], "--"),
+    "stick": ("boundary: rim of a stick set", style.OKABE_ITO[2], "--"),
+    "chatter": ("boundary: edge of a completed chatter", style.OKABE_ITO[4], "--"),
+    "other_event": ("boundary: edge at another event", style.OKABE_ITO[3], "--"),
+    "not_known": ("boundary: leads to what is not known", "0.25", "-."),
+}
+_SADDLES = ("black", "#56B4E9", "#F0E442", "#CC79A7", "#009E73", "#D55E00")
+_UNKNOWN = ("edge of what is not known", "0.4", ":")
+# Saddles that a caption describes.
+_MOST_LISTED = 4
+_OURS = ("region", "slice", "inset", "axes", "units", "shade", "colours")
+
+
+def figures(
+    path: str | Path | None,
+    result: xr.Dataset,
+    title: str,
+    look: Look = DEFAULT,
+    over: xr.Dataset | None = None,
+) -> dict[str, Figure]:
+    """Return the figure of a file of boundaries by name.
+
+    `over`: the map to draw them over; else that which the file names, if it lies beside the file at `path`.
+    """
+    look.require("file of boundaries", *_OURS)
+    if over is not None:
+        _check_map(result, over)
+        return {"boundary": _over(None, over, result, title, look)}
+    beside = None if path is None else Path(path).parent / str(result.attrs["map"])
+    if beside is not None and beside.is_file():
+        with open_result(beside) as found:
+            if _is_map(result, found):
+                return {"boundary": _over(beside, found, result, title, look)}
+    return {"boundary": _alone(result, title, look)}
+
+
+def _is_map(result: xr.Dataset, other: xr.Dataset) -> bool:
+    """Whether another result is the map that the boundaries were found from."""
+    identity = other.attrs.get("provenance_case_identity")
+    return other.attrs.get("kind") == "basin" and result.attrs.get("map_identity") == identity
+
+
+def _check_map(result: xr.Dataset, other: xr.Dataset) -> None:
+    if other.attrs.get("kind") != "basin" or not set(axes_of(result)) <= set(other.dims):
+        raise SeparatrixError("over: these boundaries are not of this map")
+
+
+def axes_of(result: xr.Dataset) -> tuple[str, str]:
+    """Return the names of the two axes of the boundaries, in the order of the map."""
+    first, second = str(result.attrs["axes"]).split()
+    return first, second
+
+
+def _over(path: Path | None, found: xr.Dataset, result: xr.Dataset, title: str, look: Look) -> Figure:
+    """Draw the map of the attractors and the boundaries over it."""
+    down, across = basin.plane_axes(found, look)
+    if {down, across} != set(axes_of(result)):
+        raise SeparatrixError(f"axes: the boundaries are those over {' and '.join(axes_of(result))}")
+
+    def curves(grid: Sequence[Axes], panels: Sequence[dict[str, float]]) -> list[Line2D]:
+        handles: list[Line2D] = []
+        for ax, place in zip(grid, panels, strict=True):
+            limits = ax.get_xlim(), ax.get_ylim()
+            handles = _merged(handles, draw(ax, result, across, str(down), look, place))
+            ax.set_xlim(limits[0])
+            ax.set_ylim(limits[1])
+        return handles
+
+    return basin.basin_map(path, found, "attractor", title, look, curves=curves, notes=_notes(result))
+
+
+def _alone(result: xr.Dataset, title: str, look: Look) -> Figure:
+    """Draw the boundaries without their map."""
+    first, second = axes_of(result)
+    across, down = ("x0", "v0") if {first, second} == {"x0", "v0"} else (first, second)
+    if look.axes is not None:
+        across, down = (name.replace(".", "_") for name in look.axes)
+        if {across, down} != {first, second}:
+            raise SeparatrixError(f"axes: the boundaries are those over {first} and {second}")
+    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 62.0)))
+    ax = figure.add_subplot()
+    handles = draw(ax, result, across, down, look, {})
+    ax.set_xlabel(axis_label(_in_units(result[across], look)))
+    ax.set_ylabel(axis_label(_in_units(result[down], look)))
+    for name, (low, high) in look.region.items():
+        (ax.set_xlim if name == across else ax.set_ylim)(low, high)
+    caption = [
+        *caption_pieces(result, look, [*describe_case(result), *start_pieces(result)]),
+        *_notes(result),
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), handles)
+    return figure
+
+
+def _in_units(variable: xr.DataArray, look: Look) -> xr.DataArray:
+    return look.selected(variable.to_dataset(name=str(variable.name)))[str(variable.name)]
+
+
+def _notes(result: xr.Dataset) -> list[str]:
+    """What a caption says of the boundaries."""
+    found = result["across"].values >= 0
+    errors = result["error"].values[found]
+    if errors.size == 0:
+        return ["no boundary: all points have the same label"]
+    notes = [f"{count_text(int(found.sum()))} boundary points, half of them known to {np.median(errors):.1g}"]
+    rows = zip(
+        result["saddles_period"].values,
+        result["saddles_event_word"].values,
+        result["saddles_multipliers"].values,
+        result["saddles_boundary_points"].values,
+        strict=True,
+    )
+    listed = [
+        f"saddle {k}: period {period}, {decode_word(word)}, multipliers {one:.4g} and {two:.4g}"
+        for k, (period, word, (one, two), reached) in enumerate(rows, 1)
+        if reached > 0
+    ]
+    return notes + listed[:_MOST_LISTED]
+
+
+def draw(
+    ax: Axes, result: xr.Dataset, across: str, down: str, look: Look, place: dict[str, float]
+) -> list[Line2D]:
+    """Draw the pieces and the saddles of one panel; return what the legend needs."""
+    handles: dict[str, Line2D] = {}
+    factors = [look.factor(str(result[name].attrs.get("units"))) for name in (across, down)]
+    x, y = (result[name].values * factor for name, factor in zip((across, down), factors, strict=True))
+    names = decode_flags(result["piece_name"]).values
+    known = (result["label_one"].values != 0) & (result["label_two"].values != 0)
+    for piece in range(result.sizes["piece"]):
+        if not _belongs(result, "piece_", piece, place, look):
+            continue
+        chosen = np.arange(result["points"].values[piece]) + result["first"].values[piece]
+        if result["closed"].values[piece]:
+            chosen = np.append(chosen, chosen[0])
+        text, colour, line = _LINES[names[piece]] if known[piece] else _UNKNOWN
+        saddle = int(result["piece_saddle"].values[piece])
+        if saddle:
+            text, colour = f"{text} {saddle}", _SADDLES[(saddle - 1) % len(_SADDLES)]
+        ax.plot(x[chosen], y[chosen], "-", color="white", linewidth=1.8, zorder=3)
+        ax.plot(x[chosen], y[chosen], line, color=colour, linewidth=0.8, zorder=4)
+        handles.setdefault(text, Line2D([], [], color=colour, linestyle=line, label=text))
+    if (across, down) in (("x0", "v0"), ("v0", "x0")) and _on_section(result, place):
+        handles |= _draw_saddles(ax, result, across, factors, place, look)
+    return list(handles.values())
+
+
+def _draw_saddles(
+    ax: Axes, result: xr.Dataset, across: str, factors: list[float], place: dict[str, float], look: Look
+) -> dict[str, Line2D]:
+    """Mark the saddles that the boundary leads to, and those within a basin."""
+    handles: dict[str, Line2D] = {}
+    owner = result["saddles_saddle"].values - 1
+    reached = result["saddles_boundary_points"].values > 0
+    x, v = result["saddles_x"].values, result["saddles_v"].values
+    points = (x, v) if across == "x0" else (v, x)
+    for on_boundary, text in ((True, "saddle"), (False, "saddle within a basin")):
+        chosen = reached[owner] == on_boundary
+        chosen &= [_belongs(result, "saddles_", int(one), place, look) for one in owner]
+        if not chosen.any():
+            continue
+        drawn = {"marker": "X", "markersize": 5.0, "markeredgecolor": "black", "linestyle": ""}
+        drawn |= {"markerfacecolor": "white" if on_boundary else "0.6", "markeredgewidth": 0.6, "zorder": 6}
+        limits = ax.get_xlim(), ax.get_ylim()
+        ax.plot(points[0][chosen] * factors[0], points[1][chosen] * factors[1], **drawn)
+        ax.set_xlim(limits[0])
+        ax.set_ylim(limits[1])
+        handles[text] = Line2D([], [], **drawn, label=text)
+    return handles
+
+
+def _on_section(result: xr.Dataset, place: dict[str, float]) -> bool:
+    """Whether the starts of a panel are on the section at crank angle 0, where the saddles are given."""
+    start = resolved_case(result).get("start", {})
+    angle = place.get("crank_angle", start.get("crank_angle", 0.0) if isinstance(start, dict) else 0.0)
+    return bool(np.isclose(np.sin(float(angle) / 2), 0, atol=1e-12))
+
+
+def _belongs(result: xr.Dataset, prefix: str, row: int, place: dict[str, float], look: Look) -> bool:
+    """Whether a piece or a saddle is of the slice of the map that a panel shows."""
+    for name, value in place.items():
+        variable = result[f"{prefix}{name}"]
+        mine = variable.values[row] * look.factor(str(variable.attrs.get("units")))
+        if not np.isclose(mine, value, rtol=1e-12, atol=0):
+            return False
+    return True
+
+
+def _merged(handles: list[Line2D], more: list[Line2D]) -> list[Line2D]:
+    texts = [handle.get_label() for handle in handles]
+    return handles + [handle for handle in more if handle.get_label() not in texts]

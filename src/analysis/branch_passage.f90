@@ -1,0 +1,302 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What lies between two points of a branch: margins that pass zero, folds, doublings and the like, located to rounding; and the
+!> way on with another sequence of events.
+module branch_passage
+  use body_family, only: family_t
+  use branch_point, only: label_bp, label_gr, label_gr_fold, label_not_known, label_ns, label_pd, label_sn, label_stick, &
+    label_stiction, no_label, point_t, set_point, step_to, trace_t
+  use kinds, only: wp
+  use one_body, only: one_body_t
+  use orbit_margins, only: margin_t, margins_t, of_gap, of_impact, of_release, of_slip, of_stick, of_turning
+  use other_sequence, only: change_sequence
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_t, states
+  implicit none
+  private
+
+  public :: first_passed, note_bifurcations, label_of_margin, change_all, enter_sequence
+
+  !> A margin within this of 0 is not passed; margins within this of 0 are zero together.
+  real(wp), parameter, public :: no_passage = 1e-11_wp
+  real(wp), parameter :: together = 1e-9_wp
+  integer, parameter, public :: most_secants = 60
+  !> First look beyond a point where the sequence changes, as a share of the largest step.
+  real(wp), parameter :: first_look = 1e-4_wp
+
+  !> What is zero at a point that is looked for: the test of a label, or, without, a margin.
+  type :: target_t
+    integer :: label = no_label
+    type(margin_t) :: margin
+  end type target_t
+
+contains
+
+  !> The first margin that is passed between two points; `length` becomes the distance to it and `next` the point there.
+  subroutine first_passed(family, trace, next, length, passed)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace
+    type(trace_t), intent(inout) :: next
+    real(wp), intent(inout) :: length
+    type(margin_t), intent(out) :: passed
+    type(trace_t) :: there
+    type(margin_t) :: candidate
+    integer :: tries
+    logical :: ok
+    do tries = 1, 8
+      call most_negative(trace%margins, next%margins, candidate)
+      if (candidate%kind == 0) return
+      call locate(family, trace, next, target_t(margin=candidate), length, there, ok)
+      if (.not. ok) return
+      candidate%time = time_like(there%margins, candidate)
+      next = there
+      passed = candidate
+    end do
+  end subroutine first_passed
+
+  !> The margin that falls below zero first, as far as a straight line tells.
+  pure subroutine most_negative(before, after, candidate)
+    type(margins_t), intent(in) :: before, after
+    type(margin_t), intent(out) :: candidate
+    real(wp) :: share, first, old
+    integer :: i
+    first = 2
+    do i = 1, size(after%list)
+      if (.not. after%list(i)%value < -no_passage) cycle
+      old = value_like(before, after%list(i))
+      share = 1
+      if (old < huge(old)) share = max(old, 0.0_wp)/(max(old, 0.0_wp) - after%list(i)%value)
+      if (share >= first) cycle
+      first = share
+      candidate = after%list(i)
+    end do
+  end subroutine most_negative
+
+  !> Value of the margin of the same meaning.
+  pure real(wp) function value_like(margins, margin) result(value)
+    type(margins_t), intent(in) :: margins
+    type(margin_t), intent(in) :: margin
+    integer :: i
+    value = huge(value)
+    do i = 1, size(margins%list)
+      associate (one => margins%list(i))
+        if (one%kind /= margin%kind) cycle
+        if (margin%kind == of_gap .and. one%side /= margin%side) cycle
+        if (margin%kind /= of_gap .and. margin%kind /= of_slip .and. one%event /= margin%event) cycle
+        value = one%value
+      end associate
+    end do
+  end function value_like
+
+  !> The point between two of a branch where a test or a margin passes zero, by the Illinois form of the secant rule over the
+  !> length of the step, by halving where the first has no such margin; `length` becomes its distance.
+  subroutine locate(family, trace, next, target, length, there, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace, next
+    type(target_t), intent(in) :: target
+    real(wp), intent(inout) :: length
+    type(trace_t), intent(out) :: there
+    logical, intent(out) :: ok
+    real(wp) :: low, high, f_low, f_high, s, f
+    integer :: i, steps, side
+    low = 0
+    high = length
+    f_low = value_of(target, trace)
+    f_high = value_of(target, next)
+    ! A margin that is not passed within rounding.
+    if (target%label == no_label) f_low = max(f_low, 0.0_wp)
+    there = next
+    ok = .true.
+    side = 0
+    do i = 1, most_secants
+      s = (low + high)/2
+      if (abs(f_low) < huge(f_low)) s = (f_low*high - f_high*low)/(f_low - f_high)
+      if (.not. (s > low .and. s < high)) s = (low + high)/2
+      call step_to(family, trace, s, there, ok, steps)
+      if (.not. ok) return
+      f = value_of(target, there)
+      if (abs(f) > 0 .and. (f < 0 .eqv. f_high < 0)) then
+        high = s
+        f_high = f
+        if (side < 0 .and. abs(f_low) < huge(f_low)) f_low = f_low/2
+        side = -1
+      else
+        low = s
+        f_low = f
+        if (side > 0) f_high = f_high/2
+        side = 1
+      end if
+      if (abs(f) <= 4*epsilon(f) .or. high - low <= 4*spacing(high)) exit
+    end do
+    length = s
+  end subroutine locate
+
+  !> What is zero at a target; `huge` where the orbit has no such margin.
+  pure real(wp) function value_of(target, trace) result(value)
+    type(target_t), intent(in) :: target
+    type(trace_t), intent(in) :: trace
+    if (target%label == no_label) then
+      value = value_like(trace%margins, target%margin)
+    else
+      value = test_value(target%label, trace)
+    end if
+  end function value_of
+
+  pure real(wp) function time_like(margins, margin) result(time)
+    type(margins_t), intent(in) :: margins
+    type(margin_t), intent(in) :: margin
+    integer :: i
+    time = margin%time
+    do i = 1, size(margins%list)
+      associate (one => margins%list(i))
+        if (one%kind == margin%kind .and. one%side == margin%side .and. one%event == margin%event) time = one%time
+      end associate
+    end do
+  end function time_like
+
+  !> Folds, doublings and the like between two points of one sequence of events: located, and added to the points.
+  subroutine note_bifurcations(family, trace, next, length, points)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace, next
+    real(wp), intent(in) :: length
+    type(point_t), allocatable, intent(inout) :: points(:)
+    type(trace_t) :: end_point, there
+    real(wp) :: distance
+    integer :: label, steps
+    logical :: ok, turns
+    call step_to(family, trace, length, end_point, ok, steps)
+    if (.not. ok) end_point = next
+    turns = test_value(label_sn, trace)*test_value(label_sn, end_point) < 0
+    do label = label_sn, label_bp
+      if (label == label_bp .and. turns) cycle
+      if (.not. test_value(label, trace)*test_value(label, end_point) < 0) cycle
+      distance = length
+      call locate(family, trace, end_point, target_t(label), distance, there, ok)
+      if (.not. ok) cycle
+      if (.not. is_genuine(label, there%now%orbit)) cycle
+      there%now%label = label
+      points = [points, there%now]
+    end do
+  end subroutine note_bifurcations
+
+  !> Whether a multiplier is where the label says; near a graze its rounding is large.
+  pure logical function is_genuine(label, orbit) result(genuine)
+    integer, intent(in) :: label
+    type(orbit_t), intent(in) :: orbit
+    select case (label)
+    case (label_pd)
+      genuine = minval(abs(orbit%multipliers + 1)) < 1e-5_wp
+    case (label_bp)
+      genuine = minval(abs(orbit%multipliers - 1)) < 1e-5_wp
+    case (label_ns)
+      genuine = abs(aimag(orbit%multipliers(1))) > 0 .and. abs(abs(orbit%multipliers(1)) - 1) < 1e-5_wp
+    case default
+      genuine = .true.
+    end select
+  end function is_genuine
+
+  !> What changes its sign where a label belongs.
+  pure real(wp) function test_value(label, trace) result(value)
+    integer, intent(in) :: label
+    type(trace_t), intent(in) :: trace
+    associate (m => trace%now%orbit%matrix)
+      associate (trace_of => m(1, 1) + m(2, 2), determinant => m(1, 1)*m(2, 2) - m(1, 2)*m(2, 1))
+        select case (label)
+        case (label_sn)
+          value = trace%now%tangent(size(trace%now%tangent))
+        case (label_pd)
+          value = 1 + trace_of + determinant
+        case (label_ns)
+          value = determinant - 1
+        case default
+          value = 1 - trace_of + determinant
+        end select
+      end associate
+    end associate
+  end function test_value
+
+  !> Label of the place where a margin is zero.
+  pure integer function label_of_margin(margin) result(label)
+    type(margin_t), intent(in) :: margin
+    select case (margin%kind)
+    case (of_impact, of_gap)
+      label = label_gr
+    case (of_turning, of_stick, of_slip)
+      label = label_stick
+    case (of_release)
+      label = label_stiction
+    case default
+      label = label_not_known
+    end select
+  end function label_of_margin
+
+  !> Changes the sequence where `passed` and every other margin of its kind is zero: a symmetric orbit has two.
+  subroutine change_all(at, passed, changed, known)
+    type(trace_t), intent(in) :: at
+    type(margin_t), intent(in) :: passed
+    type(orbit_t), intent(out) :: changed
+    logical, intent(out) :: known
+    type(orbit_t) :: before
+    real(wp) :: place(size(at%margins%list))
+    integer :: i
+    changed = at%now%orbit
+    known = .true.
+    place = -1
+    do i = 1, size(place)
+      associate (one => at%margins%list(i))
+        if (one%kind /= passed%kind .or. .not. abs(one%value) <= together) cycle
+        place(i) = one%event
+        ! After an event that comes with its number turned round.
+        if (one%event < 0) place(i) = -one%event - 0.5_wp
+        if (one%kind == of_slip) place(i) = one%event + 0.5_wp
+      end associate
+    end do
+    if (all(place < 0)) known = .false.
+    ! From the last on, so that the numbers of the others stay.
+    do while (any(place >= 0) .and. known)
+      i = maxloc(place, 1)
+      place(i) = -1
+      before = changed
+      select type (machine => at%machines%centre)
+      type is (one_body_t)
+        call change_sequence(machine, before, at%margins%list(i), changed, known)
+      end select
+    end do
+  end subroutine change_all
+
+  !> A first point with the new sequence, on the side on which its motion really has those events.
+  subroutine enter_sequence(family, at, step, beyond, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: at
+    real(wp), intent(in) :: step
+    type(trace_t), intent(inout) :: beyond
+    logical, intent(out) :: ok
+    type(trace_t) :: start, there
+    real(wp) :: look, along(states + size(beyond%now%orbit%events) + 1)
+    integer :: way, tries, steps
+    start%machines = at%machines
+    start%now%orbit = beyond%now%orbit
+    call correct_orbit(family, start%machines, start%now%orbit, direct(start%now%orbit, 1), ok)
+    if (.not. ok) return
+    along = direct(start%now%orbit, nint(sign(1.0_wp, at%now%tangent(size(at%now%tangent)))))
+    call set_point(family, start, along, ok)
+    if (.not. ok) return
+    along = start%now%tangent
+    look = first_look*step
+    do tries = 1, 4
+      do way = 1, -1, -2
+        start%now%tangent = way*along
+        call step_to(family, start, look, there, ok, steps)
+        if (ok) ok = all(there%margins%list%value > -no_passage)
+        if (ok) ok = is_admissible(there%machines, there%now%orbit)
+        if (ok) exit
+      end do
+      if (ok) exit
+      look = 10*look
+    end do
+    if (.not. ok) return
+    beyond = there
+    beyond%step = max(look, 0.1_wp*step)
+  end subroutine enter_sequence
+
+end module branch_passage

@@ -1,0 +1,118 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Points of a branch of periodic orbits: their labels, what belongs to each, and the step from one to the next.
+module branch_point
+  use body_family, only: body_neighbourhood, body_of_family, family_t
+  use errors, only: error_t
+  use kinds, only: wp
+  use one_body, only: one_body_t
+  use orbit_margins, only: margins_of, margins_t
+  use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: is_stable, set_sizes, set_point, step_to
+
+  !> Labels of points. GR: an orbit goes on beyond the graze with an impact more or less; GR-fold: both sides of it are on the
+  !> same side of the parameter. BP: multiplier +1 where the parameter does not turn;
+  !> release: a body that rests for ever does so no more.
+  integer, parameter, public :: no_label = 0, label_sn = 1, label_pd = 2, label_ns = 3, label_bp = 4, label_gr = 5, &
+    label_gr_fold = 6, label_stick = 7, label_chatter = 8, label_stiction = 9, label_range = 10, label_closed = 11, &
+    label_not_known = 12, label_long = 13, label_release = 14, last_label = 14
+  character(len=*), parameter, public :: label_names(0:last_label) = [character(len=13) :: 'none', 'SN', 'PD', 'NS', 'BP', &
+    'GR', 'GR-fold', 'stick_onset', 'chatter_onset', 'stiction_end', 'end_of_range', 'closed', 'not_known', 'too_long', &
+    'release']
+
+  type, public :: point_t
+    type(orbit_t) :: orbit
+    integer :: label = no_label
+    real(wp) :: x_max = 0, x_min = 0
+    !> Direction in which the branch goes on.
+    real(wp), allocatable :: tangent(:)
+  end type point_t
+
+  !> Points in the order in which they were found; `ending` labels the last.
+  type, public :: branch_t
+    type(point_t), allocatable :: points(:)
+    integer :: ending(2) = no_label
+  end type branch_t
+
+  !> What to follow, and how far.
+  type, public :: plan_t
+    real(wp) :: lowest = 0, highest = 0
+    !> Largest step in natural sizes, and most points each way.
+    real(wp) :: largest_step = 0.02_wp
+    integer :: most_points = 2000
+  end type plan_t
+
+  !> Where a trace is.
+  type, public :: trace_t
+    type(point_t) :: now
+    type(neighbourhood_t) :: machines
+    type(margins_t) :: margins
+    real(wp) :: step = 0
+  end type trace_t
+
+contains
+
+  !> Whether both multipliers are within the unit circle.
+  pure logical function is_stable(orbit)
+    type(orbit_t), intent(in) :: orbit
+    is_stable = maxval(abs(orbit%multipliers)) < 1
+  end function is_stable
+
+  !> Sets the sizes of a family: of the parameter by its range, of the state by the largest motion that the drive alone brings
+  !> about at the ends of the range.
+  subroutine set_sizes(plan, family, error)
+    type(plan_t), intent(in) :: plan
+    type(family_t), intent(inout) :: family
+    type(error_t), allocatable, intent(out) :: error
+    type(one_body_t) :: body
+    real(wp) :: sizes(2)
+    family%parameter_size = plan%highest - plan%lowest
+    family%sizes = 0
+    sizes = 0
+    call body_of_family(family, plan%lowest, body, error)
+    if (allocated(error)) return
+    sizes = body%size_of
+    call body_of_family(family, plan%highest, body, error)
+    if (allocated(error)) return
+    family%sizes = max(sizes, body%size_of)
+  end subroutine set_sizes
+
+  !> Tangent, margins and extremes of the orbit where the trace is.
+  subroutine set_point(family, trace, along, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(inout) :: trace
+    real(wp), intent(in) :: along(:)
+    logical, intent(out) :: ok
+    if (allocated(trace%now%tangent)) deallocate (trace%now%tangent)
+    allocate (trace%now%tangent(size(along)), source=0.0_wp)
+    call tangent_of(trace%machines, trace%now%orbit, family%parameter_size, along, trace%now%tangent, ok)
+    trace%margins = margins_of(trace%machines%centre, trace%now%orbit)
+    trace%now%x_max = trace%margins%x_max
+    trace%now%x_min = trace%margins%x_min
+  end subroutine set_point
+
+  !> The point `length` further along the branch, with everything that belongs to it.
+  subroutine step_to(family, trace, length, next, ok, steps)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace
+    real(wp), intent(in) :: length
+    type(trace_t), intent(out) :: next
+    logical, intent(out) :: ok
+    integer, intent(out) :: steps
+    type(error_t), allocatable :: error
+    steps = 0
+    next = trace
+    call move_along(next%now%orbit, length*trace%now%tangent* &
+                    scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
+    call body_neighbourhood(family, next%now%orbit%parameter, next%machines, error)
+    ok = .not. allocated(error)
+    if (ok) call correct_orbit(family, next%machines, next%now%orbit, trace%now%tangent, ok, steps)
+    if (ok) call set_point(family, next, trace%now%tangent, ok)
+  end subroutine step_to
+
+end module branch_point

@@ -1,0 +1,39 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The label that a trajectory gives its start, as boundaries between basins know it.
+module start_label
+  use attractors, only: attractor_t
+  use kinds, only: wp
+  use motion, only: motion_t
+  use status, only: reason_left_domain
+  use trajectory, only: outcome_t, run_trajectory, span_t
+  implicit none
+  private
+
+  public :: label_of, label_start
+
+  !> Labels that are no attractors: the motion is not known (not captured, or given up), or it has left the domain.
+  integer, parameter, public :: label_not_known = 0, label_left_domain = -1
+
+contains
+
+  !> The number of the attractor, or one of the codes above.
+  pure integer function label_of(outcome) result(label)
+    type(outcome_t), intent(in) :: outcome
+    label = max(outcome%attractor, label_not_known)
+    if (outcome%attractor == 0 .and. outcome%reason == reason_left_domain) label = label_left_domain
+  end function label_of
+
+  !> Label of one start: x [m], v [m/s], crank angle [rad].
+  pure integer function label_start(moving, catalogue, span, start) result(label)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(span_t), intent(in) :: span
+    real(wp), intent(in) :: start(3)
+    type(outcome_t) :: outcome
+    call run_trajectory(moving, catalogue, span, start(1), start(2), start(3), outcome)
+    label = label_of(outcome)
+  end function label_start
+
+end module start_label

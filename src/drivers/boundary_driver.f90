@@ -1,0 +1,217 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix boundary`: the boundaries between the basins of a finished map, as curves.
+module boundary_driver
+  use axis, only: axis_t
+  use basin, only: catalogue_t, open_journey
+  use boundary_layout, only: describe_boundary
+  use boundary_search, only: plane_t, search_lines
+  use boundary_lines, only: crossed_edges
+  use boundary_names, only: name_points, names_t
+  use case_setup, only: grid_of, span_of
+  use catalogue_search, only: check_slices
+  use command_line, only: command_t
+  use edge_state, only: edge_names, edge_texts
+  use errors, only: error_t, fail
+  use event_words, only: word_text
+  use grid, only: grid_t, point_slice, two_axes
+  use journal, only: json_number, json_text
+  use map_final, only: write_whole
+  use map_reader, only: reader_t
+  use map_schema, only: schema_t
+  use session, only: describe_file, session_t
+  use status, only: exit_bad_case, exit_done
+  use stored_map, only: open_map_session, read_labels, restore_catalogues
+  use text, only: to_text
+  use trajectories, only: describe_regime
+  use written_check, only: check_written
+  implicit none
+  private
+
+  public :: run_boundary
+
+contains
+
+  !> Runs the command; ends the program with the exit code on errors.
+  subroutine run_boundary(command)
+    type(command_t), intent(in) :: command
+    type(session_t) :: session
+    type(reader_t) :: reader
+    type(grid_t) :: grid
+    type(catalogue_t), allocatable :: catalogues(:)
+    type(plane_t), allocatable :: planes(:)
+    type(names_t), allocatable :: names(:)
+    type(schema_t) :: schema
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: path
+    integer :: axes(2), i
+    call open_map_session(command, session, reader)
+    grid = grid_of(session%the_case, session%the_case%axes)
+    call check_axes(command%path, grid, axes, error)
+    if (.not. allocated(error)) call check_slices(grid, span_of(session%the_case), error)
+    call session%stop_if(error)
+    path = result_path(command)
+    allocate (planes(product(grid%shape)/product(grid%shape(axes))), names(product(grid%shape)/product(grid%shape(axes))))
+    do i = 1, size(planes)
+      call open_plane(grid, axes, i - 1, planes(i))
+      call read_labels(reader, grid%shape, axes, planes(i)%index, planes(i)%labels, planes(i)%inferred, error)
+      call session%stop_if(error)
+      call crossed_edges(planes(i)%labels, planes(i)%edges)
+    end do
+    if (command%validate .or. command%dry_run) then
+      call session%journal%line('plan', command%path//': '//to_text(sum([(size(planes(i)%edges), i=1, size(planes))]))// &
+                                ' edges between points of different labels')
+      call session%end_with(exit_done)
+    end if
+    call session%begin(path, tiled=.false.)
+    call restore_catalogues(reader, session%team, session%journal, grid, session%the_case, catalogues, error)
+    call session%stop_if(error)
+    do i = 1, size(planes)
+      associate (slice => point_slice(grid, planes(i)%index))
+        call open_journey(grid, span_of(session%the_case), slice, describe_regime, planes(i)%journey, error)
+        call session%stop_if(error)
+        planes(i)%attractors = catalogues(slice + 1)%attractors
+      end associate
+      call search_lines(session, grid, planes(i))
+      call name_points(session%team, session%journal, grid, planes(i), names(i))
+    end do
+    call report(session, planes)
+    call report_names(session, planes, names)
+    call describe_file(session, 'boundary', schema)
+    if (session%team%is_root()) call describe_boundary(reader, grid, planes, names, schema, error)
+    call session%stop_if(error)
+    call session%provenance%finish(schema)
+    if (session%team%is_root()) call write_whole(path, schema, command%force, error)
+    call session%stop_if(error)
+    call check_written(session, path)
+    call session%journal%line('written', 'wrote '//path)
+    call session%end_with(exit_done)
+  end subroutine run_boundary
+
+  !> Where the curves go: as asked, or NAME.boundary.h5 for NAME.basin.h5.
+  pure function result_path(command) result(path)
+    type(command_t), intent(in) :: command
+    character(len=:), allocatable :: path
+    path = command%output
+    if (len(path) > 0) return
+    path = command%path(index(command%path, '/', back=.true.) + 1:)
+    call take_off('.h5')
+    call take_off('.basin')
+    path = path//'.boundary.h5'
+
+  contains
+
+    pure subroutine take_off(ending)
+      character(len=*), intent(in) :: ending
+      if (len(path) <= len(ending)) return
+      if (path(len(path) - len(ending) + 1:) == ending) path = path(:len(path) - len(ending))
+    end subroutine take_off
+
+  end function result_path
+
+  !> The two axes of the planes: both have to be of starts, in the order of the map. Code 65 naming what was found.
+  subroutine check_axes(path, grid, axes, error)
+    character(len=*), intent(in) :: path
+    type(grid_t), intent(in) :: grid
+    integer, intent(out) :: axes(2)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: found
+    integer :: i
+    axes = two_axes(grid)
+    found = ''
+    do i = 1, size(grid%axes)
+      if (i > 1) found = found//' and '
+      found = found//trim(grid%axes(i)%name)
+    end do
+    if (allocated(grid%drawn)) then
+      call fail(error, exit_bad_case, "'"//path//"': found starts drawn at random, allowed is a map over two axes of starts")
+    else if (any(axes == 0)) then
+      call fail(error, exit_bad_case, "'"//path//"': found the axes "//found//', allowed is a map over two axes of starts')
+    else if (.not. (any(grid%start_axis == axes(1)) .and. any(grid%start_axis == axes(2)))) then
+      call fail(error, exit_bad_case, "'"//path//"': found the axes "//found//', allowed are two axes of starts (x0, v0, '// &
+                'crank_angle, ...) and any others: between two values of a parameter lie other machines with other attractors')
+    end if
+  end subroutine check_axes
+
+  !> The plane number `number` (from 0, the last of the other axes fastest).
+  pure subroutine open_plane(grid, axes, number, plane)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: axes(2), number
+    type(plane_t), intent(inout) :: plane
+    integer :: i, rest
+    plane%axes = axes
+    plane%index = [(1, i=1, size(grid%shape))]
+    rest = number
+    do i = size(grid%shape), 1, -1
+      if (any(axes == i)) cycle
+      plane%index(i) = 1 + modulo(rest, grid%shape(i))
+      rest = rest/grid%shape(i)
+    end do
+    plane%first = grid%axes(axes(1))%values
+    plane%second = grid%axes(axes(2))%values
+  end subroutine open_plane
+
+  !> What was found.
+  subroutine report(session, planes)
+    type(session_t), intent(inout) :: session
+    type(plane_t), intent(in) :: planes(:)
+    integer :: points, lines, corrected, i, coarse
+    points = sum([(size(planes(i)%intervals), i=1, size(planes))])
+    lines = sum([(size(planes(i)%lines), i=1, size(planes))])
+    corrected = sum(planes%corrected)
+    if (corrected > 0) call session%journal%line('corrected', to_text(corrected)// &
+      ' points beside the boundary had been inferred wrongly by the refined map; their labels were computed', &
+      '"points": '//to_text(corrected))
+    if (points == 0) then
+      call session%journal%line('found', 'no boundary: all points of the map have the same label', '"points": 0, "lines": 0')
+      return
+    end if
+    coarse = 0
+    do i = 1, size(planes)
+      if (size(planes(i)%points) == 0) cycle
+      coarse = coarse + count(planes(i)%points%along == 0)
+    end do
+    call session%journal%line('found', to_text(points)//' boundary points on '//to_text(lines)//' lines, '//to_text(coarse)// &
+      ' junctions', '"points": '//to_text(points)//', "lines": '//to_text(lines)//', "junctions": '//to_text(coarse))
+  end subroutine report
+
+  !> The saddles, and what the boundary points are.
+  subroutine report_names(session, planes, names)
+    type(session_t), intent(inout) :: session
+    type(plane_t), intent(in) :: planes(:)
+    type(names_t), intent(in) :: names(:)
+    integer :: i, k, edge, number, points
+    character(len=:), allocatable :: name
+    if (len(names(1)%problem) > 0) then
+      call session%journal%line('unnamed', 'what the boundary leads to is not known: '//names(1)%problem)
+      return
+    end if
+    number = 0
+    do i = 1, size(names)
+      do k = 1, size(names(i)%saddles)
+        number = number + 1
+        associate (saddle => names(i)%saddles(k))
+          call session%journal%line('saddle', 'saddle '//to_text(number)//': period '//to_text(saddle%periods)//', '// &
+            word_text(saddle%word)//', multipliers '//to_text(saddle%multipliers(1), 9)//', '//to_text(saddle%multipliers(2), 9)// &
+            ', '//to_text(names(i)%reached(k))//' boundary points lead to it', '"number": '//to_text(number)//', "period": '// &
+            to_text(saddle%periods)//', "word": '//json_text(word_text(saddle%word))//', "x": '// &
+            json_number(saddle%points(1, 1))//', "v": '//json_number(saddle%points(2, 1))// &
+            ', "multipliers": ['//json_number(saddle%multipliers(1))//', '// &
+            json_number(saddle%multipliers(2))//'], "points": '//to_text(names(i)%reached(k)))
+        end associate
+      end do
+    end do
+    do edge = 0, ubound(edge_names, 1)
+      points = 0
+      do i = 1, size(planes)
+        if (size(planes(i)%points) > 0) points = points + count(names(i)%edge == edge .and. planes(i)%points%along > 0)
+      end do
+      if (points == 0) cycle
+      name = trim(edge_names(edge))
+      call session%journal%line('name', '  '//trim(edge_texts(edge))//': '//to_text(points)//' points', '"name": '// &
+                                json_text(name)//', "points": '//to_text(points))
+    end do
+  end subroutine report_names
+
+end module boundary_driver

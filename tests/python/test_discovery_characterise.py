@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gaps without a name: records of an independent simulator with effects that the catalogue lacks."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from separatrix.discovery import Options, discover
+
+SEED = 31
+# numbers of cases of the campaign's generator with one effect each, on what it depends, and its constant
+CASES = {
+    187: ("maxwell_element", ["memory"], "maxwell_time"),
+    122: ("drifting_restitution", ["oscillating time", "impacts"], "restitution_wave_frequency"),
+    229: ("parametric_stiffness", ["oscillating time", "place"], "stiffness_wave_frequency"),
+    204: ("drifting_friction", ["slow time", "direction of motion"], None),
+}
+# one with an effect of the catalogue
+SINGLE = 50
+
+pytestmark = pytest.mark.usefixtures("library")
+
+
+@pytest.fixture(scope="module")
+def hide(source_dir, tmp_path_factory):
+    """Records and the sealed truth of a case."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(source_dir / "tests" / "generator"))
+        patch.syspath_prepend(str(source_dir / "scripts"))
+        import records
+        from design import draw
+
+        def hidden(number: int) -> tuple[Path, dict]:
+            folder = tmp_path_factory.mktemp(f"case{number}")
+            records.write_case(folder / "case", folder / "truth.json", draw(SEED, number))
+            return folder / "case", json.loads((folder / "truth.json").read_text())
+
+        yield hidden
+
+
+def ask(case: Path, **options) -> dict:
+    training = [case / "first.csv", case / "second.csv"]
+    return discover(case / "base.toml", training, [case / "held_out.csv"], Options(quick=True, **options))
+
+
+@pytest.mark.parametrize("number", CASES)
+def test_what_a_force_without_a_name_depends_on_is_told(hide, number):
+    name, depends_on, constant = CASES[number]
+    case, truth = hide(number)
+    assert truth["names"] == [name]
+    verdict = ask(case, candidates=("cubic_spring",))
+    assert verdict["outcome"] == "characterised"
+    assert verdict["effects"] == []
+    best = verdict["character"][0]
+    assert best["depends_on"] == depends_on
+    assert min(best["closed"].values()) > 0.8
+    if constant:
+        assert best["constant"]["value"] == pytest.approx(truth["parameters"][constant], rel=0.12)
+    if name == "maxwell_element":
+        size = best["size"]
+        off = size["value"] - truth["parameters"]["maxwell_stiffness"]
+        assert abs(off) < 3 * size["standard_error"] + 0.03 * truth["parameters"]["maxwell_stiffness"]
+
+
+def test_an_effect_that_is_not_asked_for_is_characterised_by_what_it_depends_on(hide):
+    """The catalogue has it, but the search is restricted to another: a force that depends on speed."""
+    case, truth = hide(SINGLE)
+    assert truth["names"] == ["quadratic_drag"]
+    verdict = ask(case, candidates=("drive_ripple",))
+    assert verdict["outcome"] == "characterised"
+    assert verdict["character"][0]["depends_on"] == ["speed"]
+    assert verdict["character"][0]["formula"] == "-a v |v|"
+    found, hidden = (
+        verdict["character"][0]["size"]["value"],
+        truth["parameters"]["effect.quadratic_drag.coefficient"],
+    )
+    assert found == pytest.approx(hidden, rel=0.15)
+
+
+def test_a_machine_without_a_gap_has_no_character(hide):
+    from design import plan
+
+    number = next(n for n in range(60) if plan(SEED, n)[0] == "none")
+    verdict = ask(hide(number)[0], candidates=("cubic_spring",))
+    assert verdict["outcome"] == "none"
+    assert verdict["character"] == []
+    assert np.isfinite(verdict["gap"]["training"]["before"])
