@@ -9,6 +9,7 @@ from sphinx.application import Sphinx
 # what scrolls can be reached by keys; headings have levels, landmarks names, and no header of a column is empty
 CHANGES = {
     "<pre": '<pre tabindex="0"',
+    '<div class="math"': '<div tabindex="0" class="math"',
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
     'role="heading">': 'role="heading" aria-level="2">',
     '<aside class="sidebar-drawer"': '<aside aria-label="Site" class="sidebar-drawer"',

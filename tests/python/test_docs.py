@@ -96,7 +96,9 @@ def test_the_site_builds_without_a_warning(
     assert "petals.png" in home and "Start in 60 seconds" in home
     for page in (tmp_path / "site").glob("[!f]*.html"):
         text = page.read_text()
-        assert re.findall(r"<pre(?! tabindex)|<img(?![^>]* alt=)|role=.heading.(?! aria-level)", text) == [], page
+        assert (
+            re.findall(r"<pre(?! tabindex)|<img(?![^>]* alt=)|role=.heading.(?! aria-level)", text) == []
+        ), page
         assert '<html class="no-js" lang="en"' in text
 
 
