@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 
-# what scrolls can be reached by keys; headings have levels, landmarks names, and no header of a column is empty
+# what scrolls can be reached by keys; headings have levels, landmarks names; no header of a column is empty
 CHANGES = {
     "<pre": '<pre tabindex="0"',
     '<div class="math"': '<div tabindex="0" class="math"',
