@@ -47,7 +47,9 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
         for row in rows[:_MOST]:
             entry = {name: catalogue[name].values[row] for name in ("attractor", "period", "x", "v")}
             if 0 < entry["period"] <= _LONGEST:
-                yield (int(entry["attractor"]), *_flown(model, values, entry, angle))
+                point = float(entry["x"]), float(entry["v"])
+                found = simulate.section_points(model, point, int(entry["period"]), angle, values)
+                yield (int(entry["attractor"]), *found.T)
     except (CaseError, KeyError):
         return
 
@@ -57,24 +59,3 @@ def coordinates(result: xr.Dataset) -> int:
     if "driven_mass" in resolved_case(result).get("body", {}):
         return 2 * _PLANE
     return int(result.sizes.get("coordinate", _PLANE))
-
-
-def _flown(
-    model: Model, values: dict[str, float], entry: Mapping, angle: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """All points of an attractor at a crank angle [rad] from its point at 0."""
-    period = 2 * np.pi / model.drive_frequency(values)
-    state = float(entry["x"]), float(entry["v"])
-    turn = angle % (2 * np.pi)
-    if turn > 0:
-        state = _next(model, values, (*state, 0.0), period * turn / (2 * np.pi))
-    found = [state]
-    for _ in range(int(entry["period"]) - 1):
-        found.append(_next(model, values, (*found[-1], turn), period))
-    x, v = np.array(found).T
-    return x, v
-
-
-def _next(model: Model, values: dict[str, float], start: tuple, duration: float) -> tuple[float, float]:
-    end = simulate.trajectory(model, start, values, duration, samples_per_period=-1).summary
-    return end["x"], end["v"]
