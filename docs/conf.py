@@ -15,7 +15,14 @@ release = version = re.search(
     r"project\(separatrix VERSION ([0-9.]+)", (HERE.parent / "CMakeLists.txt").read_text()
 )[1]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "mathml"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "mathml",
+    "accessible",
+]
 exclude_patterns = ["_ext", "Thumbs.db", "gallery/README.md"]
 myst_enable_extensions = ["dollarmath", "deflist", "attrs_block"]
 myst_heading_anchors = 5

@@ -28,6 +28,10 @@ def boundary(
 ) -> xr.Dataset:
     """Return the boundaries between the basins of a map, as curves known to 1e-10 of its ranges.
 
+    `.separatrix.plot(over=basins)` draws the curves over the map. Piece k has the points `first[k]` to
+    `first[k] + points[k] - 1`, between the attractors `label_one[k]` and `label_two[k]`; 0 is not known.
+    `piece_name` says what it leads to, `piece_saddle` to which of the saddles in `table(result, "saddles")`.
+
     Parameters
     ----------
     basins
@@ -40,10 +44,6 @@ def boundary(
         The result file. Without one the result is kept in memory.
     ranks, progress, overwrite
         As for `basin`; what is counted are edges of cells. Ctrl-C is a KeyboardInterrupt, nothing is kept.
-
-    `.separatrix.plot(over=basins)` draws the curves over the map. Piece k has the points `first[k]` to
-    `first[k] + points[k] - 1`, between the attractors `label_one[k]` and `label_two[k]`; 0 is not known.
-    `piece_name` says what it leads to, `piece_saddle` to which of the saddles in `table(result, "saddles")`.
     """
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         target = (Path(folder) / "boundary.h5" if output is None else Path(output).expanduser()).absolute()

@@ -32,7 +32,7 @@ def write(folder: Path) -> None:
             raise SystemExit(f"docs: {missing[0]} is missing; scripts/gallery {name} makes it")
         title, explanation, code = entry(folder, name)
         (folder / f"{name}.md").write_text(MADE + _page(folder, name, title, explanation, code))
-        tiles.append(f"* [![{title}]({name}.png) {title}]({name}.md)")
+        tiles.append(f"* [![]({name}.png) {title}]({name}.md)")
     (folder / "index.md").write_text(
         MADE
         + "# Gallery\n\nEach picture is the work of the script that stands below it, on one or two cores.\n\n"

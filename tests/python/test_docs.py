@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The site: every code block of its teaching pages runs and prints what it says."""
 
+import re
 import runpy
 import subprocess
 import sys
@@ -93,6 +94,12 @@ def test_the_site_builds_without_a_warning(
     assert done.returncode == 0, done.stdout + done.stderr
     home = (tmp_path / "site" / "index.html").read_text()
     assert "petals.png" in home and "Start in 60 seconds" in home
+    for page in (tmp_path / "site").glob("[!f]*.html"):
+        text = page.read_text()
+        assert (
+            re.findall(r"<pre(?! tabindex)|<img(?![^>]* alt=)|role=.heading.(?! aria-level)", text) == []
+        ), page
+        assert '<html class="no-js" lang="en"' in text
 
 
 def test_the_links_of_a_site_are_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

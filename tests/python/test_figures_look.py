@@ -177,6 +177,25 @@ def test_captions_hold_every_number_of_the_machine(tmp_path: Path, library: Path
     assert result.separatrix.plot(caption="none").separatrix_caption == ""
 
 
+def test_a_caption_tells_a_measured_force_by_its_samples(library: Path) -> None:
+    """How many, of what size, how often, with units; those of a pendulum are a torque."""
+    force = (2.0 * np.cos(2 * np.pi * np.arange(40) / 40)).tolist()
+    for law, unit in (({"law": "linear", "stiffness": 1}, "N"), ({"law": "pendulum", "moment": 1}, "N m")):
+        case = sx.Case.from_dict(
+            {
+                "body": {"mass": 1},
+                "restoring": law,
+                "friction": {"law": "viscous", "damping": 0.5},
+                "drive": {"law": "measured_force", "interval": 0.1, "force": force, "periodic": 1},
+                "run": {"duration": 60.0},
+            }
+        )
+        result = sx.basin(case, x0=(-1.0, 1.0, 3), v0=(-1.0, 1.0, 3), progress=False)
+        caption = result.separatrix.plot(caption="full").separatrix_caption
+        assert "measured force drive, interval = 0.1 s" in caption
+        assert f"force: 40 values from -2 to 2 {unit}, repeated;" in caption
+
+
 def test_marks_lie_on_the_attractors(library: Path) -> None:
     """A point on the section comes back after its period, at any crank angle of the starts."""
     for angle in (0.0, 1.0, 6.0):

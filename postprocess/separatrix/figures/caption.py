@@ -43,7 +43,7 @@ _FURTHER = {
     "restoring.free_length": "$l_0$",
 }
 # not mentioned where they are 0, as they are by default
-_ZERO = ("drive.mean", "drive.angle", "restoring.free_length")
+_ZERO = ("drive.mean", "drive.angle", "drive.periodic", "restoring.free_length")
 _START = {"x0": ("$x_0$", "m"), "v0": ("$v_0$", "m/s")}
 _LAW_NAMES = {
     "none": "no",
@@ -54,6 +54,8 @@ _LAW_NAMES = {
 }
 # values beyond this mean "absent", and are not numbers to print
 _HUGE = 1e300
+# of a list; of more the range is told
+_MOST_NUMBERS = 12
 
 
 def resolved_case(result: xr.Dataset) -> dict:
@@ -109,6 +111,9 @@ def machine_pieces(result: xr.Dataset) -> list[str]:
     """Return what `describe_case` leaves out of the machine and its run, to six digits and with units."""
     case = resolved_case(result)
     axes, units = _axes(result, case), _units(str(result.attrs.get("resolved_case", "")))
+    # a measured force is data, not parameters that the library knows the units of
+    turns = case.get("restoring", {}).get("law") == "pendulum"
+    units = {"drive.interval": "s", "drive.force[1]": "N m" if turns else "N"} | units
     pieces = []
     several = several_bodies(case)
     for family in () if several else ("body", "restoring", "friction", "contact", "drive"):
@@ -142,11 +147,16 @@ def _law_pieces(family: str, law: dict, axes: set[str], units: dict[str, str]) -
             continue
         if not all(isinstance(one, int | float) and abs(one) < _HUGE for one in numbers):
             continue
-        shown = ", ".join(f"{one:.6g}" for one in numbers[:12]) + (", ..." if len(numbers) > 12 else "")
-        shown = f"({shown})" if isinstance(value, list) else shown
+        if path == "drive.periodic":
+            texts.append("repeated")
+            continue
+        shown = ", ".join(f"{one:.6g}" for one in numbers)
+        shown = f" = ({shown})" if isinstance(value, list) else f" = {shown}"
+        if len(numbers) > _MOST_NUMBERS:
+            shown = f": {len(numbers)} values from {min(numbers):.6g} to {max(numbers):.6g}"
         name = _FURTHER.get(path, key.replace("_", " "))
         unit = units.get(f"{path}[1]" if isinstance(value, list) else path, "")
-        texts.append(f"{name} = {shown} {'' if unit == '1' else raised(unit)}".rstrip())
+        texts.append(f"{name}{shown} {'' if unit == '1' else raised(unit)}".rstrip())
     law_name = str(law.get("law", "")).replace("_", " ")
     heading = {
         "drive": f"{law_name.replace('fourier', 'Fourier')} drive",

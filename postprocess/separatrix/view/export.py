@@ -40,7 +40,7 @@ style-src 'unsafe-inline'; img-src data: blob:">
 </style>
 </head>
 <body>
-<div id="separatrix"></div>
+<main id="separatrix"></main>
 <script id="stored" type="application/json">{stored}</script>
 <script type="module">
 {module}
