@@ -12,11 +12,11 @@ module branch
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use errors, only: error_t
   use kinds, only: wp
-  use motion_state, only: event_turning_point
+  use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
   use one_body, only: one_body_t, slips_in
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_t, rotate_to_section, scales_of_orbit, &
-    section_points, states
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, rotate_to_section, &
+    same_sequence, scales_of_orbit, section_points, states
   implicit none
   private
 
@@ -24,7 +24,7 @@ module branch
 
   !> Turn of the tangent in one step [cosine], and Newton steps from which on a step is thought long.
   real(wp), parameter :: least_cosine = 0.97_wp
-  integer, parameter :: many_steps = 5
+  integer, parameter :: many_steps = 6
   !> With so many impacts in a row no more are put in: they are the beginning of a chatter.
   integer, parameter :: long_run = 10
   !> Smallest step, as a share of the largest.
@@ -60,8 +60,7 @@ contains
     integer, intent(in) :: way
     type(point_t), allocatable, intent(out) :: points(:)
     integer, intent(out) :: ending
-    type(trace_t) :: trace
-    type(point_t) :: first
+    type(trace_t) :: trace, before
     type(error_t), allocatable :: error
     logical :: ok
     integer :: labels
@@ -73,32 +72,44 @@ contains
     call set_point(family, trace, direct(seed, way), ok)
     points = [trace%now]
     if (.not. ok) return
-    first = trace%now
     trace%step = 0.1_wp*plan%largest_step
     ending = no_label
     do while (ending == no_label .and. size(points) < plan%most_points)
+      before = trace
       call go_on(family, plan, trace, points, ending)
       if (ending /= no_label) exit
-      if (size(points) > 4 .and. has_returned(first, trace)) ending = label_closed
+      if (size(points) < 5) cycle
+      if (has_returned(seed, before, trace, family%parameter_size)) ending = label_closed
     end do
     if (ending == no_label) ending = label_long
     labels = size(points)
     if (points(labels)%label == no_label) points(labels)%label = ending
   end subroutine trace_one_way
 
-  !> Whether a trace is back where it began.
-  pure logical function has_returned(first, trace) result(back)
-    type(point_t), intent(in) :: first
-    type(trace_t), intent(in) :: trace
-    back = size(first%orbit%events) == size(trace%now%orbit%events)
-    if (.not. back) return
+  !> Whether a branch of the same events has passed the orbit in which it began, maybe at another of its section points.
+  pure logical function has_returned(first, before, trace, parameter_size) result(back)
+    type(orbit_t), intent(in) :: first
+    type(trace_t), intent(in) :: before, trace
+    real(wp), intent(in) :: parameter_size
+    real(wp) :: points(states, first%periods), step(states + 1), way(states + 1), sizes(states), share
+    integer :: k
+    back = .false.
+    if (.not. same_sequence(first, trace%now%orbit) .or. .not. same_sequence(first, before%now%orbit)) return
     select type (machine => trace%machines%centre)
     type is (one_body_t)
-      back = norm2((first%orbit%y - trace%now%orbit%y)/machine%size_of) < 0.5_wp*trace%step .and. &
-             sum(first%tangent*trace%now%tangent) > 0.9_wp
+      sizes = machine%size_of
     end select
-    if (back) back = abs(first%orbit%parameter - trace%now%orbit%parameter) < &
-                     trace%step*abs(first%tangent(size(first%tangent))) + tiny(trace%step)
+    points = section_points(trace%machines, first)
+    associate (now => trace%now%orbit, last => before%now%orbit)
+      step = [(now%y - last%y)/sizes, (now%parameter - last%parameter)/parameter_size]
+      if (.not. norm2(step) > 0) return
+      do k = 1, first%periods
+        way = [(points(:, k) - last%y)/sizes, (first%parameter - last%parameter)/parameter_size]
+        share = sum(way*step)/sum(step**2)
+        back = share > 0 .and. share <= 1 .and. norm2(way - share*step) < 0.1_wp*norm2(step)
+        if (back) return
+      end do
+    end associate
   end function has_returned
 
   !> One step of the branch: to the next point, and to what is passed on the way.
@@ -143,13 +154,15 @@ contains
     if (.not. is_admissible(next%machines, next%now%orbit)) then
       ! A turn of events that no margin foretells, or one that is nearer than the look along the flights.
       trace%step = length/4
-      if (trace%step < smallest_step*plan%largest_step) ending = unforeseen(next%now%orbit)
+      if (trace%step < smallest_step*plan%largest_step) ending = unforeseen(trace, next)
       return
     end if
     next%step = min(plan%largest_step, length*merge(0.7_wp, 1.4_wp, steps > many_steps))
     if (turned) call set_point(family, next, direct(next%now%orbit, &
                                                     nint(sign(1.0_wp, next%now%tangent(size(next%now%tangent))))), ok)
     points = [points, next%now]
+    if (allocated(next%bend)) deallocate (next%bend)
+    if (.not. turned) next%bend = (next%now%tangent - trace%now%tangent)/length
     trace = next
   end subroutine go_on
 
@@ -218,13 +231,25 @@ contains
     leaves_range = parameter < plan%lowest .or. parameter > plan%highest
   end function leaves_range
 
-  !> What ends where the motion suddenly has other events: a long run of ever weaker impacts is a chatter.
-  pure integer function unforeseen(orbit) result(label)
-    type(orbit_t), intent(in) :: orbit
+  !> What ends where the motion from the point `next` of a branch suddenly has other events: a chatter that is completed there
+  !> and not on the branch, or the other way round; a rest that is over.
+  integer function unforeseen(trace, next) result(label)
+    type(trace_t), intent(in) :: trace, next
+    type(orbit_t) :: motion
+    logical :: ok
     label = label_not_known
-    if (size(orbit%events) == 0 .and. .not. slips_in(orbit%mode)) label = label_release
-    if (longest_run(orbit) >= long_run) label = label_chatter
+    associate (orbit => trace%now%orbit)
+      if (size(orbit%events) == 0 .and. .not. slips_in(orbit%mode)) label = label_release
+      call orbit_of_motion(next%machines, next%now%orbit%parameter, next%now%orbit%y, orbit%periods, motion, ok)
+      if (.not. ok) return
+      if (any(is_chatter(motion%events%kind)) .neqv. any(is_chatter(orbit%events%kind))) label = label_chatter
+    end associate
   end function unforeseen
+
+  pure elemental logical function is_chatter(kind)
+    integer, intent(in) :: kind
+    is_chatter = kind == event_chatter_upper .or. kind == event_chatter_lower
+  end function is_chatter
 
   !> Impacts in a row, turning points aside.
   pure integer function longest_run(orbit) result(longest)
@@ -270,6 +295,21 @@ contains
     points = [points, next%now]
   end subroutine end_at_range
 
+  !> Whether an orbit is one of a shorter period, run through several times: in the graze of that the branch ends.
+  pure logical function is_repeated(trace)
+    type(trace_t), intent(in) :: trace
+    real(wp) :: points(states, trace%now%orbit%periods)
+    integer :: i
+    is_repeated = .false.
+    points = section_points(trace%machines, trace%now%orbit)
+    select type (machine => trace%machines%centre)
+    type is (one_body_t)
+      do i = 2, trace%now%orbit%periods
+        is_repeated = is_repeated .or. norm2((points(:, i) - points(:, 1))/machine%size_of) < at_graze
+      end do
+    end select
+  end function is_repeated
+
   !> The orbit where a margin is zero: its label, and on with the sequence of events beyond, if there is one.
   subroutine pass_margin(family, trace, at, passed, points, ending)
     type(family_t), intent(in) :: family
@@ -285,6 +325,11 @@ contains
     ending = no_label
     point = at%now
     point%label = label_of_margin(passed)
+    if (point%label == label_gr .and. is_repeated(at)) then
+      ending = label_gr
+      points = [points, point]
+      return
+    end if
     call change_all(at, passed, beyond%now%orbit, known)
     if (known) call enter_sequence(family, at, trace%step, beyond, known)
     if (known) then

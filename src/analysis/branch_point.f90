@@ -53,6 +53,8 @@ module branch_point
     type(neighbourhood_t) :: machines
     type(margins_t) :: margins
     real(wp) :: step = 0
+    !> How the tangent turns per length; nothing where it is not known.
+    real(wp), allocatable :: bend(:)
   end type trace_t
 
 contains
@@ -105,10 +107,12 @@ contains
     logical, intent(out) :: ok
     integer, intent(out) :: steps
     type(error_t), allocatable :: error
+    real(wp) :: way(size(trace%now%tangent))
     steps = 0
     next = trace
-    call move_along(next%now%orbit, length*trace%now%tangent* &
-                    scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
+    way = length*trace%now%tangent
+    if (allocated(trace%bend)) way = way + length**2/2*trace%bend
+    call move_along(next%now%orbit, way*scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
     call body_neighbourhood(family, next%now%orbit%parameter, next%machines, error)
     ok = .not. allocated(error)
     if (ok) call correct_orbit(family, next%machines, next%now%orbit, trace%now%tangent, ok, steps)

@@ -23,6 +23,8 @@ module branch_search
   !> How far along the critical direction the doubled orbit is looked for, in natural sizes; largest number of drive periods of an
   !> orbit that is followed after a doubling.
   real(wp), parameter :: doubled_at = 3e-3_wp
+  !> Nearness to a doubling, in multiplier and as a share of the range, at the end of a branch.
+  real(wp), parameter :: at_doubling = 1e-3_wp
 
   type, public :: search_t
     type(family_t) :: family
@@ -80,10 +82,11 @@ contains
     end do
     do i = 1, size(seeds)
       do k = 1, size(seeds(i)%orbits)
-        if (size(search%branches) >= search%most_branches) return
+        if (size(search%branches) >= search%most_branches) exit
         if (.not. is_known(search, i, seeds(i)%orbits(k))) call follow(search, seeds(i)%orbits(k))
       end do
     end do
+    call join_doublings(search)
   end subroutine follow_seeds
 
   !> Whether an orbit at the value number `i` is on a branch.
@@ -111,17 +114,14 @@ contains
   end function is_known
 
   !> Follows one orbit, notes where its branch passes the values of the search, and follows what doubles.
-  !> `parent` is the orbit at whose doubling it begins.
-  recursive subroutine follow(search, seed, parent)
+  recursive subroutine follow(search, seed)
     type(search_t), intent(inout) :: search
     type(orbit_t), intent(in) :: seed
-    type(orbit_t), intent(in), optional :: parent
     type(branch_t) :: found
     type(orbit_t) :: doubled
     integer :: i
     logical :: ok
     call trace_branch(search%family, search%plan, seed, found)
-    if (present(parent)) call end_at(parent, search%family%parameter_size, found)
     search%branches = [search%branches, found]
     call note_passages(search, found)
     do i = 1, size(found%points)
@@ -131,24 +131,43 @@ contains
       if (minval(abs(found%points(i)%orbit%multipliers + 1)) > 1e-3_wp) cycle
       call double(search, found%points(i)%orbit, doubled, ok)
       if (ok) ok = .not. on_branch(search, doubled)
-      if (ok) call follow(search, doubled, found%points(i)%orbit)
+      if (ok) call follow(search, doubled)
     end do
   end subroutine follow
 
-  !> Puts the ends of a branch that are in the doubling of `parent` where that is: the equations are singular there.
-  pure subroutine end_at(parent, parameter_size, found)
-    type(orbit_t), intent(in) :: parent
-    real(wp), intent(in) :: parameter_size
-    type(branch_t), intent(inout) :: found
-    integer :: i, k
-    do k = 1, 2
-      if (found%ending(k) /= label_pd) cycle
-      i = merge(1, size(found%points), k == 1)
-      if (abs(found%points(i)%orbit%parameter - parent%parameter) > 1e-2_wp*parameter_size) cycle
-      found%points(i)%orbit%parameter = parent%parameter
-      found%points(i)%orbit%y = parent%y
+  !> Puts the ends of branches that are in a doubling where it was located on the branch of half the period: the equations are
+  !> singular there.
+  pure subroutine join_doublings(search)
+    type(search_t), intent(inout) :: search
+    type(orbit_t) :: nearest
+    real(wp) :: distance, least
+    integer :: b, c, i, k
+    do b = 1, size(search%branches)
+      do k = 1, 2
+        if (search%branches(b)%ending(k) /= label_pd) cycle
+        least = at_doubling
+        associate (ended => search%branches(b)%points(merge(1, size(search%branches(b)%points), k == 1))%orbit)
+          do c = 1, size(search%branches)
+            do i = 1, size(search%branches(c)%points)
+              associate (there => search%branches(c)%points(i))
+                if (2*there%orbit%periods /= ended%periods .or. there%label /= label_pd) cycle
+                if (minval(abs(there%orbit%multipliers + 1)) > at_doubling) cycle
+                distance = abs(ended%parameter - there%orbit%parameter)/search%family%parameter_size
+                if (distance >= least) cycle
+                least = distance
+                nearest = there%orbit
+              end associate
+            end do
+          end do
+          if (.not. least < at_doubling) cycle
+          ended%parameter = nearest%parameter
+          ended%y = nearest%y
+          ended%matrix = matmul(nearest%matrix, nearest%matrix)
+          ended%multipliers = nearest%multipliers**2
+        end associate
+      end do
     end do
-  end subroutine end_at
+  end subroutine join_doublings
 
   !> The orbits at which a branch passes the values of the search.
   subroutine note_passages(search, found)

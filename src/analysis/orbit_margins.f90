@@ -22,7 +22,7 @@ module orbit_margins
     of_order = 7
   !> Looks along a flight, per period of the section.
   integer, parameter :: looks = 96
-  integer, parameter :: most_halvings = 60
+  integer, parameter :: most_secants = 60
 
   type, public :: margin_t
     real(wp) :: value = huge(1.0_wp)
@@ -151,15 +151,15 @@ contains
     last_a = slope(2)
     do i = 1, count
       t = from + (until - from)*i/count
-      call state_in(machine, mode, from, start, t, y)
+      call machine%fly(mode, last_t, last, t, y)
       slope = machine%slope(mode, t, y)
       a = slope(2)
       margins%x_max = max(margins%x_max, y(1))
       margins%x_min = min(margins%x_min, y(1))
       if (smooth .and. last(2)*y(2) < 0) then
-        call note_turning(machine, mode, from, start, last_t, t, merge(1, -1, last(2) > 0), k, gaps, margins)
+        call note_turning(machine, mode, last, last_t, t, merge(1, -1, last(2) > 0), k, gaps, margins)
       else if (.not. smooth .and. direction*last_a < 0 .and. direction*a > 0) then
-        call note_slowest(machine, mode, from, start, last_t, t, direction, k, slowest)
+        call note_slowest(machine, mode, last, last_t, t, direction, k, slowest)
       end if
       last = y
       last_a = a
@@ -167,64 +167,68 @@ contains
     end do
   end subroutine look_along
 
-  pure subroutine state_in(machine, mode, from, start, t, y)
-    type(one_body_t), intent(in) :: machine
-    integer, intent(in) :: mode
-    real(wp), intent(in) :: from, start(states), t
-    real(wp), intent(out) :: y(states)
-    real(wp) :: unused(states, states)
-    call machine%fly(mode, from, start, t, y, unused)
-  end subroutine state_in
-
-  !> The extreme of x between two looks, by halving.
-  pure subroutine note_turning(machine, mode, from, start, low, high, side, k, gaps, margins)
+  !> The extreme of x between two looks, the body being at `start` at the first.
+  pure subroutine note_turning(machine, mode, start, low, high, side, k, gaps, margins)
     type(one_body_t), intent(in) :: machine
     integer, intent(in) :: mode, side, k
-    real(wp), intent(in) :: from, start(states), low, high
+    real(wp), intent(in) :: start(states), low, high
     type(margin_t), intent(inout) :: gaps(-1:1)
     type(margins_t), intent(inout) :: margins
-    real(wp) :: a, b, t, y(states)
-    integer :: i
-    a = low
-    b = high
-    do i = 1, most_halvings
-      t = a + (b - a)/2
-      call state_in(machine, mode, from, start, t, y)
-      if (side*y(2) > 0) then
-        a = t
-      else
-        b = t
-      end if
-      if (b - a <= spacing(b)) exit
-    end do
+    real(wp) :: t, y(states)
+    call find_zero(machine, mode, start, low, high, 1, t, y)
     margins%x_max = max(margins%x_max, y(1))
     margins%x_min = min(margins%x_min, y(1))
     call note_gap(machine, y(1), k, side, t, .false., gaps)
   end subroutine note_turning
 
-  pure subroutine note_slowest(machine, mode, from, start, low, high, direction, k, slowest)
+  pure subroutine note_slowest(machine, mode, start, low, high, direction, k, slowest)
     type(one_body_t), intent(in) :: machine
     integer, intent(in) :: mode, direction, k
-    real(wp), intent(in) :: from, start(states), low, high
+    real(wp), intent(in) :: start(states), low, high
     type(margin_t), intent(inout) :: slowest
-    real(wp) :: a, b, t, y(states), slope(states)
-    integer :: i
-    a = low
-    b = high
-    do i = 1, most_halvings
-      t = a + (b - a)/2
-      call state_in(machine, mode, from, start, t, y)
-      slope = machine%slope(mode, t, y)
-      if (direction*slope(2) < 0) then
-        a = t
-      else
-        b = t
-      end if
-      if (b - a <= spacing(b)) exit
-    end do
+    real(wp) :: t, y(states)
+    call find_zero(machine, mode, start, low, high, 2, t, y)
     if (direction*y(2)/machine%size_of(2) < slowest%value) slowest = &
       margin_t(direction*y(2)/machine%size_of(2), of_slip, k, direction, t)
   end subroutine note_slowest
+
+  !> Where the velocity (`row` 1) or the acceleration (2) changes its sign between `low` and `high` [s], by the Illinois form of
+  !> the secant rule from the state `start` at `low`; the state there.
+  pure subroutine find_zero(machine, mode, start, low, high, row, t, y)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: mode, row
+    real(wp), intent(in) :: start(states), low, high
+    real(wp), intent(out) :: t, y(states)
+    real(wp) :: a, b, f_a, f_b, f, slope(states)
+    integer :: i, side
+    a = low
+    b = high
+    slope = machine%slope(mode, a, start)
+    f_a = slope(row)
+    call machine%fly(mode, low, start, b, y)
+    slope = machine%slope(mode, b, y)
+    f_b = slope(row)
+    side = 0
+    do i = 1, most_secants
+      t = b - f_b*((b - a)/(f_b - f_a))
+      if (.not. (t > a .and. t < b)) t = a + (b - a)/2
+      call machine%fly(mode, low, start, t, y)
+      slope = machine%slope(mode, t, y)
+      f = slope(row)
+      if (f*f_b > 0) then
+        b = t
+        f_b = f
+        if (side < 0) f_a = f_a/2
+        side = -1
+      else
+        a = t
+        f_a = f
+        if (side > 0) f_b = f_b/2
+        side = 1
+      end if
+      if (.not. abs(f) > 0 .or. b - a <= 2*spacing(b)) exit
+    end do
+  end subroutine find_zero
 
   !> Notes the distance of a turning point at `x` [m] to the barrier on its side; `at_event`: it is the event `k`, else it comes
   !> after that.

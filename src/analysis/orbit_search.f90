@@ -4,8 +4,9 @@
 !> Periodic orbits at one value of the parameter, stable and unstable: Newton's method on the map with its exact derivative, from
 !> starts as they are, and from where the motions from them have settled.
 module orbit_search
-  use body_family, only: family_t, map_with_variation
+  use body_family, only: family_t, fly_periods, map_with_variation
   use circle, only: point_near
+  use hybrid_machine, only: event_t
   use kinds, only: wp
   use matrices, only: solve
   use motion_state, only: tally_t
@@ -21,6 +22,9 @@ module orbit_search
   integer, parameter :: most_newton = 20, settling = 150
   !> Relative distance at which a section point counts as a return to an earlier one, and at which two orbits are one.
   real(wp), parameter :: near_return = 0.1_wp, same_orbit = 1e-7_wp
+  !> A motion has settled when it moves no further than this over a number of periods that every short one divides.
+  real(wp), parameter :: at_rest = 1e-9_wp
+  integer, parameter :: any_period = 12
   !> An orbit whose map less 1 has a determinant below this is one of a family.
   real(wp), parameter :: neutral = 1e-8_wp
 
@@ -46,7 +50,8 @@ contains
     if (.not. allocated(found%orbits)) allocate (found%orbits(0))
     do i = 1, size(starts, 2)
       call settle(machines, starts(:, i), longest, settled, n)
-      if (n > 0) call try_newton(family, machines, value, settled, n, found)
+      if (n == 0 .or. is_found(machines, settled, n, found)) cycle
+      call try_newton(family, machines, value, settled, n, found)
     end do
     do i = 1, size(starts, 2)
       do n = 1, min(2, longest)
@@ -55,6 +60,24 @@ contains
     end do
   end subroutine find_orbits
 
+  !> Whether a section point is one of a known orbit.
+  logical function is_found(machines, point, periods, found)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(states)
+    integer, intent(in) :: periods
+    type(found_t), intent(in) :: found
+    real(wp), allocatable :: points(:, :)
+    integer :: i, k
+    is_found = .false.
+    do i = 1, size(found%orbits)
+      if (found%orbits(i)%periods /= periods) cycle
+      points = section_points(machines, found%orbits(i))
+      do k = 1, periods
+        is_found = is_found .or. distance(machines, points(:, k), point) < same_orbit
+      end do
+    end do
+  end function is_found
+
   !> Where a motion is after many periods, and after how many it is back there (0: it is not).
   subroutine settle(machines, start, longest, settled, periods)
     type(neighbourhood_t), intent(in) :: machines
@@ -62,15 +85,19 @@ contains
     integer, intent(in) :: longest
     real(wp), intent(out) :: settled(states)
     integer, intent(out) :: periods
-    real(wp) :: image(states), next(states)
+    real(wp) :: image(states), next(states), then(states)
     logical :: ok
     integer :: i
     periods = 0
     settled = start
+    then = start
     do i = 1, settling
       call image_of(machines, settled, next, ok)
       if (.not. ok) return
       settled = next
+      if (modulo(i, any_period) /= 0) cycle
+      if (distance(machines, settled, then) < at_rest) exit
+      then = settled
     end do
     image = settled
     do i = 1, longest
@@ -89,13 +116,15 @@ contains
     real(wp), intent(in) :: point(states)
     real(wp), intent(out) :: image(states)
     logical, intent(out) :: ok
-    type(orbit_t) :: motion
+    type(event_t), allocatable :: events(:)
     type(tally_t) :: tally
-    real(wp) :: slopes(states, states)
-    motion%periods = 1
-    call map_with_variation(machines, point, 1, image, slopes, tally, ok)
-    ! The derivative is not needed here.
-    ok = tally%events > 0 .and. all(abs(image) < huge(1.0_wp))
+    integer :: mode
+    ok = .false.
+    select type (body => machines%centre)
+    type is (one_body_t)
+      call fly_periods(body, point, 1, .false., image, events, mode, tally, ok)
+      ok = ok .and. all(abs(image) < huge(1.0_wp))
+    end select
   end subroutine image_of
 
   !> Distance of two section points in natural sizes; an angle is on a circle.

@@ -123,20 +123,43 @@ contains
     end do
   end subroutine shoot
 
+  !> What does not fit in the guesses, as `shoot`, without the derivatives.
+  pure subroutine shoot_only(machine, orbit, miss)
+    class(hybrid_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(out) :: miss(:)
+    real(wp), dimension(states) :: y, arrived, by_state, by_time
+    real(wp) :: jump(states, states), t, guard_rate
+    integer :: k, m, mode
+    m = size(orbit%events)
+    mode = orbit%mode
+    t = 0
+    call machine%fly(mode, t, orbit%y, t, y)
+    do k = 1, m
+      associate (event => orbit%events(k))
+        call machine%fly(mode, t, y, event%time, arrived)
+        t = event%time
+        call machine%guard(event, t, arrived, miss(k), by_state, guard_rate)
+        call machine%jump(event, t, arrived, y, jump, by_time)
+        mode = event%after
+      end associate
+    end do
+    call machine%fly(mode, t, y, orbit%periods*machine%period, arrived)
+    miss(m + 1:) = arrived - orbit%y
+  end subroutine shoot_only
+
   !> The equations at an orbit and their derivatives by state, instants and parameter, in natural sizes.
   pure subroutine equations(machines, orbit, scales, miss, slopes)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
     real(wp), intent(in) :: scales(:)
     real(wp), intent(out) :: miss(:), slopes(:, :)
-    type(orbit_t) :: copy
-    real(wp) :: near(size(miss), 4), unused(size(miss), size(miss))
+    real(wp) :: near(size(miss), 4)
     integer :: i, n
     n = size(miss)
     call shoot(machines%centre, orbit, miss, slopes(:, :n))
     do i = 1, 4
-      copy = orbit
-      call shoot(machines%near(i), copy, near(:, i), unused)
+      call shoot_only(machines%near(i), orbit, near(:, i))
     end do
     slopes(:, n + 1) = by_difference(machines, miss, near)
     do i = 1, n + 1
@@ -177,19 +200,22 @@ contains
       call solve(slopes, -miss, step, ok)
       if (ok) ok = all(abs(step) <= 1e3_wp)
       if (.not. ok) return
-      ! It has come as near as rounding lets it.
       before = length
       length = norm2(step)
       call move_along(orbit, scales*step)
       if (abs(step(n)) > 0) call body_neighbourhood(family, orbit%parameter, machines, error)
       ok = .not. allocated(error)
       if (.not. ok) return
+      ! It has come as near as rounding lets it.
       if (length < 1e-14_wp .or. (length < converged_step .and. length >= 0.1_wp*before)) exit
+      ! Or what the next step would be is nil, the steps shrinking with the square.
+      ok = length < 1e-7_wp .and. length*(length/before)**2 < 1e-17_wp
+      if (ok) exit
     end do
-    ok = length < converged_step
+    ok = ok .or. length < converged_step
     if (.not. ok) return
     call clean_rest(machines, orbit)
-    call set_multipliers(machines, orbit, ok)
+    call set_multipliers(machines, orbit)
   end subroutine correct_orbit
 
   !> Adds a change of state, instants and parameter (not scaled).
@@ -207,22 +233,23 @@ contains
   pure subroutine clean_rest(machines, orbit)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
-    real(wp) :: y(states), flight(states, states)
+    real(wp) :: y(states)
     if (.not. rests_on_barrier(orbit%mode)) return
-    call machines%centre%fly(orbit%mode, 0.0_wp, orbit%y, 0.0_wp, y, flight)
+    call machines%centre%fly(orbit%mode, 0.0_wp, orbit%y, 0.0_wp, y)
     orbit%y = y
   end subroutine clean_rest
 
-  !> Derivative of the map over the orbit's period, by saltation, and its eigenvalues.
-  pure subroutine set_multipliers(machines, orbit, ok)
+  !> Derivative of the map over the orbit's period, by saltation, and its eigenvalues; of an orbit that grazes they are not finite.
+  pure subroutine set_multipliers(machines, orbit)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
-    logical, intent(out) :: ok
     real(wp) :: miss(states + size(orbit%events)), slopes(states + size(orbit%events), states + size(orbit%events))
+    logical :: ok
     call shoot(machines%centre, orbit, miss, slopes)
     call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, [huge(1.0_wp), huge(1.0_wp)], &
               orbit%matrix, ok)
-    if (ok) orbit%multipliers = eigenvalues(orbit%matrix)
+    if (.not. ok) orbit%matrix = sqrt(huge(1.0_wp))
+    orbit%multipliers = eigenvalues(orbit%matrix)
   end subroutine set_multipliers
 
   !> Direction in which the orbits go on, a unit vector in natural sizes, on the side of `along`.
@@ -279,7 +306,7 @@ contains
     type(orbit_t), intent(inout) :: orbit
     logical, intent(out) :: turned
     type(event_t) :: moved
-    real(wp) :: span, y(states), flight(states, states), from(states)
+    real(wp) :: span, y(states), from(states)
     integer :: m
     turned = .false.
     m = size(orbit%events)
@@ -287,7 +314,7 @@ contains
     span = orbit%periods*machines%centre%period
     if (orbit%events(1)%time < 0) then
       moved = orbit%events(1)
-      call machines%centre%fly(moved%after, moved%time, moved%departure(:states), 0.0_wp, y, flight)
+      call machines%centre%fly(moved%after, moved%time, moved%departure(:states), 0.0_wp, y)
       orbit%mode = moved%after
       moved%time = moved%time + span
       orbit%events = [orbit%events(2:), moved]
@@ -295,8 +322,8 @@ contains
       moved = orbit%events(m)
       from = orbit%y
       if (m > 1) from = orbit%events(m - 1)%departure(:states)
-      if (m > 1) call machines%centre%fly(moved%before, orbit%events(m - 1)%time, from, span, y, flight)
-      if (m == 1) call machines%centre%fly(moved%before, 0.0_wp, from, span, y, flight)
+      if (m > 1) call machines%centre%fly(moved%before, orbit%events(m - 1)%time, from, span, y)
+      if (m == 1) call machines%centre%fly(moved%before, 0.0_wp, from, span, y)
       orbit%mode = moved%before
       moved%time = moved%time - span
       orbit%events = [moved, orbit%events(:m - 1)]
@@ -312,7 +339,7 @@ contains
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(in) :: orbit
     real(wp) :: points(states, orbit%periods)
-    real(wp) :: y(states), unused(states, states), t, section
+    real(wp) :: y(states), t, section
     integer :: i, k, mode
     points(:, 1) = orbit%y
     y = orbit%y
@@ -328,7 +355,7 @@ contains
         t = orbit%events(k)%time
         mode = orbit%events(k)%after
       end do
-      call machines%centre%fly(mode, t, y, section, points(:, i + 1), unused)
+      call machines%centre%fly(mode, t, y, section, points(:, i + 1))
     end do
   end function section_points
 

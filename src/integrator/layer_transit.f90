@@ -83,8 +83,9 @@ contains
   end subroutine prepare_transit
 
   !> Crosses the layer from its edge to rest (`inward`) or from rest to its outer edge, slipping in `direction`, from `time`
-  !> [s] at `x` [m]; `ok` is false, and nothing changed, where it must be left to the adaptive flight.
-  pure subroutine cross_layer(transit, flow, direction, inward, time_end, time, x, ok)
+  !> [s] at `x` [m]; `ok` is false, and nothing changed, where it must be left to the adaptive flight. `by_start` are the
+  !> derivatives of time and x at the end (rows) by those at the beginning.
+  pure subroutine cross_layer(transit, flow, direction, inward, time_end, time, x, ok, by_start)
     type(transit_t), intent(in) :: transit
     type(flow_t), intent(in) :: flow
     integer, intent(in) :: direction
@@ -92,8 +93,10 @@ contains
     real(wp), intent(in) :: time_end
     real(wp), intent(inout) :: time, x
     logical, intent(out) :: ok
+    real(wp), intent(out), optional :: by_start(2, 2)
     real(wp) :: taylor(0:order), elapsed, y, start_rate
     integer :: k, i, which, degree
+    if (present(by_start)) by_start = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
     call expand_forcing(flow, time, taylor)
     which = merge(1, 2, inward)
     elapsed = 0
@@ -104,7 +107,8 @@ contains
     degree = min(order, enough_terms(transit, abs(start_rate), longest*transit%ends(pieces, which)/abs(start_rate)))
     do i = 1, pieces
       k = merge(pieces + 1 - i, i, inward)
-      call cross_piece(transit, flow, taylor(:degree), real(direction, wp), which, k, inward, start_rate, elapsed, y, ok)
+      call cross_piece(transit, flow, taylor(:degree), real(direction, wp), which, k, inward, start_rate, elapsed, y, ok, &
+                       by_start)
       if (.not. ok) return
     end do
     ok = time + elapsed <= time_end .and. enough_terms(transit, abs(start_rate), elapsed) <= degree
@@ -127,7 +131,7 @@ contains
   end function enough_terms
 
   !> One piece: fixed-point iteration for time and place at the Gauss points.
-  pure subroutine cross_piece(transit, flow, taylor, direction, which, k, inward, start_rate, elapsed, y, ok)
+  pure subroutine cross_piece(transit, flow, taylor, direction, which, k, inward, start_rate, elapsed, y, ok, change_by)
     type(transit_t), intent(in) :: transit
     type(flow_t), intent(in) :: flow
     real(wp), intent(in) :: taylor(0:), direction, start_rate
@@ -135,6 +139,7 @@ contains
     logical, intent(in) :: inward
     real(wp), intent(inout) :: elapsed, y
     logical, intent(out) :: ok
+    real(wp), intent(inout), optional :: change_by(2, 2)
     real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half, change, last_change
     integer :: round
     half = 0.5_wp*(transit%ends(k, which) - transit%ends(k - 1, which))
@@ -167,10 +172,47 @@ contains
         elapsed = elapsed + dot_product(transit%weight, inverse)
         y = y + dot_product(transit%weight, run)
         ok = .true.
+        if (.not. present(change_by)) return
+        rate = merge(-direction, direction, inward)/rate
+        call vary_piece(transit, direction*transit%speed(:, k, which), inward, rate*slope_of(taylor, time), &
+                        -flow%natural**2*rate, inverse, change_by(:, 1))
+        call vary_piece(transit, direction*transit%speed(:, k, which), inward, rate*slope_of(taylor, time), &
+                        -flow%natural**2*rate, inverse, change_by(:, 2))
         return
       end if
     end do
   end subroutine cross_piece
+
+  !> Takes a variation of time and place across a piece, by the same iteration: `by_time` and `by_place` are the relative
+  !> derivatives of the deceleration at the points, `inverse` the weights of the time there.
+  pure subroutine vary_piece(transit, velocity, inward, by_time, by_place, inverse, change)
+    type(transit_t), intent(in) :: transit
+    real(wp), intent(in) :: velocity(points), by_time(points), by_place(points), inverse(points)
+    logical, intent(in) :: inward
+    real(wp), intent(inout) :: change(2)
+    real(wp) :: time(points), place(points), before(2, points), later(points), further(points)
+    integer :: round
+    time = change(1)
+    place = change(2)
+    do round = 1, most_rounds
+      before(1, :) = time
+      before(2, :) = place
+      later = -inverse*(by_time*time + by_place*place)
+      further = velocity*later
+      time = change(1)
+      place = change(2)
+      if (inward) then
+        time = time + dot_product(transit%weight, later)
+        place = place + dot_product(transit%weight, further)
+        call add_integrals(transit, -later, -further, time, place)
+      else
+        call add_integrals(transit, later, further, time, place)
+      end if
+      if (maxval(abs(time - before(1, :))) <= 4*epsilon(1.0_wp)*maxval(abs(time)) .and. &
+          maxval(abs(place - before(2, :))) <= 4*epsilon(1.0_wp)*maxval(abs(place))) exit
+    end do
+    change = change + [dot_product(transit%weight, later), dot_product(transit%weight, further)]
+  end subroutine vary_piece
 
   !> Adds the integrals from -1 to each point of what has the values `inverse` and `run` at the points. A few at a time, whose
   !> sums stay in registers.
@@ -232,11 +274,19 @@ contains
     end do
   end function polynomial
 
+  !> Derivatives at `t` of a polynomial.
+  pure function slope_of(coefficients, t) result(slope)
+    real(wp), intent(in) :: coefficients(0:), t(points)
+    real(wp) :: slope(points)
+    integer :: i
+    slope = polynomial([(i*coefficients(i), i=1, ubound(coefficients, 1)), 0.0_wp], t)
+  end function slope_of
+
   !> Gauss-Legendre points on [-1, 1], as many as `node` has room for, weights, and the integrals of the Lagrange polynomials
   !> from -1 to each point (first index).
   pure subroutine gauss(node, weight, integral)
     real(wp), intent(out) :: node(:), weight(:), integral(:, :)
-    real(wp) :: p(-1:size(node)), table(-1:size(node), size(node)), slope, sine, cosine
+    real(wp) :: p(-1:size(node)), table(-1:size(node), size(node)), slope, sine, cosine, before
     integer :: j, k, m, i, n
     n = size(node)
     do j = 1, n
@@ -245,7 +295,9 @@ contains
       do i = 1, 20
         p = legendre(n, node(j))
         slope = n*(node(j)*p(n) - p(n - 1))/(node(j)**2 - 1)
-        node(j) = node(j) - p(n)/slope
+        before = node(j)
+        node(j) = before - p(n)/slope
+        if (.not. abs(node(j) - before) > 0) exit
       end do
       p = legendre(n, node(j))
       table(:, j) = p

@@ -19,8 +19,8 @@ module body_family
 
   public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, size_of_motion, vary_period
 
-  !> Distance of the neighbours, as a share of the parameter's size.
-  real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
+  !> Distance of the neighbours, as a share of the parameter's size, and at least.
+  real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp), smallest_share = 1e-9_wp
   !> The flights lead from event to event to this share of the size of the motion, or the variation is not known.
   real(wp), parameter :: likeness = 1e-6_wp
 
@@ -85,7 +85,7 @@ contains
     if (allocated(error)) return
     allocate (machines%centre, source=centre)
     if (.not. allocated(family%path)) return
-    machines%step = share*max(abs(value), family%parameter_size)
+    machines%step = share_for(centre)*max(abs(value), family%parameter_size)
     sides = [0, 1, -1]
     do side = 1, 3
       machines%side = sides(side)
@@ -108,6 +108,15 @@ contains
     if (allocated(error)) return
     allocate (machines%near, source=near)
   end subroutine body_neighbourhood
+
+  !> Distance of the neighbours of a machine, as a share of the parameter's size: events of theirs must stay within a thin
+  !> Stribeck layer.
+  pure real(wp) function share_for(body)
+    type(one_body_t), intent(in) :: body
+    share_for = share
+    if (body%moving%layer > 0) share_for = &
+      min(share, max(smallest_share, 1.6_wp*(body%moving%machine%friction%stribeck_velocity/body%size_of(2))**2))
+  end function share_for
 
   !> Image of a section point after `periods` drive periods, its derivatives by the point (and by the parameter), and the
   !> events on the way. `ok` is false if the trajectory had to be given up or the derivatives are not known.

@@ -40,13 +40,14 @@ module hybrid_machine
   end type hybrid_t
 
   abstract interface
-    !> The state `y1` that the mode brings `y0` at `t0` to at `t1` [s], and its derivative by `y0`.
+    !> The state `y1` that the mode brings `y0` at `t0` to at `t1` [s], and, which takes longer, its derivative by `y0`.
     pure subroutine fly_interface(self, mode, t0, y0, t1, y1, flight)
       import :: hybrid_t, wp
       class(hybrid_t), intent(in) :: self
       integer, intent(in) :: mode
       real(wp), intent(in) :: t0, y0(:), t1
-      real(wp), intent(out) :: y1(:), flight(:, :)
+      real(wp), intent(out) :: y1(:)
+      real(wp), intent(out), optional :: flight(:, :)
     end subroutine fly_interface
 
     !> Time derivative of the state in a mode.

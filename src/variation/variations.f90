@@ -96,14 +96,14 @@ contains
     real(wp), intent(inout) :: change(:, :)
     real(wp), intent(out) :: reached(:)
     logical, intent(in) :: with_parameter
-    real(wp) :: flight(size(y), size(y)), unused(size(y), size(y)), near(size(y), 4)
+    real(wp) :: flight(size(y), size(y)), near(size(y), 4)
     integer :: i, n
     n = size(y)
     call machines%centre%fly(mode, t0, y, t1, reached, flight)
     change = matmul(flight, change)
     if (.not. with_parameter) return
     do i = 1, 4
-      call machines%near(i)%fly(mode, t0, y, t1, near(:, i), unused)
+      call machines%near(i)%fly(mode, t0, y, t1, near(:, i))
     end do
     change(:, n + 1) = change(:, n + 1) + by_difference(machines, reached, near)
   end subroutine cross_flight

@@ -1,0 +1,368 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A slip of one body over a given time, and its derivative by its start: on the closed form where that exists, also between
+!> passages of a Stribeck layer, else on the equations of motion and of their variation. Modes are those of module `one_body`.
+module body_flight
+  use contact_law, only: contact_force, contact_force_slopes, contact_margin
+  use drive_law, only: foot_motion
+  use effect_law, only: slip_memory_t
+  use elementary, only: exponential, sine_cosine
+  use exact_flight, only: flight_speed_reached, fly_exact
+  use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
+  use friction_law, only: sliding_friction, sliding_slope
+  use guarded_march, only: begin_march, guard_t, march_failed, march_t, march_time_over, system_t, take_step
+  use kinds, only: wp
+  use layer_transit, only: cross_layer
+  use motion, only: motion_t
+  use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
+  use oscillator, only: extra_force, oscillator_t
+  use restoring_law, only: restoring_force, restoring_stiffness
+  implicit none
+  private
+
+  public :: fly_slip, slip_acceleration, slips_in, direction_in, pressed_side, surface_of, pushes, quarter
+
+  !> Added to a slip's mode while the body presses the upper or the lower soft barrier.
+  integer, parameter, public :: on_upper = 10, on_lower = 20
+  !> A Stribeck layer is marched through from its edge, and left at this multiple of it.
+  real(wp), parameter :: layer_exit = 1.25_wp
+  integer, parameter :: most_steps = 100000
+  !> After a stop in the layer the law is followed up to this share of Stribeck's velocity.
+  real(wp), parameter :: half_way = 0.5_wp
+
+  !> Position and velocity, and after them the derivatives of both by the start, column by column.
+  type, extends(system_t) :: slip_t
+    type(oscillator_t) :: machine
+    !> Steps of the differences of laws.
+    real(wp) :: step_of(2) = 1
+    integer :: mode = 0
+    real(wp) :: start = 0
+    logical :: pushing = .true.
+  contains
+    procedure :: slope => slope_of_slip
+  end type slip_t
+
+contains
+
+  !> Whether the body slips in a mode.
+  pure elemental logical function slips_in(mode)
+    integer, intent(in) :: mode
+    slips_in = modulo(mode, 10) == mode_slip_plus .or. modulo(mode, 10) == mode_slip_minus
+  end function slips_in
+
+  !> Direction of the slip, 0 at rest.
+  pure elemental integer function direction_in(mode)
+    integer, intent(in) :: mode
+    direction_in = 0
+    if (modulo(mode, 10) == mode_slip_plus) direction_in = 1
+    if (modulo(mode, 10) == mode_slip_minus) direction_in = -1
+  end function direction_in
+
+  !> Side of the soft barrier that is pressed in a mode, 0 without.
+  pure elemental integer function pressed_side(mode)
+    integer, intent(in) :: mode
+    pressed_side = 0
+    if (mode > on_upper .and. mode < on_lower) pressed_side = 1
+    if (mode > on_lower) pressed_side = -1
+  end function pressed_side
+
+  !> The state `y1` that a slip brings `y0` at `t0` to at `t1` [s], and its derivative by `y0`. `sizes` are those of x and v,
+  !> `steps` of the differences of laws.
+  pure subroutine fly_slip(moving, sizes, steps, mode, t0, y0, t1, y1, flight)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: sizes(2), steps(2), t0, y0(:), t1
+    integer, intent(in) :: mode
+    real(wp), intent(out) :: y1(:)
+    real(wp), intent(out), optional :: flight(:, :)
+    type(slip_t) :: system
+    real(wp) :: t, place(2)
+    integer :: side
+    side = pressed_side(mode)
+    if (side == 0 .and. moving%exact .and. .not. moving%layer > 0) then
+      call fly_closed(moving%flow, direction_in(mode), t0, y0, t1, y1, flight)
+    else if (side /= 0 .and. moving%pressed%available) then
+      place = [surface_of(moving%machine, side), 0.0_wp]
+      call fly_closed(moving%pressed%flow(side), direction_in(mode), t0, y0 - place, t1, y1, flight)
+      y1 = y1 + place
+    else
+      system%machine = moving%machine
+      system%step_of = steps
+      system%mode = mode
+      y1 = y0
+      t = t0
+      if (present(flight)) flight = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+      if (side == 0 .and. moving%exact .and. t1 > t0) then
+        call cross_layers(moving, system, sizes, t, t1, y1, flight)
+      else
+        call march(moving, system, sizes, t, t1, huge(1.0_wp), y1, flight)
+      end if
+    end if
+  end subroutine fly_slip
+
+  !> With z = y' + g y + i w_d y a linear slip is z' = (-g + i w_d) z + forcing: its derivative by the start is a decaying
+  !> rotation.
+  pure subroutine fly_closed(flow, direction, t0, y0, t1, y1, flight)
+    type(flow_t), intent(in) :: flow
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: t0, y0(2), t1
+    real(wp), intent(out) :: y1(2)
+    real(wp), intent(out), optional :: flight(2, 2)
+    type(segment_t) :: segment
+    type(kinematics_t) :: now
+    call begin_segment(flow, t0, y0(1), y0(2), direction, segment)
+    call evaluate(flow, segment, t1 - t0, now)
+    y1 = [now%x, now%v]
+    if (present(flight)) flight = closed_derivative(flow, t1 - t0)
+  end subroutine fly_closed
+
+  pure function closed_derivative(flow, span) result(flight)
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in) :: span
+    real(wp) :: flight(2, 2), s, c
+    call sine_cosine(flow%damped*span, s, c)
+    s = s/flow%damped
+    flight(:, 1) = [c + flow%decay*s, -flow%natural**2*s]
+    flight(:, 2) = [s, c - flow%decay*s]
+    flight = exponential(-flow%decay*span)*flight
+  end function closed_derivative
+
+  !> Outside the layer, where Stribeck's excess is nil to rounding, on the closed form, from edge to edge; inside in one stroke
+  !> where the body passes straight through, else by steps.
+  pure subroutine cross_layers(moving, system, sizes, t, t1, y, flight)
+    type(motion_t), intent(in) :: moving
+    type(slip_t), intent(inout) :: system
+    real(wp), intent(in) :: sizes(2), t1
+    real(wp), intent(inout) :: t, y(2)
+    real(wp), intent(inout), optional :: flight(2, 2)
+    type(state_t) :: state
+    type(tally_t) :: unused
+    integer :: direction, outcome, i
+    logical :: ok
+    direction = direction_in(system%mode)
+    do i = 1, most_steps
+      if (direction*y(2) > moving%layer) then
+        state = state_t(x=y(1), v=y(2), mode=system%mode, time=t)
+        call fly_exact(moving%flow, state, t1, moving%layer, direction*huge(1.0_wp), unused, outcome)
+        if (present(flight)) flight = matmul(closed_derivative(moving%flow, state%time - t), flight)
+        y = [state%x, state%v]
+        t = state%time
+        ok = outcome == flight_speed_reached .and. t < t1
+      else
+        ok = .not. abs(y(2)) > 0 .and. t < t1
+      end if
+      if (ok) call cross_straight(moving, system, t1, t, y, ok, flight)
+      if (.not. ok .and. .not. direction*y(2) > moving%layer) then
+        call march(moving, system, sizes, t, t1, layer_exit*moving%layer, y, flight)
+      end if
+      if (t >= t1) exit
+    end do
+    ! A layer that is crossed in one stroke may end a little later.
+    if (t > t1) call march(moving, system, sizes, t, t1, huge(1.0_wp), y, flight)
+  end subroutine cross_layers
+
+  !> From the edge of the layer to rest, or from rest to its edge. With the speed as the independent variable the variations are
+  !> those of time and place; `t1` may be passed on the way to rest, by half of it.
+  pure subroutine cross_straight(moving, system, t1, t, y, ok, flight)
+    type(motion_t), intent(in) :: moving
+    type(slip_t), intent(in) :: system
+    real(wp), intent(in) :: t1
+    real(wp), intent(inout) :: t, y(2)
+    logical, intent(out) :: ok
+    real(wp), intent(inout), optional :: flight(2, 2)
+    real(wp) :: time, x, v, rate, across(2, 2), into(2, 2), out_of(2, 2)
+    integer :: direction
+    logical :: inward
+    ok = moving%transit%available
+    if (.not. ok) return
+    direction = direction_in(system%mode)
+    inward = abs(y(2)) > 0
+    time = t
+    x = y(1)
+    if (present(flight)) then
+      call cross_layer(moving%transit, moving%flow, direction, inward, huge(t1), time, x, ok, across)
+    else
+      call cross_layer(moving%transit, moving%flow, direction, inward, huge(t1), time, x, ok)
+    end if
+    if (inward) ok = ok .and. time - t1 < 0.5_wp*(time - t)
+    if (.not. inward) ok = ok .and. time <= t1
+    if (.not. ok) return
+    v = direction*merge(0.0_wp, moving%transit%exit, inward)
+    if (present(flight)) then
+      rate = slip_acceleration(system%machine, system%mode, .false., t, y(1), y(2))
+      into = reshape([0.0_wp, 1.0_wp, -1/rate, -y(2)/rate], [2, 2])
+      rate = slip_acceleration(system%machine, system%mode, .false., time, x, v)
+      out_of = reshape([-v, -rate, 1.0_wp, 0.0_wp], [2, 2])
+      flight = matmul(out_of, matmul(across, matmul(into, flight)))
+    end if
+    t = time
+    y = [x, v]
+    if (.not. inward .or. t >= t1) return
+    rate = slip_acceleration(system%machine, system%mode, .false., t, x, v)
+    if ((t1 - t)*abs(rate) <= half_way*system%machine%friction%stribeck_velocity) return
+    ! The slip has ended here; what is asked long after is asked on the way to a solution, and any continuation will do.
+    y = y + (t1 - t)*[0.5_wp*(t1 - t)*rate, rate]
+    if (present(flight)) flight(1, :) = flight(1, :) + (t1 - t)*flight(2, :)
+    t = t1
+  end subroutine cross_straight
+
+  !> By steps up to `t1`, but no further than to where the speed rises to `exit`; backwards by the mirrored equations.
+  pure subroutine march(moving, system, sizes, t, t1, exit, y, flight)
+    type(motion_t), intent(in) :: moving
+    type(slip_t), intent(inout) :: system
+    real(wp), intent(in) :: sizes(2), t1, exit
+    real(wp), intent(inout) :: t, y(2)
+    real(wp), intent(inout), optional :: flight(2, 2)
+    type(march_t) :: steps
+    type(guard_t) :: cut(2)
+    real(wp) :: scale(6), time, span, all(6)
+    integer :: fallen, i, n, mode
+    span = t1 - t
+    if (.not. abs(span) > 0) return
+    n = merge(6, 2, present(flight))
+    all = [y, 1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp]
+    scale = [sizes, 1.0_wp, sizes(2)/sizes(1), sizes(1)/sizes(2), 1.0_wp]
+    mode = system%mode
+    system%start = t
+    if (span < 0) system%start = -t
+    if (span < 0) system%mode = -mode
+    system%pushing = pushes(system%machine, mode, y)
+    time = 0
+    fallen = 2
+    do i = 1, most_steps
+      if (fallen > 0) then
+        cut = cuts_of(system%machine, mode, system%pushing, exit)
+        call begin_march(steps, system, moving%options%tolerance, scale(:n), abs(span), time, all(:n))
+      end if
+      call take_step(steps, system, cut, abs(span), fallen)
+      time = steps%time
+      all(:n) = steps%y(:n)
+      if (fallen == march_time_over .or. fallen == march_failed .or. fallen == 1) then
+        exit
+      else if (fallen == 2) then
+        system%pushing = .not. system%pushing
+      end if
+    end do
+    t = t1
+    if (fallen == 1) t = t + sign(time, span) - span
+    y = all(1:2)
+    if (present(flight)) flight = matmul(reshape(all(3:6), [2, 2]), flight)
+    if (fallen /= march_time_over .and. fallen /= 1) y = huge(1.0_wp)
+    if (.not. y(1) < huge(1.0_wp)) t = t1
+    system%mode = mode
+  end subroutine march
+
+  !> Whether the force of a soft barrier that may not pull is there: not on a flight off it, and not where it would pull.
+  pure logical function pushes(machine, mode, y)
+    type(oscillator_t), intent(in) :: machine
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: y(2)
+    integer :: side
+    side = pressed_side(mode)
+    pushes = side /= 0
+    if (.not. pushes .or. machine%contact%tension) return
+    pushes = sum(contact_margin(machine%contact)*[1.0_wp, side*(y(1) - surface_of(machine, side)), side*y(2)]) >= 0
+  end function pushes
+
+  !> The guard at which the speed rises to `exit`, and that at which the force of a soft barrier is cut off or comes back; never,
+  !> where there is none.
+  pure function cuts_of(machine, mode, pushing, exit) result(cut)
+    type(oscillator_t), intent(in) :: machine
+    integer, intent(in) :: mode
+    logical, intent(in) :: pushing
+    real(wp), intent(in) :: exit
+    type(guard_t) :: cut(2)
+    real(wp) :: margin(3)
+    integer :: side
+    side = pressed_side(mode)
+    cut%constant = 1
+    if (exit < huge(exit)) then
+      cut(1)%constant = exit
+      cut(1)%coefficients(2) = -direction_in(mode)
+    end if
+    if (side == 0 .or. machine%contact%tension) return
+    margin = merge(1, -1, pushing)*contact_margin(machine%contact)
+    cut(2)%constant = margin(1) - side*surface_of(machine, side)*margin(2)
+    cut(2)%coefficients(1:2) = side*margin(2:3)
+  end function cuts_of
+
+  pure function slope_of_slip(self, time, y) result(slope)
+    class(slip_t), intent(in) :: self
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: slope(size(y)), t, by(2)
+    integer :: way, mode
+    way = sign(1, self%mode)
+    mode = abs(self%mode)
+    t = way*(self%start + time)
+    slope(1:2) = [y(2), slip_acceleration(self%machine, mode, self%pushing, t, y(1), y(2))]
+    if (size(y) > 2) then
+      by = acceleration_slopes(self, mode, t, y(1), y(2))
+      slope(3:4) = [y(4), sum(by*y(3:4))]
+      slope(5:6) = [y(6), sum(by*y(5:6))]
+    end if
+    slope = way*slope
+  end function slope_of_slip
+
+  !> Derivatives of the acceleration by x and v; of effects by differences.
+  pure function acceleration_slopes(self, mode, t, x, v) result(by)
+    class(slip_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t, x, v
+    real(wp) :: by(2), foot
+    integer :: side
+    associate (machine => self%machine)
+      if (machine%extra) then
+        by(1) = quarter(free_at(-2, 0), free_at(-1, 0), free_at(1, 0), free_at(2, 0))/self%step_of(1)
+        by(2) = quarter(free_at(0, -2), free_at(0, -1), free_at(0, 1), free_at(0, 2))/self%step_of(2)
+      else
+        foot = 0
+        if (.not. machine%restoring%is_linear) call foot_motion(machine%drive, machine%drive_frequency*t, foot)
+        by(1) = -restoring_stiffness(machine%restoring, machine%restoring%free_length + foot - x)/machine%mass
+        by(2) = sliding_slope(machine%friction, v, real(direction_in(mode), wp))/machine%mass
+      end if
+      side = pressed_side(mode)
+      if (side /= 0 .and. self%pushing) by = by - &
+        contact_force_slopes(machine%contact, side*(x - surface_of(machine, side)), side*v)/machine%mass
+    end associate
+
+  contains
+
+    !> Acceleration without the barrier, off the state by steps.
+    pure real(wp) function free_at(i, k) result(a)
+      integer, intent(in) :: i, k
+      a = slip_acceleration(self%machine, mode, .false., t, x + i*self%step_of(1), v + k*self%step_of(2))
+    end function free_at
+
+  end function acceleration_slopes
+
+  !> Difference of fourth order of the values two and one steps back, one and two further: derivative times the step.
+  pure real(wp) function quarter(far_back, back, further, far) result(change)
+    real(wp), intent(in) :: far_back, back, further, far
+    change = (8*(further - back) - (far - far_back))/12
+  end function quarter
+
+  !> Acceleration [m/s^2] in a slip; `pushing`: a soft barrier acts.
+  pure real(wp) function slip_acceleration(machine, mode, pushing, t, x, v) result(a)
+    type(oscillator_t), intent(in) :: machine
+    integer, intent(in) :: mode
+    logical, intent(in) :: pushing
+    real(wp), intent(in) :: t, x, v
+    real(wp) :: foot, stretch, direction
+    integer :: side
+    direction = direction_in(mode)
+    call foot_motion(machine%drive, machine%drive_frequency*t, foot)
+    stretch = machine%restoring%free_length + foot - x
+    a = restoring_force(machine%restoring, stretch) + sliding_friction(machine%friction, v, direction)
+    if (machine%extra) a = a + extra_force(machine, slip_memory_t(direction, x, 0.0_wp), t, x, v, stretch)
+    side = pressed_side(mode)
+    if (side /= 0 .and. pushing) a = a - side*contact_force(machine%contact, side*(x - surface_of(machine, side)), side*v)
+    a = a/machine%mass
+  end function slip_acceleration
+
+  pure real(wp) function surface_of(machine, side) result(surface)
+    type(oscillator_t), intent(in) :: machine
+    integer, intent(in) :: side
+    surface = merge(machine%contact%soft_upper, machine%contact%soft_lower, side > 0)
+  end function surface_of
+
+end module body_flight
