@@ -201,7 +201,13 @@ def ball(program: Program) -> list[Number]:
     upper = program.events("ball", "impact_upper", "contact.room")[:, 0]
     lower = program.events("ball", "impact_lower", "contact.room")[:, 0]
     ours = np.sort(np.concatenate([upper, lower]))
-    theirs = (0.05131670194948630, 0.2283187800528825, 0.4665486160195453, 0.7413599657472243, 1.834535421015040)
+    theirs = (
+        0.05131670194948630,
+        0.2283187800528825,
+        0.4665486160195453,
+        0.7413599657472243,
+        1.834535421015040,
+    )
     return [
         Number(source, f"ball between floor and ceiling: impact {k + 1} (s)", value, ours[k], 1e-12)
         for k, value in enumerate(theirs)
@@ -357,8 +363,7 @@ def turning_pendulum(program: Program) -> list[Number]:
     """A pendulum under a constant torque: share of the equilibrium, time of a turn."""
     found = []
     source = "P. J. Menck and others (2013) by bSTAB, 10000 starts"
-    case = SOURCE / "examples" / "validation" / "pendulum_torque.toml"
-    with h5py.File(program.run("basin", case)) as file:
+    with h5py.File(program.run("basin", "pendulum_torque")) as file:
         rests = np.isin(file["attractor"][:], known(file, "rest"))
         what = "pendulum under a constant torque: share of the equilibrium"
         bar = 2 * np.sqrt(2 * 0.152 * 0.848 / 10000)
@@ -486,7 +491,10 @@ NOT_YET = (
     ],
     ["impacting bar (Siconos)", "contact boundaries without mass are not there"],
     ["beam with dry friction (NLvib, example 08)", "its matrices are not at hand"],
-    ["end of the chatter of a ball between floor and ceiling (Siconos)", "events tell where it was completed, not its end"],
+    [
+        "end of the chatter of a ball between floor and ceiling (Siconos)",
+        "events tell where it was completed, not its end",
+    ],
     [
         "stick-slip microactuator (COCO), impact Duffing in a cage (PWSDDE-cont)",
         "force laws that are not there",

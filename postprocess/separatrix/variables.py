@@ -46,7 +46,12 @@ MAP = {
     "x_min": (np.float32, "m", "smallest position", {}),
     "v_max": (np.float32, "m/s", "largest velocity towards the upper barrier", {}),
     "settle_time": (np.float32, "s", "time from the start to capture by the attractor", {}),
-    "grazing_margin": (np.float32, "m", "smallest distance to a barrier at a turning point that missed it", {}),
+    "grazing_margin": (
+        np.float32,
+        "m",
+        "smallest distance to a barrier at a turning point that missed it",
+        {},
+    ),
 }
 # name: unit, meaning, further attributes
 STARTS = {
