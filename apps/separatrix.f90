@@ -6,7 +6,8 @@ program separatrix
   use basin_driver, only: run_basin
   use boundary_driver, only: run_boundary
   use branches_driver, only: run_branches
-  use command_line, only: command_t, help_text, read_command_line
+  use command_line, only: command_t, read_command_line
+  use command_table, only: help_text
   use errors, only: error_t
   use info_driver, only: run_info
   use launcher, only: launched_rank

@@ -112,7 +112,7 @@ enum {
   separatrix_sample_numbers = 13,
   separatrix_event_numbers = 7,
   separatrix_summary_numbers = 26,
-  separatrix_attractor_numbers = 54,
+  separatrix_attractor_numbers = 55,
   separatrix_label_numbers = 13,
   separatrix_section_coordinates = 16
 };
@@ -178,16 +178,16 @@ int separatrix_catalogue_search(separatrix_catalogue *catalogue, int start_count
 int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
 
 /* Attractor `index`, from 0.
- *   numbers [54]
+ *   numbers [55]
  *     label, regime, period in drive periods (0: not periodic), event word; x [m] and v [m/s] on the section
  *     at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude
  *     [m], largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s],
  *     grazing margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be
  * anywhere between stops, number of coordinates on the section, 1 if the machine has two bodies, kind (the
- * codes of docs/file-format.md), real parts of its multipliers [16], imaginary parts [16], one for each
- * coordinate point_capacity, point_count, points [point_capacity][16] room for points on the section, how
- * many there are (those beyond the room are left out), and these: of one body x [m] and v [m/s]; of a motion
- * that is not periodic the lower and the upper corner of their box */
+ * codes of docs/file-format.md), time of one cycle [s] (0: none), real parts of its multipliers [16],
+ * imaginary parts [16], one for each coordinate point_capacity, point_count, points [point_capacity][16] room
+ * for points on the section, how many there are (those beyond the room are left out), and these: of one body
+ * x [m] and v [m/s]; of a motion that is not periodic the lower and the upper corner of their box */
 int separatrix_catalogue_attractor(const separatrix_catalogue *catalogue, int index, double *numbers,
                                    int point_capacity, int *point_count, double *points, char *message,
                                    size_t message_size);

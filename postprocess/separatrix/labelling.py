@@ -136,7 +136,7 @@ class Labelling:
         shape = [len(self.axes[name]) for name in order]
         back = [order.index(name) for name in self.axes]
         data = {
-            name: (dims, np.transpose(values.reshape(shape), back), attributes(MAP[name]))
+            name: (dims, np.transpose(values.reshape(shape), back), attributes(MAP[name][1:]))
             for name, values in self.values.items()
         }
         coordinates = {

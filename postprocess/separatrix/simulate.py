@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.library import CaseError, Model, _call, _library, _pointer
+from separatrix.variables import MAP
 
 __all__ = [
     "LABEL_VARIABLES",
@@ -40,15 +41,10 @@ SUMMARY = (
 ATTRACTOR = (
     "attractor", "regime", "period", "event_word", "x", "v", "driver_x", "driver_v", "multiplier",
     "capture_radius", "amplitude", "x_max", "x_min", "v_max", "impacts_per_period", "mean_impact_speed",
-    "grazing_margin", "rests", "any_place", "coordinates", "two_bodies", "kind",
+    "grazing_margin", "rests", "any_place", "coordinates", "two_bodies", "kind", "cycle_time",
 )  # fmt: skip
 #: Variables of a label in the order of the library, with the types that a file has.
-LABEL_VARIABLES = {
-    "regime": np.int8, "attractor": np.int32, "reason": np.int8, "period": np.int16, "event_word": np.int64,
-    "impacts_per_period": np.float32, "mean_impact_speed": np.float32, "amplitude": np.float32,
-    "x_max": np.float32, "x_min": np.float32, "v_max": np.float32, "settle_time": np.float32,
-    "grazing_margin": np.float32,
-}  # fmt: skip
+LABEL_VARIABLES = {name: kind for name, (kind, *_) in MAP.items()}
 # coordinates on the section, at most
 _COORDINATES = 16
 _WHOLE = {

@@ -32,22 +32,28 @@ def _flags(meanings: str, first: int = 0) -> dict[str, object]:
     return {"flag_values": np.arange(first, first + count, dtype=np.int8), "flag_meanings": meanings}
 
 
-# name: unit, meaning, further attributes
+# name: type, unit, meaning, further attributes; the table of src/maps/point_columns.f90
 MAP = {
-    "regime": ("1", "regime of the motion", _flags(_REGIMES)),
-    "attractor": ("1", "label of the attractor in the catalogue, 0 = none", {}),
-    "reason": ("1", "why the trajectory ended", _flags(_REASONS)),
-    "period": ("1", "period in drive periods, 0 = not periodic", {}),
-    "event_word": ("1", "events of one period of the motion, three bits each", {}),
-    "impacts_per_period": ("1", "impacts per drive period", {}),
-    "mean_impact_speed": ("m/s", "mean speed just before impact", {}),
-    "amplitude": ("m", "half the range of the position", {}),
-    "x_max": ("m", "largest position", {}),
-    "x_min": ("m", "smallest position", {}),
-    "v_max": ("m/s", "largest velocity towards the upper barrier", {}),
-    "settle_time": ("s", "time from the start to capture by the attractor", {}),
-    "grazing_margin": ("m", "smallest distance to a barrier at a turning point that missed it", {}),
+    "regime": (np.int8, "1", "regime of the motion", _flags(_REGIMES)),
+    "attractor": (np.int32, "1", "label of the attractor in the catalogue, 0 = none", {}),
+    "reason": (np.int8, "1", "why the trajectory ended", _flags(_REASONS)),
+    "period": (np.int16, "1", "period in drive periods, 0 = not periodic", {}),
+    "event_word": (np.int64, "1", "events of one period of the motion, three bits each", {}),
+    "impacts_per_period": (np.float32, "1", "impacts per drive period", {}),
+    "mean_impact_speed": (np.float32, "m/s", "mean speed just before impact", {}),
+    "amplitude": (np.float32, "m", "half the range of the position", {}),
+    "x_max": (np.float32, "m", "largest position", {}),
+    "x_min": (np.float32, "m", "smallest position", {}),
+    "v_max": (np.float32, "m/s", "largest velocity towards the upper barrier", {}),
+    "settle_time": (np.float32, "s", "time from the start to capture by the attractor", {}),
+    "grazing_margin": (
+        np.float32,
+        "m",
+        "smallest distance to a barrier at a turning point that missed it",
+        {},
+    ),
 }
+# name: unit, meaning, further attributes
 STARTS = {
     "x0": ("m", "initial position", {}),
     "v0": ("m/s", "initial velocity", {}),
@@ -59,6 +65,7 @@ CATALOGUE = {
     "attractor": (np.int32, "1", "label"),
     "regime": (np.int8, "1", "regime, coded as in the map"),
     "period": (np.int16, "1", "period in drive periods"),
+    "cycle_time": (np.float64, "s", "time that one cycle takes; 0 of what is none"),
     "event_word": (np.int64, "1", "events of one period"),
     "x": (np.float64, "m", "position at the section, crank angle 0"),
     "v": (np.float64, "m/s", "velocity at the section, crank angle 0"),

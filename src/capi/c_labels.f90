@@ -4,7 +4,7 @@
 !> The functions of include/separatrix.h that find the attractors of a machine and label starts with them.
 module c_labels
   use attractors, only: attractor_t, most_coordinates
-  use basin, only: basin_variables, catalogue_t, label_slices, outcome_values, search_starts
+  use basin, only: catalogue_t, label_slices, search_starts
   use c_machine, only: is_start, prepare_machine, prepared_t
   use c_text, only: answer
   use case_setup, only: span_of
@@ -13,6 +13,7 @@ module c_labels
   use grid, only: grid_t
   use kinds, only: int64, wp
   use model_type, only: model_t
+  use point_columns, only: outcome_values, point_values
   use status, only: exit_resumable, exit_usage
   use text, only: to_text
   use trajectories, only: block_size, run_trajectories
@@ -26,7 +27,7 @@ module c_labels
     separatrix_catalogue_number, separatrix_catalogue_free, separatrix_labels
 
   !> Numbers of an attractor.
-  integer, parameter :: of_attractor = 22 + 2*most_coordinates
+  integer, parameter :: of_attractor = 23 + 2*most_coordinates
 
   !> What a catalogue's handle stands for.
   type :: labeller_t
@@ -144,7 +145,7 @@ contains
                    one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
                    f%grazing_margin, merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
                    real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, allocated(self%prepared%journey%moving%pair)), &
-                   real(one%kind, wp), real(one%multipliers), aimag(one%multipliers)]
+                   real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
         shown = min(point_count, point_capacity)
         points(:one%coordinates, :shown) = one%points(:one%coordinates, :shown)
@@ -190,7 +191,7 @@ contains
     type(c_ptr), value :: catalogue, stop_flag
     integer(c_int), value :: start_count
     real(c_double), intent(in) :: start(3, start_count)
-    real(c_double), intent(inout) :: values(basin_variables, start_count)
+    real(c_double), intent(inout) :: values(point_values, start_count)
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
     type(labeller_t), pointer :: self

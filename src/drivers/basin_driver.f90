@@ -4,7 +4,6 @@
 !> `separatrix basin`: where every point of a grid ends up.
 module basin_driver
   use attractors, only: last_regime, regime_names
-  use basin, only: basin_variables, marks_of_attractor
   use basin_work, only: basin_work_t, prepare_counts, sum_counts
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
@@ -15,6 +14,7 @@ module basin_driver
   use endings, only: report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
+  use point_columns, only: marks_of_attractor, point_values
   use sample_shares, only: add_sample_shares, add_samples, share_with_interval
   use grid, only: grid_t, two_axes
   use journal, only: json_text
@@ -104,7 +104,7 @@ contains
     type(case_t), intent(in) :: the_case
     type(basin_work_t), intent(inout) :: work
     integer, allocatable, intent(out) :: tile(:)
-    work%variables = basin_variables
+    work%variables = point_values
     work%grid = grid_of(the_case, the_case%axes)
     work%span = span_of(the_case)
     work%max_period = the_case%attractors%max_period

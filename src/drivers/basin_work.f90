@@ -4,10 +4,11 @@
 !> The points of a basin map as work for a team, and what is counted on the way.
 module basin_work
   use attractors, only: last_regime
-  use basin, only: basin_points, catalogue_t, marks_of_attractor, points_at_a_time, settling_value, slice_cache_t
+  use basin, only: basin_points, catalogue_t, points_at_a_time, slice_cache_t
   use errors, only: error_t
   use grid, only: grid_t, point_slice, slice_period
   use kinds, only: int64, wp
+  use point_columns, only: marks_of_attractor, settling_value
   use point_work, only: point_work_t
   use refinement, only: last_origin
   use session, only: session_t

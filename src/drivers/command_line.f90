@@ -1,8 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The command line: what was asked, and the texts of `--help`.
+!> The command line: what was asked.
 module command_line
+  use command_table, only: belonging_to, commands, option_number, options
   use errors, only: error_t, fail
   use kinds, only: wp
   use status, only: exit_usage
@@ -10,18 +11,9 @@ module command_line
   implicit none
   private
 
-  public :: read_command_line, help_text
+  public :: read_command_line
 
   integer, parameter :: longest_argument = 4096
-
-  character(len=*), parameter, public :: commands(11) = [character(len=10) :: 'basin', 'sweep', &
-    'branches', 'boundary', 'stability', 'trajectory', 'points', 'merge', 'laws', 'info', 'verify']
-
-  !> The commands that keep what is done when they are stopped.
-  character(len=*), parameter :: resumable(3) = [character(len=10) :: 'basin', 'sweep', 'points']
-
-  !> The commands that write a table besides.
-  character(len=*), parameter :: tabulated(3) = [character(len=10) :: 'points', 'trajectory', 'merge']
 
   type, public :: command_t
     character(len=:), allocatable :: name
@@ -51,13 +43,14 @@ module command_line
     integer :: searches = 12
     !> `boundary`: invariant sets are grown within so many times the window of the map; 0 = none.
     real(wp) :: grow = 1
-    logical :: has_grow = .false.
     !> `stability`: drive periods that are watched.
     integer :: periods = 20000
     !> `verify`: points rerun, and the seed that chooses them.
     integer :: sample = 200, seed = 1
     !> `verify`: share of the labels that may change, in per cent.
     real(wp) :: max_changes = 1
+    !> Options that were given.
+    logical :: given(size(options)) = .false.
   end type command_t
 
 contains
@@ -102,7 +95,8 @@ contains
       if (allocated(error)) return
     end do
     if (command%help .or. command%version) return
-    call check_command(command, error)
+    if (any(commands == command%name)) call check_options(command, error)
+    if (.not. allocated(error)) call check_command(command, error)
   end subroutine read_command_line
 
   subroutine check_command(command, error)
@@ -118,12 +112,8 @@ contains
       call fail(error, exit_usage, "laws takes no file; found '"//command%path//"'")
     else if (command%name == 'merge' .and. size(command%shards) == 0) then
       call fail(error, exit_usage, 'merge: the shards are missing (see separatrix merge --help)')
-    else if (command%shard > 0 .and. command%name /= 'basin' .and. command%name /= 'points') then
-      call fail(error, exit_usage, '--shard belongs to the commands basin and points')
     else if (command%shard > 0 .and. len(command%csv) > 0) then
       call fail(error, exit_usage, '--csv needs the whole list: give it to merge')
-    else if (len(command%catalogue) > 0 .and. command%name /= 'basin') then
-      call fail(error, exit_usage, '--catalogue belongs to the command basin')
     else if (command%search_only .and. (command%name /= 'basin' .or. command%shard == 0)) then
       call fail(error, exit_usage, '--search-only belongs to basin --shard I/N')
     else if (command%search_only .and. len(command%catalogue) > 0) then
@@ -136,27 +126,6 @@ contains
       call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed is a whole number from 64')
     else if (command%name == 'branches' .and. len(command%parameter) == 0) then
       call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
-    else if (command%name /= 'branches' .and. (len(command%parameter) > 0 .or. command%has_from .or. command%has_to)) then
-      call fail(error, exit_usage, '--parameter, --from and --to belong to the command branches')
-    else if (command%name /= 'boundary' .and. command%has_grow) then
-      call fail(error, exit_usage, '--grow belongs to the command boundary')
-    else if (command%name /= 'points' .and. len(command%list) > 0) then
-      call fail(error, exit_usage, '--list belongs to the command points')
-    else if (len(command%csv) > 0 .and. .not. any(command%name == tabulated)) then
-      call fail(error, exit_usage, '--csv belongs to the commands '//join(tabulated, ', '))
-    else if (len(command%record) > 0 .and. command%name /= 'trajectory') then
-      call fail(error, exit_usage, '--record belongs to the command trajectory')
-    else if (len(command%tile_times) > 0 .and. .not. any(command%name == resumable)) then
-      call fail(error, exit_usage, '--tile-times belongs to the commands '//join(resumable, ', '))
-    else if (len(command%draw) > 0 .and. any(command%name == [character(len=10) :: 'merge', 'boundary', 'laws', 'info', &
-                                                                               'verify'])) then
-      call fail(error, exit_usage, '--draw belongs to the commands that read a case')
-    else if (size(command%overrides) > 0 .and. command%name == 'boundary') then
-      call fail(error, exit_usage, '--set belongs to the commands that read a case: boundary takes that of its map')
-    else if (command%resume .and. .not. any(command%name == resumable)) then
-      call fail(error, exit_usage, '--resume belongs to the commands '//join(resumable, ', '))
-    else if (command%time_limit > 0 .and. .not. any(command%name == resumable)) then
-      call fail(error, exit_usage, '--time-limit belongs to the commands '//join(resumable, ', '))
     else if (command%force .and. command%resume) then
       call fail(error, exit_usage, '--force starts anew and --resume goes on: choose one')
     else
@@ -164,14 +133,25 @@ contains
     end if
   end subroutine check_command
 
+  !> Every option that was given belongs to the command.
+  subroutine check_options(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: words
+    integer :: k
+    do k = 1, size(options)
+      if (.not. command%given(k) .or. allocated(error)) cycle
+      words = belonging_to(options(k), command%name)
+      if (len(words) > 0) call fail(error, exit_usage, trim(options(k)%name)//' belongs to '//words)
+    end do
+  end subroutine check_options
+
   !> Nothing that is read may be replaced, and no output by another.
   subroutine check_outputs(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
     if (len(command%output) > 0 .and. (command%output == command%path .or. command%output == command%list)) then
       call fail(error, exit_usage, "-o '"//command%output//"' would replace what is read")
-    else if (len(command%log) > 0 .and. any(command%name == [character(len=10) :: 'laws', 'info', 'verify'])) then
-      call fail(error, exit_usage, '--log belongs to the commands that compute')
     else if (len(command%log) > 0 .and. any([command%path == command%log, command%list == command%log, &
                                              command%output == command%log, command%csv == command%log, &
                                              command%record == command%log, command%tile_times == command%log])) then
@@ -199,12 +179,42 @@ contains
     type(command_t), intent(inout) :: command
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: name, value
-    integer :: equals
+    integer :: equals, number
     name = argument
     equals = index(argument, '=')
     if (starts_with(argument, '--') .and. equals > 0) name = argument(:equals - 1)
+    number = option_number(name)
+    if (number == 0) then
+      call fail(error, exit_usage, "unknown option '"//argument//"' (see separatrix --help)")
+      return
+    end if
+    command%given(number) = .true.
+    if (.not. options(number)%takes_value) then
+      if (len(name) < len(argument)) then
+        call fail(error, exit_usage, name//' takes no value')
+      else
+        call switch_on(trim(options(number)%name), command)
+      end if
+      return
+    end if
+    if (len(name) < len(argument)) then
+      value = argument(equals + 1:)
+    else if (position < command_argument_count()) then
+      position = position + 1
+      value = argument_at(position)
+    else
+      call fail(error, exit_usage, name//' needs a value')
+      return
+    end if
+    call take_value(trim(options(number)%name), value, command, error)
+  end subroutine read_option
+
+  !> An option without a value.
+  pure subroutine switch_on(name, command)
+    character(len=*), intent(in) :: name
+    type(command_t), intent(inout) :: command
     select case (name)
-    case ('-h', '--help')
+    case ('--help')
       command%help = .true.
     case ('--version')
       command%version = .true.
@@ -220,28 +230,10 @@ contains
       command%search_only = .true.
     case ('--json')
       command%json = .true.
-    case ('-q', '--quiet')
+    case ('--quiet')
       command%quiet = .true.
-    case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--draw', '--parameter', '--from', '--to', '--searches', '--periods', '--grow', &
-          '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
-      if (equals > 0 .and. starts_with(argument, '--')) then
-        value = argument(equals + 1:)
-      else if (position < command_argument_count()) then
-        position = position + 1
-        value = argument_at(position)
-      else
-        call fail(error, exit_usage, name//' needs a value')
-        return
-      end if
-      call take_value(name, value, command, error)
-    case default
-      call fail(error, exit_usage, "unknown option '"//argument//"' (see separatrix --help)")
     end select
-    if (equals > 0 .and. .not. allocated(value) .and. .not. allocated(error)) then
-      call fail(error, exit_usage, name//' takes no value')
-    end if
-  end subroutine read_option
+  end subroutine switch_on
 
   subroutine take_value(name, value, command, error)
     character(len=*), intent(in) :: name, value
@@ -249,7 +241,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_argument) :: padded
     select case (name)
-    case ('-o', '--output', '--list', '--csv', '--record', '--log', '--tile-times', '--catalogue', '--draw')
+    case ('--output', '--list', '--csv', '--record', '--log', '--tile-times', '--catalogue', '--draw')
       call take_path(name, value, command, error)
     case ('--set')
       padded = value
@@ -275,7 +267,6 @@ contains
       command%has_to = .true.
       call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
     case ('--grow')
-      command%has_grow = .true.
       call read_number_in(name, value, 0.0_wp, 1000.0_wp, 'windows', command%grow, error)
     case ('--searches')
       call read_integer(name, value, 1, command%searches, error)
@@ -365,105 +356,5 @@ contains
     allocate (character(len=length) :: argument)
     call get_command_argument(position, argument)
   end function argument_at
-
-  !> The text of `--help`, of one command or, with '', of the program.
-  pure function help_text(command) result(lines)
-    character(len=*), intent(in) :: command
-    character(len=:), allocatable :: lines
-    character(len=*), parameter :: nl = new_line('a')
-    select case (command)
-    case ('basin')
-      lines = 'separatrix basin CASE [-o FILE]: where every point of a grid ends up'//nl// &
-        '  The grid is the [[axis]] tables of the case: two or more of x0, v0, crank_angle, drive.ratio or any'//nl// &
-        '  other parameter. Run it with mpirun to share the work.'//nl
-    case ('sweep')
-      lines = 'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
-        '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
-        '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl
-    case ('branches')
-      lines = 'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
-        '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
-        '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
-        '  --searches N       values at which orbits are searched (default 12)'//nl
-    case ('boundary')
-      lines = 'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
-        '  Every edge between neighbours of different attractors is halved until its boundary point is known to 1e-10'//nl// &
-        '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
-        '  takes a small part of the time of the map. The pieces are named by what they lead to, and the stable and'//nl// &
-        '  unstable sets of the saddles are grown (one body).'//nl// &
-        '  --grow F           grows these sets within F times the window of the map (default 1; 0: not at all)'//nl
-    case ('stability')
-      lines = 'separatrix stability CASE|MAP [--periods N]: Lyapunov exponents and the kind of a motion'//nl// &
-        '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
-        '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period (chaotic, quasi-periodic,'//nl// &
-        '  long transient, period above the limit, not known). One body. Writes no file.'//nl// &
-        '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl
-    case ('trajectory')
-      lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
-        '  --csv FILE      also write the events as a table'//nl// &
-        '  --record FILE   also write the position as the sensor of the table [record] would measure it'//nl
-    case ('points')
-      lines = 'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
-        '  --list FILE     table with the columns x0,v0 and optionally ratio; replaces the grid of the case'//nl// &
-        '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl
-    case ('merge')
-      lines = 'separatrix merge OUT SHARD...: one result file from the files that --shard I/N has written'//nl// &
-        '  The shards must be all of one case: N files, each share once. They are kept.'//nl// &
-        '  --csv FILE      of a list of starts also the table that points --csv writes'//nl// &
-        '  --force         replaces an existing OUT'//nl// &
-        '  --json, --quiet, --log FILE  as for the other commands'//nl
-      return
-    case ('laws')
-      lines = 'separatrix laws [--json]: every law with parameters, units, bounds and source'//nl
-      return
-    case ('info')
-      lines = 'separatrix info FILE [--json]: what a file holds, with shares of regimes and attractors'//nl
-      return
-    case ('verify')
-      lines = 'separatrix verify FILE [--sample N] [--seed N] [--max-changes P] [--json]: checks a file'//nl// &
-        '  Reads everything back, checks sums and invariants, and reruns a random sample of the points in double'//nl// &
-        '  precision (must agree to the bit) and in quadruple precision (label flips, largest deviation).'//nl// &
-        '  Ends with code 77 if more labels would change than are allowed.'//nl// &
-        '  --sample N      points rerun (default 200)'//nl// &
-        '  --seed N        seed that chooses them (default 1)'//nl// &
-        '  --max-changes P per cent of the labels rerun that may change (default 1)'//nl
-      return
-    case default
-      lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl// &
-        '  basin CASE       where every point of a grid of starts or parameters ends up'//nl// &
-        '  sweep CASE       amplitude-frequency and bifurcation diagram, run up, run down and from many starts'//nl// &
-        '  branches CASE    periodic orbits over a parameter, stable and unstable, with their bifurcations'//nl// &
-        '  boundary MAP     the boundaries between the basins of a map, as curves'//nl// &
-        '  stability CASE   Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic'//nl// &
-        '  trajectory CASE  one motion with all its events'//nl// &
-        '  points CASE      a list of starts'//nl// &
-        '  merge OUT SHARD  one file from the shares of a map'//nl// &
-        '  laws             every law with parameters, units, bounds and source'//nl// &
-        '  info FILE        what a file holds'//nl// &
-        '  verify FILE      checks a file and reruns a sample of it at higher precision'//nl//nl// &
-        'separatrix COMMAND --help tells more. CASE is a TOML file, see docs/case-file.md.'//nl
-    end select
-    lines = lines//nl//'Options:'//nl// &
-      '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'//nl// &
-      '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'//nl// &
-      '  --validate         checks the case and stops'//nl// &
-      '  --draw FILE.svg    draws the machine as it was understood and stops'//nl// &
-      '  --dry-run          says what would be done: points, tiles, bytes, estimated time'//nl// &
-      '  --force            replaces an existing output'//nl// &
-      '  --resume           goes on with a run that was stopped or killed, begins one if there is none'//nl// &
-      '  --shard I/N        basin, points: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'//nl// &
-      '  --catalogue FILE   basin: takes the attractors from a share of the same map instead of searching them'//nl// &
-      '  --search-only      basin --shard: only makes the file of the share, from which all can take the attractors'//nl// &
-      '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'//nl// &
-      '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'//nl// &
-      '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'//nl// &
-      '  --progress S       progress every S seconds (default: in a log after 10 s, then ever less often)'//nl// &
-      '  --json             log as JSON lines'//nl// &
-      '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'//nl// &
-      '  -q, --quiet        errors only'//nl// &
-      '  --version          version, commit, compilers, MPI, HDF5 and flags'//nl//nl// &
-      'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &
-      '75 stopped early and resumable, 76 file belongs to another case, 77 too many labels would change.'//nl
-  end function help_text
 
 end module command_line

@@ -7,12 +7,13 @@ module file_layout
   use axis, only: axis_t
   use basin, only: catalogue_t
   use kinds, only: int64, wp
-  use map_schema, only: name_length, schema_t, type_float32, type_float64, type_int16, type_int32, &
-    type_int64, type_int8
+  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use motion_state, only: event_names
+  use point_columns, only: marks_of_attractor, point_table
   use status, only: last_reason, reason_names
   use refinement, only: last_origin, origin_names
   use text, only: join, replace_all
+  use value_types, only: type_named
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -20,11 +21,6 @@ module file_layout
   public :: axis_dimension, add_axes, add_map_variables, add_refined_variables, add_catalogue, add_regime, add_reason, add_events
 
   character(len=*), parameter :: coded_unit = '1'
-
-  !> The variables of a map's points, in the order of `outcome_values`.
-  character(len=*), parameter, public :: map_variables(13) = [character(len=18) :: 'regime', 'attractor', 'reason', &
-    'period', 'event_word', 'impacts_per_period', 'mean_impact_speed', 'amplitude', 'x_max', 'x_min', 'v_max', &
-    'settle_time', 'grazing_margin']
 
 contains
 
@@ -89,58 +85,40 @@ contains
       flag_meanings=join(reason_names, ' '), tiled=tiled)
   end subroutine add_reason
 
-  !> The variables of a map's points, in the order of `outcome_values`; names get `prefix`.
+  !> The variables of a map's points; names get `prefix`.
   subroutine add_map_variables(schema, prefix, dimensions)
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: prefix, dimensions(:)
-    call add_marks(schema, prefix, dimensions)
-    call add(6, '1', 'impacts per drive period')
-    call add(7, 'm/s', 'mean speed just before impact')
-    call add(8, 'm', 'half the range of the position')
-    call add(9, 'm', 'largest position')
-    call add(10, 'm', 'smallest position')
-    call add(11, 'm/s', 'largest velocity towards the upper barrier')
-    call add(12, 's', 'time from the start to capture by the attractor')
-    call add(13, 'm', 'smallest distance to a barrier at a turning point that missed it')
-
-  contains
-
-    subroutine add(number, units, long_name)
-      integer, intent(in) :: number
-      character(len=*), intent(in) :: units, long_name
-      call schema%add_variable(prefix//trim(map_variables(number)), type_float32, dimensions, units=units, &
-                               long_name=long_name, tiled=.true.)
-    end subroutine add
-
+    call add_columns(schema, prefix, dimensions, size(point_table))
   end subroutine add_map_variables
 
-  !> The first variables, by which points are told apart.
-  subroutine add_marks(schema, prefix, dimensions)
+  !> The first `count` columns of points.
+  subroutine add_columns(schema, prefix, dimensions, count)
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: prefix, dimensions(:)
-    call add_regime(schema, prefix//'regime', dimensions, .true.)
-    call add(2, type_int32, 'label of the attractor in the catalogue, 0 = none')
-    call add_reason(schema, prefix//'reason', dimensions, .true.)
-    call add(4, type_int16, 'period in drive periods, 0 = not periodic')
-    call add(5, type_int64, 'events of one period of the motion, three bits each')
-
-  contains
-
-    subroutine add(number, type, long_name)
-      integer, intent(in) :: number, type
-      character(len=*), intent(in) :: long_name
-      call schema%add_variable(prefix//trim(map_variables(number)), type, dimensions, units=coded_unit, &
-                               long_name=long_name, tiled=.true.)
-    end subroutine add
-
-  end subroutine add_marks
+    integer, intent(in) :: count
+    integer :: k
+    do k = 1, count
+      associate (column => point_table(k))
+        select case (column%name)
+        case ('regime')
+          call add_regime(schema, prefix//'regime', dimensions, .true.)
+        case ('reason')
+          call add_reason(schema, prefix//'reason', dimensions, .true.)
+        case default
+          call schema%add_variable(prefix//trim(column%name), type_named(column%type), dimensions, units=trim(column%unit), &
+                                   long_name=trim(column%meaning), tiled=.true.)
+        end select
+      end associate
+    end do
+  end subroutine add_columns
 
   !> The variables of a refined map's points: those that all points of a cell share, and where they come from.
   subroutine add_refined_variables(schema, dimensions)
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: dimensions(:)
     integer :: i
-    call add_marks(schema, '', dimensions)
+    call add_columns(schema, '', dimensions, marks_of_attractor)
     call schema%add_variable('origin', type_int8, dimensions, units=coded_unit, &
       long_name='whether the point was computed, or inferred from the corners of a cell of at most so many points', &
       flag_values=[(i, i=0, last_origin)], flag_meanings=join(origin_names, ' '), tiled=.true.)

@@ -6,7 +6,7 @@ module sweep_driver
   use attractors, only: longest_period
   use axis, only: axis_t, linear_values
   use basin_driver, only: bytes_per_point
-  use basin, only: basin_points, basin_variables, catalogue_t, points_at_a_time, slice_cache_t
+  use basin, only: basin_points, catalogue_t, points_at_a_time, slice_cache_t
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
@@ -21,6 +21,7 @@ module sweep_driver
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
+  use point_columns, only: point_values
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, last_reason, reason_settled, reason_time_over
   use strobe, only: strobe_t
@@ -173,7 +174,7 @@ contains
     type(session_t), intent(in) :: session
     type(branch_work_t), intent(inout) :: work
     associate (sweep => session%the_case%sweep)
-      work%variables = basin_variables
+      work%variables = point_values
       work%grid = grid_of(session%the_case, sweep_axes(session%the_case))
       work%span = span_of(session%the_case)
       work%max_period = session%the_case%attractors%max_period

@@ -7,13 +7,12 @@ module verify_driver
   use angle_units, only: unit_of
   use attractors, only: regime_names
   use axis, only: axis_t
-  use basin, only: basin_points, basin_variables, catalogue_t, slice_cache_t
+  use basin, only: basin_points, catalogue_t, slice_cache_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of, options_of, span_of
   use case_type, only: case_t
   use command_line, only: command_t
   use errors, only: error_t, fail
-  use file_layout, only: map_variables
   use grid, only: grid_t, point_laws, point_slice, point_start, slice_laws
   use info_driver, only: count_codes
   use journal, only: journal_t, json_text
@@ -22,6 +21,7 @@ module verify_driver
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
+  use point_columns, only: point_table, point_values
   use point_list, only: point_list_t
   use points_driver, only: open_list_journey, read_further
   use random, only: uniform
@@ -146,7 +146,7 @@ contains
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
-    real(wp) :: values(1, basin_variables)
+    real(wp) :: values(1, point_values)
     integer, allocatable :: index(:)
     integer(int64), allocatable :: lengths(:), place(:)
     integer(int64) :: points
@@ -236,9 +236,9 @@ contains
       inferred = nint(stored(1)) > origin_contradicted
       if (inferred) audit%inferred = audit%inferred + 1
     end if
-    do k = 1, size(map_variables)
-      if (.not. reader%has('/'//prefix//trim(map_variables(k)))) cycle
-      call reader%read_block('/'//prefix//trim(map_variables(k)), place, spread(1_int64, 1, size(place)), stored, error)
+    do k = 1, size(point_table)
+      if (.not. reader%has('/'//prefix//trim(point_table(k)%name))) cycle
+      call reader%read_block('/'//prefix//trim(point_table(k)%name), place, spread(1_int64, 1, size(place)), stored, error)
       if (allocated(error)) return
       if (k <= 5) same = nint(stored(1), int64) == nint(values(k), int64)
       if (k > 5) same = real(stored(1), real32) == real(values(k), real32) &
@@ -249,7 +249,7 @@ contains
         return
       end if
       audit%differing = audit%differing + 1
-      if (audit%differing == 1) audit%first_difference = trim(map_variables(k))//' at '//place_text(place)//': the file has '// &
+      if (audit%differing == 1) audit%first_difference = trim(point_table(k)%name)//' at '//place_text(place)//': the file has '// &
         to_text(stored(1))//', rerun gives '//to_text(values(k))
       return
     end do

@@ -8,7 +8,7 @@ module value_types
   implicit none
   private
 
-  public :: bytes_of, to_bytes, from_bytes, is_float
+  public :: type_named, bytes_of, to_bytes, from_bytes, is_float
 
   integer, parameter, public :: type_int8 = 1, type_int16 = 2, type_int32 = 3, type_int64 = 4, &
     type_uint32 = 5, type_float32 = 6, type_float64 = 7, type_string = 8
@@ -20,6 +20,12 @@ module value_types
   integer, parameter :: sizes(8) = [1, 2, 4, 8, 4, 4, 8, 0]
 
 contains
+
+  !> The type of this name; 0 if there is none.
+  pure integer function type_named(name)
+    character(len=*), intent(in) :: name
+    type_named = findloc(type_names == name, .true., 1)
+  end function type_named
 
   !> Bytes of one value; 0 for strings.
   pure integer function bytes_of(type)

@@ -3,7 +3,8 @@
 
 !> Dry and viscous friction. While sliding in direction s = +1 or -1 the force on the body is
 !>   -s (K + E exp(-|v/v_s|^delta)) - b v,
-!> at rest it is whatever holds the body, up to the break-away force. Nothing is smoothed.
+!> or, where it fades, -s (K + (F - K)/(1 + |v|/v_f)) - b v with the break-away force F; at rest it is whatever holds the body, up
+!> to the break-away force. Nothing is smoothed.
 module friction_law
   use elementary, only: exponential, logarithm
   use kinds, only: wp
@@ -11,7 +12,8 @@ module friction_law
   implicit none
   private
 
-  public :: friction_of, add_to_friction, sliding_friction, sliding_slope, stribeck_excess, power
+  public :: friction_of, friction_of_part, add_to_friction, sliding_friction, sliding_slope, stribeck_excess, power, falls, &
+    same_shape
 
   !> Exponent at which the Stribeck excess is below the rounding of the sliding friction.
   real(wp), parameter :: negligible_exponent = -log(0.01_wp*epsilon(1.0_wp))
@@ -32,6 +34,8 @@ module friction_law
     real(wp) :: layer_speed = 0
     !> The same of a second excess, where an effect adds one to a law that has one.
     real(wp) :: second_excess = 0, second_velocity = 1, second_exponent = 1
+    !> v_f [m/s]; 0: it does not fade.
+    real(wp) :: fading_speed = 0
   end type friction_t
 
 contains
@@ -59,6 +63,38 @@ contains
       if (law%excess > 0) law%layer_speed = edge_of_layer(law%stribeck_velocity, law%stribeck_exponent)
     end select
   end function friction_of
+
+  !> The law that a part of a machine of several bodies names: forces, no normal force. A static force below that of sliding is
+  !> as given.
+  pure function friction_of_part(choice) result(law)
+    type(law_choice_t), intent(in) :: choice
+    type(friction_t) :: law
+    law%kinetic = value_of(choice, 'force')
+    law%break_away = value_of(choice, 'static_force')
+    if (law%break_away < 0) law%break_away = law%kinetic
+    select case (choice%name)
+    case ('friction:coulomb_viscous')
+      law%damping = value_of(choice, 'damping')
+    case ('friction:coulomb_stribeck')
+      law%excess = law%break_away - law%kinetic
+      law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
+      law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+    case ('friction:coulomb_hyperbolic')
+      if (law%break_away > law%kinetic) law%fading_speed = value_of(choice, 'fading_velocity')
+    end select
+  end function friction_of_part
+
+  !> Whether sliding friction depends on the speed other than linearly.
+  pure elemental logical function falls(law)
+    type(friction_t), intent(in) :: law
+    falls = law%excess > 0 .or. law%fading_speed > 0
+  end function falls
+
+  !> Whether the forces of two laws add up to one law of their kind.
+  pure logical function same_shape(a, b)
+    type(friction_t), intent(in) :: a, b
+    same_shape = .not. (falls(a) .or. falls(b))
+  end function same_shape
 
   !> Adds the effect of a choice of the family `effect`, if it is one of those that are friction like the law's own.
   pure subroutine add_to_friction(law, choice)
@@ -100,6 +136,8 @@ contains
     type(friction_t), intent(in) :: law
     real(wp), intent(in) :: v, direction
     sliding_friction = -direction*(law%kinetic + stribeck_excess(law, direction*v)) - law%damping*v
+    if (law%fading_speed > 0) sliding_friction = sliding_friction &
+      - direction*(law%break_away - law%kinetic)/(1 + max(direction*v, -law%fading_speed/2)/law%fading_speed)
   end function sliding_friction
 
   !> E exp(-(v/v_s)^delta) [N] at the sliding speed `speed` [m/s]; smooth continuation below zero.
@@ -123,6 +161,8 @@ contains
     type(friction_t), intent(in) :: law
     real(wp), intent(in) :: v, direction
     slope = -law%damping
+    if (law%fading_speed > 0) slope = slope + (law%break_away - law%kinetic)/ &
+      (law%fading_speed*(1 + max(direction*v, -law%fading_speed/2)/law%fading_speed)**2)
     if (.not. law%excess > 0) return
     slope = slope + law%excess*falloff(direction*v/law%stribeck_velocity, law%stribeck_exponent)/law%stribeck_velocity
     if (law%second_excess > 0) slope = slope &

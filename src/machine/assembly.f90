@@ -7,6 +7,7 @@ module assembly
   use constants, only: two_pi
   use eigen, only: symmetric_eigen, undamped_modes
   use errors, only: error_t, fail
+  use friction_law, only: same_shape
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, most_degrees, most_joints, &
     name_length, wave_t
   use jointed_state, only: is_curved
@@ -307,8 +308,7 @@ contains
     if (alike) alike = same(sum(abs(a%row - b%row))) .or. same(sum(abs(a%row + b%row)))
     if (alike) alike = same(a%offset%rate) .and. same(b%offset%rate) .and. .not. allocated(a%offset%harmonic) .and. &
                        .not. allocated(b%offset%harmonic)
-    if (alike) alike = same(a%friction%excess) .and. same(b%friction%excess) .and. same(a%fading_speed) .and. &
-                       same(b%fading_speed)
+    if (alike) alike = same_shape(a%friction, b%friction)
   end function alike
 
   pure logical function same(difference)

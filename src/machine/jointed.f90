@@ -41,8 +41,6 @@ module jointed
     type(wave_t) :: offset
     !> Friction, of the slider too.
     type(friction_t) :: friction
-    !> Friction falls with the sliding speed: kinetic + excess/(1 + |u|/speed); 0 = it does not.
-    real(wp) :: fading_speed = 0
     !> Contact, stops excepted.
     type(contact_t) :: contact
     !> Stops of a contact [m], huge means none.

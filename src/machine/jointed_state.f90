@@ -5,7 +5,7 @@
 module jointed_state
   use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
-  use friction_law, only: sliding_friction, sliding_slope
+  use friction_law, only: falls, sliding_friction, sliding_slope
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
     most_degrees, most_joints, wave_value
   use kinds, only: wp
@@ -83,7 +83,7 @@ contains
     is_curved = .false.
     select case (joint%kind)
     case (joint_friction)
-      is_curved = phase /= 0 .and. (joint%friction%excess > 0 .or. joint%fading_speed > 0)
+      is_curved = phase /= 0 .and. falls(joint%friction)
     case (joint_soft)
       is_curved = abs(phase) == 1 .and. joint%contact%kind /= contact_kelvin_voigt
     case (joint_spring)
@@ -129,16 +129,16 @@ contains
     case (joint_friction)
       if (phase == 0) return
       direction = phase
-      force = sliding(joint, u, direction)
-      if (present(by_speed)) by_speed = slope_of_sliding(joint, u, direction)
+      force = sliding_friction(joint%friction, u, direction)
+      if (present(by_speed)) by_speed = sliding_slope(joint%friction, u, direction)
     case (joint_elastic)
       if (phase == 0) then
         force = -joint%stiffness*(s - slider)
         if (present(by_place)) by_place = -joint%stiffness
       else
         direction = phase
-        force = sliding(joint, u, direction)
-        if (present(by_speed)) by_speed = slope_of_sliding(joint, u, direction)
+        force = sliding_friction(joint%friction, u, direction)
+        if (present(by_speed)) by_speed = sliding_slope(joint%friction, u, direction)
       end if
     case (joint_soft)
       if (abs(phase) /= 1) return
@@ -170,27 +170,6 @@ contains
     by_place = -slopes(1)
     by_speed = -slopes(2)
   end subroutine press
-
-  !> Force of sliding in a direction, continued smoothly to the other one.
-  pure real(wp) function sliding(joint, u, direction)
-    type(joint_t), intent(in) :: joint
-    real(wp), intent(in) :: u, direction
-    sliding = sliding_friction(joint%friction, u, direction)
-    if (joint%fading_speed > 0) then
-      ! Of the fading law, `excess` is outside of the friction law's own.
-      sliding = sliding - direction*(joint%friction%break_away - joint%friction%kinetic)/ &
-                (1 + max(direction*u, -joint%fading_speed/2)/joint%fading_speed)
-    end if
-  end function sliding
-
-  !> Derivative of the force of sliding by the speed.
-  pure real(wp) function slope_of_sliding(joint, u, direction) result(slope)
-    type(joint_t), intent(in) :: joint
-    real(wp), intent(in) :: u, direction
-    slope = sliding_slope(joint%friction, u, direction)
-    if (joint%fading_speed > 0) slope = slope + (joint%friction%break_away - joint%friction%kinetic)/ &
-      (joint%fading_speed*(1 + max(direction*u, -joint%fading_speed/2)/joint%fading_speed)**2)
-  end function slope_of_sliding
 
   !> Energy that a joint holds as a spring [J]: that of elastic friction and of soft contacts, too.
   pure real(wp) function joint_energy(joint, phase, slider, s) result(energy)

@@ -12,21 +12,16 @@ module basin
   use lane_preparation, only: prepare_lanes
   use motion, only: motion_t
   use pair, only: is_pair
+  use point_columns, only: outcome_values
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
   use trajectories, only: block_size, describe_all, journey_t, run_trajectories
   use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
-  use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: open_slice, open_journey, points_at_a_time, search_starts, label_slices, basin_points, outcome_values
-
-  !> Values of a point, in the order of the file.
-  integer, parameter, public :: basin_variables = 13
-  !> The first of them are the same wherever an attractor captures; where the settling time is.
-  integer, parameter, public :: marks_of_attractor = 5, settling_value = 12
+  public :: open_slice, open_journey, points_at_a_time, search_starts, label_slices, basin_points
 
   !> The attractors of one slice.
   type, public :: catalogue_t
@@ -218,20 +213,5 @@ contains
       values(members(i), :) = outcome_values(outcome)
     end do
   end subroutine lone_points
-
-  !> An outcome in the order of the file: regime, attractor, reason, period, event word, impacts per period, mean
-  !> impact speed, amplitude, x_max, x_min, v_max, settle time (not a number: not captured), grazing margin (infinite:
-  !> no barrier was missed).
-  pure function outcome_values(outcome) result(values)
-    type(outcome_t), intent(in) :: outcome
-    real(wp) :: values(basin_variables)
-    associate (f => outcome%features)
-      values = [real(f%regime, wp), real(outcome%attractor, wp), real(outcome%reason, wp), &
-                real(outcome%period, wp), real(f%word, wp), f%impacts_per_period, f%mean_impact_speed, &
-                f%amplitude, f%x_max, f%x_min, f%v_max, outcome%settle_time, f%grazing_margin]
-      if (outcome%settle_time < 0) values(12) = ieee_value(1.0_wp, ieee_quiet_nan)
-      if (.not. f%grazing_margin < huge(1.0_wp)) values(13) = ieee_value(1.0_wp, ieee_positive_inf)
-    end associate
-  end function outcome_values
 
 end module basin

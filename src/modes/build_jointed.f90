@@ -7,6 +7,7 @@ module build_jointed
   use contact_law, only: contact_of
   use elementary, only: sine_cosine
   use errors, only: error_t, fail
+  use friction_law, only: friction_of_part
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
     together_newton, together_sequence, wave_t
   use kinds, only: real64, wp
@@ -194,32 +195,19 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(joint_t) :: joint
     type(wave_t) :: belt
-    real(wp) :: static
     joint%name = path_of(choice)
     joint%kind = joint_friction
     joint%row = row
-    joint%friction%kinetic = value_of(choice, 'force')
-    static = value_of(choice, 'static_force')
-    if (static < 0) static = joint%friction%kinetic
-    if (static < joint%friction%kinetic) then
-      call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(static)//' N, allowed at least the '// &
-                'force '//number(joint%friction%kinetic)//' N')
+    joint%friction = friction_of_part(choice)
+    if (joint%friction%break_away < joint%friction%kinetic) then
+      call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(joint%friction%break_away)// &
+                ' N, allowed at least the force '//number(joint%friction%kinetic)//' N')
       return
     end if
-    joint%friction%break_away = static
-    select case (choice%name)
-    case ('friction:elastic_coulomb')
+    if (choice%name == 'friction:elastic_coulomb') then
       joint%kind = joint_elastic
       joint%stiffness = value_of(choice, 'stiffness')
-    case ('friction:coulomb_viscous')
-      joint%friction%damping = value_of(choice, 'damping')
-    case ('friction:coulomb_stribeck')
-      joint%friction%excess = static - joint%friction%kinetic
-      joint%friction%stribeck_velocity = value_of(choice, 'stribeck_velocity')
-      joint%friction%stribeck_exponent = value_of(choice, 'stribeck_exponent')
-    case ('friction:coulomb_hyperbolic')
-      if (static > joint%friction%kinetic) joint%fading_speed = value_of(choice, 'fading_velocity')
-    end select
+    end if
     belt%mean = value_of(choice, 'velocity')
     call move_surface(joint, machine%frequency, belt)
     call add_joint(machine, joint)

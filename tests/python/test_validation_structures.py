@@ -16,10 +16,10 @@ def rows(source_dir):
     sys.path.remove(str(source_dir / "scripts"))
 
 
-@pytest.mark.parametrize("name", ["nonsmooth_modes", "others"])
-def test_numbers_agree(rows, separatrix, build_dir, tmp_path, name):
+@pytest.mark.parametrize(("name", "count"), [("nonsmooth_modes", 3), ("others", 3), ("ball", 5)])
+def test_numbers_agree(rows, separatrix, build_dir, tmp_path, name, count):
     found = getattr(rows, name)(rows.Program(build_dir, tmp_path))
-    assert len(found) == 3
+    assert len(found) == count
     assert [number for number in found if number.verdict != "agrees"] == []
 
 

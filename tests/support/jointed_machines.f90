@@ -98,7 +98,7 @@ contains
     joint%row = row(machine, first, second)
     joint%friction%kinetic = kinetic
     joint%friction%break_away = static
-    if (present(fading)) joint%fading_speed = fading
+    if (present(fading)) joint%friction%fading_speed = fading
     if (present(belt)) wave%mean = belt
     call move_surface(joint, machine%frequency, wave)
     call add_joint(machine, joint)

@@ -1,0 +1,215 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The commands and their options: one row each. Parsing, refusals and the texts of `--help` take them from here.
+module command_table
+  use text, only: join
+  implicit none
+  private
+
+  public :: help_text, belonging_to, option_number
+
+  character(len=*), parameter :: nl = new_line('a')
+
+  type :: command_row_t
+    character(len=10) :: name
+    !> What stands behind the name, and what it does, in a line.
+    character(len=9) :: reads
+    character(len=110) :: summary
+    !> All that `--help` tells of it; whether the options of all commands follow.
+    character(len=700) :: help
+    logical :: common
+  end type command_row_t
+
+  type(command_row_t), parameter :: rows(11) = [ &
+    command_row_t('basin', 'CASE', &
+      'where every point of a grid of starts or parameters ends up', &
+      'separatrix basin CASE [-o FILE]: where every point of a grid ends up'//nl// &
+      '  The grid is the [[axis]] tables of the case: two or more of x0, v0, crank_angle, drive.ratio or any'//nl// &
+      '  other parameter. Run it with mpirun to share the work.'//nl, .true.), &
+    command_row_t('sweep', 'CASE', &
+      'amplitude-frequency and bifurcation diagram, run up, run down and from many starts', &
+      'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
+      '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
+      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl, .true.), &
+    command_row_t('branches', 'CASE', &
+      'periodic orbits over a parameter, stable and unstable, with their bifurcations', &
+      'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
+      '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
+      '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
+      '  --searches N       values at which orbits are searched (default 12)'//nl, .true.), &
+    command_row_t('boundary', 'MAP', &
+      'the boundaries between the basins of a map, as curves', &
+      'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
+      '  Every edge between neighbours of different attractors is halved until its boundary point is known to 1e-10'//nl// &
+      '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
+      '  takes a small part of the time of the map. The pieces are named by what they lead to, and the stable and'//nl// &
+      '  unstable sets of the saddles are grown (one body).'//nl// &
+      '  --grow F           grows these sets within F times the window of the map (default 1; 0: not at all)'//nl, .true.), &
+    command_row_t('stability', 'CASE', &
+      'Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic', &
+      'separatrix stability CASE|MAP [--periods N]: Lyapunov exponents and the kind of a motion'//nl// &
+      '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
+      '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period (chaotic, quasi-periodic,'//nl// &
+      '  long transient, period above the limit, not known). One body. Writes no file.'//nl// &
+      '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl, .true.), &
+    command_row_t('trajectory', 'CASE', &
+      'one motion with all its events', &
+      'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
+      '  --csv FILE      also write the events as a table'//nl// &
+      '  --record FILE   also write the position as the sensor of the table [record] would measure it'//nl, .true.), &
+    command_row_t('points', 'CASE', &
+      'a list of starts', &
+      'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
+      '  --list FILE     table with the columns x0,v0, optionally ratio and starts of further bodies (body.NAME.x0);'//nl// &
+      '                  replaces the grid of the case'//nl// &
+      '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl, .true.), &
+    command_row_t('merge', 'OUT SHARD', &
+      'one file from the shares of a map', &
+      'separatrix merge OUT SHARD...: one result file from the files that --shard I/N has written'//nl// &
+      '  The shards must be all of one case: N files, each share once. They are kept.'//nl// &
+      '  --csv FILE      of a list of starts also the table that points --csv writes'//nl// &
+      '  --force         replaces an existing OUT'//nl// &
+      '  --json, --quiet, --log FILE  as for the other commands'//nl, .false.), &
+    command_row_t('laws', '', &
+      'every law with parameters, units, bounds and source', &
+      'separatrix laws [--json]: every law with parameters, units, bounds and source'//nl, .false.), &
+    command_row_t('info', 'FILE', &
+      'what a file holds', &
+      'separatrix info FILE [--json]: what a file holds, with shares of regimes and attractors'//nl, .false.), &
+    command_row_t('verify', 'FILE', &
+      'checks a file and reruns a sample of it at higher precision', &
+      'separatrix verify FILE [--sample N] [--seed N] [--max-changes P] [--json]: checks a file'//nl// &
+      '  Reads everything back, checks sums and invariants, and reruns a random sample of the points in double'//nl// &
+      '  precision (must agree to the bit) and in quadruple precision (label flips, largest deviation).'//nl// &
+      '  Ends with code 77 if more labels would change than are allowed.'//nl// &
+      '  --sample N      points rerun (default 200)'//nl// &
+      '  --seed N        seed that chooses them (default 1)'//nl// &
+      '  --max-changes P per cent of the labels rerun that may change (default 1)'//nl, .false.)]
+
+  character(len=*), parameter, public :: commands(size(rows)) = rows%name
+
+  type, public :: option_row_t
+    character(len=16) :: name
+    character(len=2) :: short
+    logical :: takes_value
+    !> The commands that it belongs to; none are named of one that belongs to all.
+    character(len=80) :: commands
+    !> Its lines in the list of options; '' where its command tells of it.
+    character(len=130) :: help
+  end type option_row_t
+
+  type(option_row_t), parameter, public :: options(31) = [ &
+    option_row_t('--output', '-o', .true., '', &
+      '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'), &
+    option_row_t('--set', '', .true., 'basin sweep branches stability trajectory points', &
+      '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'), &
+    option_row_t('--validate', '', .false., '', &
+      '  --validate         checks the case and stops'), &
+    option_row_t('--draw', '', .true., 'basin sweep branches stability trajectory points', &
+      '  --draw FILE.svg    draws the machine as it was understood and stops'), &
+    option_row_t('--dry-run', '', .false., '', &
+      '  --dry-run          says what would be done: points, tiles, bytes, estimated time'), &
+    option_row_t('--force', '', .false., '', &
+      '  --force            replaces an existing output'), &
+    option_row_t('--resume', '', .false., 'basin sweep points', &
+      '  --resume           goes on with a run that was stopped or killed, begins one if there is none'), &
+    option_row_t('--shard', '', .true., 'basin points', &
+      '  --shard I/N        basin, points: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'), &
+    option_row_t('--catalogue', '', .true., 'basin', &
+      '  --catalogue FILE   basin: takes the attractors from a share of the same map instead of searching them'), &
+    option_row_t('--search-only', '', .false., 'basin', &
+      '  --search-only      basin --shard: only makes the file of the share, from which all can take the attractors'), &
+    option_row_t('--time-limit', '', .true., 'basin sweep points', &
+      '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'), &
+    option_row_t('--ranks-per-node', '', .true., '', &
+      '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'), &
+    option_row_t('--tile-times', '', .true., 'basin sweep points', &
+      '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'), &
+    option_row_t('--progress', '', .true., '', &
+      '  --progress S       progress every S seconds (default: in a log after 10 s, then ever less often)'), &
+    option_row_t('--json', '', .false., '', &
+      '  --json             log as JSON lines'), &
+    option_row_t('--log', '', .true., 'basin sweep branches boundary stability trajectory points merge', &
+      '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'), &
+    option_row_t('--quiet', '-q', .false., '', &
+      '  -q, --quiet        errors only'), &
+    option_row_t('--version', '', .false., '', &
+      '  --version          version, commit, compilers, MPI, HDF5 and flags'), &
+    option_row_t('--list', '', .true., 'points', &
+      ''), &
+    option_row_t('--csv', '', .true., 'points trajectory merge', &
+      ''), &
+    option_row_t('--record', '', .true., 'trajectory', &
+      ''), &
+    option_row_t('--parameter', '', .true., 'branches', &
+      ''), &
+    option_row_t('--from', '', .true., 'branches', &
+      ''), &
+    option_row_t('--to', '', .true., 'branches', &
+      ''), &
+    option_row_t('--searches', '', .true., 'branches', &
+      ''), &
+    option_row_t('--grow', '', .true., 'boundary', &
+      ''), &
+    option_row_t('--periods', '', .true., 'stability', &
+      ''), &
+    option_row_t('--sample', '', .true., 'verify', &
+      ''), &
+    option_row_t('--seed', '', .true., 'verify', &
+      ''), &
+    option_row_t('--max-changes', '', .true., 'verify', &
+      ''), &
+    option_row_t('--help', '-h', .false., '', &
+      '')]
+
+contains
+
+  !> Number of the option of this name, long or short; 0 if there is none.
+  pure integer function option_number(name) result(number)
+    character(len=*), intent(in) :: name
+    number = findloc(options%name == name .or. (options%short == name .and. len_trim(options%short) > 0), .true., 1)
+  end function option_number
+
+  !> 'the command basin', 'the commands basin, points': what an option belongs to; '' if it belongs to `command`.
+  pure function belonging_to(option, command) result(words)
+    type(option_row_t), intent(in) :: option
+    character(len=*), intent(in) :: command
+    character(len=:), allocatable :: words
+    logical :: among(size(commands))
+    integer :: k
+    words = ''
+    if (len_trim(option%commands) == 0) return
+    among = [(index(' '//trim(option%commands)//' ', ' '//trim(commands(k))//' ') > 0, k=1, size(commands))]
+    if (any(among .and. commands == command)) return
+    words = 'the command'//trim(merge('s', ' ', count(among) > 1))//' '//join(pack(commands, among), ', ')
+  end function belonging_to
+
+  !> The text of `--help`, of one command or, with '', of the program.
+  pure function help_text(command) result(lines)
+    character(len=*), intent(in) :: command
+    character(len=:), allocatable :: lines
+    character(len=16) :: called
+    integer :: k
+    k = findloc(commands == command, .true., 1)
+    if (k > 0) then
+      lines = trim(rows(k)%help)
+      if (.not. rows(k)%common) return
+    else
+      lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl
+      do k = 1, size(rows)
+        called = trim(rows(k)%name)//' '//rows(k)%reads
+        lines = lines//'  '//called//' '//trim(rows(k)%summary)//nl
+      end do
+      lines = lines//nl//'separatrix COMMAND --help tells more. CASE is a TOML file, see docs/case-file.md.'//nl
+    end if
+    lines = lines//nl//'Options:'//nl
+    do k = 1, size(options)
+      if (len_trim(options(k)%help) > 0) lines = lines//trim(options(k)%help)//nl
+    end do
+    lines = lines//nl// &
+      'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &
+      '75 stopped early and resumable, 76 file belongs to another case, 77 too many labels would change.'//nl
+  end function help_text
+
+end module command_table

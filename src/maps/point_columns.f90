@@ -1,0 +1,60 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What is told of each point of a map, in one table: name, type and unit in a file, meaning, and value. Files, verification, the
+!> C interface and the merging of shares take it from here.
+module point_columns
+  use kinds, only: wp
+  use trajectory, only: outcome_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  public :: outcome_values
+
+  type, public :: point_column_t
+    character(len=18) :: name
+    !> As HDF5 files and numpy call it.
+    character(len=7) :: type
+    character(len=3) :: unit
+    character(len=80) :: meaning
+  end type point_column_t
+
+  !> The first are the same wherever an attractor captures; `regime` and `reason` are codes. A new one goes to the end.
+  type(point_column_t), parameter, public :: point_table(13) = [ &
+    point_column_t('regime', 'int8', '1', 'regime of the motion'), &
+    point_column_t('attractor', 'int32', '1', 'label of the attractor in the catalogue, 0 = none'), &
+    point_column_t('reason', 'int8', '1', 'why the trajectory ended'), &
+    point_column_t('period', 'int16', '1', 'period in drive periods, 0 = not periodic'), &
+    point_column_t('event_word', 'int64', '1', 'events of one period of the motion, three bits each'), &
+    point_column_t('impacts_per_period', 'float32', '1', 'impacts per drive period'), &
+    point_column_t('mean_impact_speed', 'float32', 'm/s', 'mean speed just before impact'), &
+    point_column_t('amplitude', 'float32', 'm', 'half the range of the position'), &
+    point_column_t('x_max', 'float32', 'm', 'largest position'), &
+    point_column_t('x_min', 'float32', 'm', 'smallest position'), &
+    point_column_t('v_max', 'float32', 'm/s', 'largest velocity towards the upper barrier'), &
+    point_column_t('settle_time', 'float32', 's', 'time from the start to capture by the attractor'), &
+    point_column_t('grazing_margin', 'float32', 'm', 'smallest distance to a barrier at a turning point that missed it')]
+
+  !> How many there are; how many of them are marks of the attractor, by which points are told apart; where the settling time is.
+  integer, parameter, public :: point_values = size(point_table), marks_of_attractor = 5, settling_value = 12
+
+contains
+
+  !> The values of a point, in the order of the table: settling time not a number where it was not captured, grazing margin
+  !> infinite where no barrier was missed.
+  pure function outcome_values(outcome) result(values)
+    type(outcome_t), intent(in) :: outcome
+    real(wp) :: values(point_values), settled, margin
+    associate (f => outcome%features)
+      settled = outcome%settle_time
+      if (settled < 0) settled = ieee_value(1.0_wp, ieee_quiet_nan)
+      margin = f%grazing_margin
+      if (.not. margin < huge(1.0_wp)) margin = ieee_value(1.0_wp, ieee_positive_inf)
+      values = [real(f%regime, wp), real(outcome%attractor, wp), real(outcome%reason, wp), real(outcome%period, wp), &
+                real(f%word, wp), f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
+                settled, margin]
+    end associate
+  end function outcome_values
+
+end module point_columns
