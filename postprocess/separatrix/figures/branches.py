@@ -5,6 +5,7 @@
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -63,22 +64,23 @@ def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
     up = (result["x_max"].values - result["x_min"].values) / 2
     stable, branch = result["stable"].values == 1, result["branch"].values
     labels = decode_flags(result["label"]).values
-    for chosen, look in ((stable, "-"), (~stable, "--")):
+    for look in ("-", "--"):
         # A piece between two points is stable where both are.
         joined = (branch[1:] == branch[:-1]) & (
             stable[1:] & stable[:-1] if look == "-" else ~(stable[1:] & stable[:-1])
         )
-        x = np.where(joined, across[:-1], np.nan), np.where(joined, across[1:], np.nan)
-        y = np.where(joined, up[:-1], np.nan), np.where(joined, up[1:], np.nan)
-        gap = np.full(joined.size, np.nan)
-        if chosen.any():
-            ax.plot(
-                np.column_stack([*x, gap]).ravel(),
-                np.column_stack([*y, gap]).ravel(),
-                look,
-                color="black" if look == "-" else "0.45",
-                linewidth=1.2 if look == "-" else 0.9,
+        # Whole curves: a dash is longer than a piece.
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], joined.astype(int), [0]]))).reshape(-1, 2)
+        lines = [np.column_stack([across[first : last + 1], up[first : last + 1]]) for first, last in ends]
+        ax.add_collection(
+            LineCollection(
+                lines,
+                colors="black" if look == "-" else "0.45",
+                linestyles=look,
+                linewidths=1.2 if look == "-" else 0.9,
             )
+        )
+    ax.autoscale_view()
     handles = [
         Line2D([], [], color="black", linestyle="-", label="stable"),
         Line2D([], [], color="0.45", linestyle="--", label="unstable"),
