@@ -37,6 +37,12 @@ def survival(
 ) -> xr.Dataset:
     """Return the share of motions that random blows have not taken out of their basin, over the time.
 
+    A motion has left when the state right after a blow lies in another basin, or its label is not known
+    (`not_known` counts these). `survival` is the share that has not left, with its 95 % interval;
+    `law` is exp(-rate p t) of rare blows, which find the machine settled again: `p` is the probability that
+    one blow at a random crank angle leaves the basin, from `motions` blows of its own. Where the two differ,
+    blows meet motions that have not settled.
+
     Parameters
     ----------
     result, attractor, slice
@@ -51,12 +57,6 @@ def survival(
         How many motions are struck, all from the attractor at random crank angles.
     seed, threads
         What is drawn depends on the seed; the result does not depend on `threads`.
-
-    A motion has left when the state right after a blow lies in another basin, or its label is not known
-    (`not_known` counts these). `survival` is the share that has not left, with its 95 % interval;
-    `law` is exp(-rate p t) of rare blows, which find the machine settled again: `p` is the probability that
-    one blow at a random crank angle leaves the basin, from `motions` blows of its own. Where the two differ,
-    blows meet motions that have not settled.
     """
     if not (rate > 0 and deviation > 0 and motions >= 10):
         raise SeparatrixError("survival: allowed are rate > 0, deviation > 0 and motions from 10", USAGE)
