@@ -49,6 +49,10 @@ module command_line
     real(wp) :: from = 0, to = 0
     logical :: has_from = .false., has_to = .false.
     integer :: searches = 12
+    !> A second parameter, over which its labels are followed, and its range.
+    character(len=:), allocatable :: free
+    real(wp) :: free_from = 0, free_to = 0
+    logical :: has_free_from = .false., has_free_to = .false.
     !> `stability`: drive periods that are watched.
     integer :: periods = 20000
     !> `verify`: points rerun, and the seed that chooses them.
@@ -71,6 +75,7 @@ contains
     command%output = ''
     command%list = ''
     command%parameter = ''
+    command%free = ''
     command%csv = ''
     command%record = ''
     command%tile_times = ''
@@ -135,6 +140,10 @@ contains
       call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
     else if (command%name /= 'branches' .and. (len(command%parameter) > 0 .or. command%has_from .or. command%has_to)) then
       call fail(error, exit_usage, '--parameter, --from and --to belong to the command branches')
+    else if (command%name /= 'branches' .and. len(command%free) > 0) then
+      call fail(error, exit_usage, '--free belongs to the command branches')
+    else if (len(command%free) == 0 .and. (command%has_free_from .or. command%has_free_to)) then
+      call fail(error, exit_usage, '--free-from and --free-to are the range of --free NAME, which is missing')
     else if (command%name /= 'points' .and. len(command%list) > 0) then
       call fail(error, exit_usage, '--list belongs to the command points')
     else if (len(command%csv) > 0 .and. .not. any(command%name == tabulated)) then
@@ -218,7 +227,7 @@ contains
     case ('-q', '--quiet')
       command%quiet = .true.
     case ('-o', '--output', '--set', '--list', '--csv', '--record', '--log', '--tile-times', '--shard', '--catalogue', &
-          '--draw', '--parameter', '--from', '--to', '--searches', '--periods', &
+          '--draw', '--parameter', '--from', '--to', '--searches', '--free', '--free-from', '--free-to', '--periods', &
           '--time-limit', '--progress', '--ranks-per-node', '--sample', '--seed', '--max-changes')
       if (equals > 0 .and. starts_with(argument, '--')) then
         value = argument(equals + 1:)
@@ -269,6 +278,14 @@ contains
     case ('--to')
       command%has_to = .true.
       call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
+    case ('--free')
+      command%free = value
+    case ('--free-from')
+      command%has_free_from = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the second parameter', command%free_from, error)
+    case ('--free-to')
+      command%has_free_to = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the second parameter', command%free_to, error)
     case ('--searches')
       call read_integer(name, value, 1, command%searches, error)
     case ('--periods')
@@ -376,7 +393,9 @@ contains
       lines = 'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
         '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
         '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
-        '  --searches N       values at which orbits are searched (default 12)'//nl
+        '  --searches N       values at which orbits are searched (default 12)'//nl// &
+        '  --free NAME        a second parameter, over which the labels found are followed as curves'//nl// &
+        '  --free-from A, --free-to B   its range, without which it is that of the axis of this parameter'//nl
     case ('boundary')
       lines = 'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
         '  Every edge between neighbours of different attractors is halved until its boundary point is known to 1e-10'//nl// &

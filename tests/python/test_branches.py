@@ -58,6 +58,35 @@ def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
         assert "fold (SN)" in texts and "graze with a fold (GR-fold)" in texts
 
 
+def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
+    out, ended = run(
+        "impact_coco", *AMPLITUDE, "--free", "drive.ratio", "--free-from", "0.9", "--free-to", "1.1", "--json"
+    )
+    assert ended.returncode == 0, ended.stderr
+    logged = [
+        line for line in map(json.loads, ended.stdout.splitlines()) if line["event"] == "codimension_two"
+    ]
+    meeting = [line for line in logged if (line["label"], line["second"]) == ("SN", "GR")]
+    assert [line["free"] for line in meeting] == pytest.approx([0.998749217772], abs=1e-9)
+    with open_result(out) as result:
+        labels = decode_flags(result["curve_label"]).values
+        amplitude, ratio = result["curve_parameter"].values, result["curve_free"].values
+        assert set(labels) == {"GR", "SN"}
+        grazes = labels == "GR"
+        assert amplitude[grazes] == pytest.approx(np.hypot(1 - ratio**2, 0.1 * ratio)[grazes], abs=1e-10)
+        assert (ratio[grazes].min(), ratio[grazes].max()) == pytest.approx((0.9, 1.1), abs=1e-9)
+        # the folds leave the grazes with the square of the distance
+        away = (ratio - 0.998749217772)[labels == "SN"]
+        gap = (np.hypot(1 - ratio**2, 0.1 * ratio) - amplitude)[labels == "SN"]
+        near = (away > 1e-3) & (away < 1e-2)
+        assert near.sum() >= 2
+        assert np.polyfit(np.log(away[near]), np.log(gap[near]), 1)[0] == pytest.approx(2, abs=0.02)
+        with style.context():
+            figure = branches.figures(result, "title")["curves"]
+        texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        assert {"fold (SN)", "graze (GR)", "codimension two"} <= set(texts)
+
+
 @pytest.mark.parametrize(
     ("options", "code", "said"),
     [
@@ -67,6 +96,14 @@ def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
         (("--parameter", "body.mass"), 65, "--from and --to are needed"),
         (("--parameter", "drive.amplitude", "--from", "2", "--to", "1"), 65, "a range that rises"),
         (("--parameter", "contact.restitution", "--from", "0.5", "--to", "1.5"), 65, "--to"),
+        ((*AMPLITUDE, "--free", "drive.amplitude"), 65, "--free: found 'drive.amplitude'"),
+        ((*AMPLITUDE, "--free", "drive.ratio"), 65, "--free-from and --free-to are needed"),
+        (
+            (*AMPLITUDE, "--free", "drive.ratio", "--free-from", "2", "--free-to", "3"),
+            65,
+            "holds drive.ratio",
+        ),
+        ((*AMPLITUDE, "--free-from", "2"), 64, "--free NAME, which is missing"),
     ],
 )
 def test_what_makes_no_sense_is_refused(run, options, code, said):
