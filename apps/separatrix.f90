@@ -46,7 +46,7 @@ program separatrix
       case ('boundary')
         call run_boundary(command)
       case ('stability')
-        call run_stability(command)
+        call run_stability(command, error)
       case ('trajectory')
         call run_trajectory_command(command)
       case ('points')

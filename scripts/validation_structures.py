@@ -18,6 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from markdown import table
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 SOURCE = Path(__file__).resolve().parents[1]
@@ -290,7 +291,90 @@ def blocks(program: Program) -> list[Number]:
         for theirs, mine in zip(intervals, ours, strict=True):
             what = f"{case}, belt {belt} m/s, friction {kinetic}, at rest {static}: interval of releases (s)"
             found.append(Number(source, what, theirs, mine, bar))
+        with h5py.File(program.run("trajectory", case, **settings)) as file:
+            cycle = file.attrs.get("cycle_time", np.nan)
+        what = f"{case}, belt {belt} m/s, friction {kinetic}, at rest {static}: limit cycle (s)"
+        found.append(Number(source, what, sum(intervals), cycle, 2 * bar))
     return found
+
+
+def slid(u: float) -> float:
+    """Friction of belt_stribeck.toml over the sliding speed."""
+    return 0.5 + 0.5 * np.exp(-u / 0.5)
+
+
+def known(file: h5py.File, kind: str) -> np.ndarray:
+    """Labels of the entries of a kind."""
+    kinds = text(file["catalogue/kind"].attrs["flag_meanings"]).split()
+    return file["catalogue/attractor"][:][file["catalogue/kind"][:] == kinds.index(kind) + 1]
+
+
+#: At 1.175 m/s motions come to the equilibrium within hundreds of turns only.
+SLOW = {"run__duration": 3000}
+
+
+def belt_oscillator(program: Program) -> list[Number]:
+    """Friction oscillator on a belt: share of the equilibrium, limit cycle, labels of single starts."""
+    source = "M. Stender, N. Hoffmann, bSTAB (2022), 5000 starts"
+    found = []
+    for belt, share in ((1.175, 0.0126), (1.5, 0.312), (1.85, 1.0)):
+        with h5py.File(program.run("basin", "belt_stribeck", friction__belt__velocity=belt, **SLOW)) as file:
+            rests = np.isin(file["attractor"][:], known(file, "rest"))
+            # Two samples of 5000, two standard errors.
+            bar = 2 * np.sqrt(2 * share * (1 - share) / 5000) + 1e-9
+            what = f"friction oscillator on a belt at {belt} m/s: share of the equilibrium"
+            found.append(Number(source, what, share, float(np.mean(rests)), bar))
+            if belt == 1.5:
+                found += belt_by_steps(file, rests)
+    return found
+
+
+def turning_pendulum(program: Program) -> list[Number]:
+    """A pendulum under a constant torque: share of the equilibrium, time of a turn."""
+    found = []
+    source = "P. J. Menck and others (2013) by bSTAB, 10000 starts"
+    case = SOURCE / "examples" / "validation" / "pendulum_torque.toml"
+    with h5py.File(program.run("basin", case)) as file:
+        rests = np.isin(file["attractor"][:], known(file, "rest"))
+        what = "pendulum under a constant torque: share of the equilibrium"
+        bar = 2 * np.sqrt(2 * 0.152 * 0.848 / 10000)
+        found.append(Number(source, what, 0.152, float(np.mean(rests)), bar))
+        cycle = max(file["catalogue/cycle_time"][:])
+    turns = solve_ivp(
+        lambda t, y: [y[1], 0.5 - 0.1 * y[1] - sin(y[0])],
+        (0, 400),
+        (0, 5),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+        events=lambda t, y: sin((y[0] - np.pi) / 2),
+    ).t_events[0]
+    found.append(Number("scipy, DOP853", "the same: time of a turn (s)", turns[-1] - turns[-2], cycle, 1e-9))
+    return found
+
+
+def belt_by_steps(file: h5py.File, rests: np.ndarray) -> list[Number]:
+    """The stick-slip cycle of belt_stribeck.toml, and where the first starts of its map go."""
+    source = "`tests/referee/structures.py`"
+
+    def slips(x: float, v: float, until: float, tolerance: float) -> list[float]:
+        machine = Structure(
+            [1], lambda t, q, v: -q - 0.1 * v, [Friction([1], slid, 1.0, 1.5)], tolerance=tolerance
+        )
+        machine.run([x], [v], until)
+        return [at for kind, _, at in machine.events if kind == "slip"]
+
+    late = slips(-1.5, 0, 60, 1e-12)
+    cycle = max(file["catalogue/cycle_time"][:])
+    found = [Number(source, "the same: limit cycle (s)", late[-1] - late[-2], cycle, 1e-8)]
+    starts = np.column_stack([file[name][:] for name in ("x0", "v0")])[:40]
+    # What still sticks after 60 s never stops.
+    other = sum(
+        (max(slips(*start, 90, 1e-8), default=0) > 60) == rest
+        for start, rest in zip(starts, rests, strict=False)
+    )
+    what = f"the same: labels of {len(starts)} starts that differ"
+    return [*found, Number(source, what, 0, other, 0)]
 
 
 def pulled(q, first: float, coupling: float, second: float = 0.0) -> np.ndarray:
@@ -384,7 +468,16 @@ NOT_YET = (
     ],
 )
 
-COMPUTED = (two_masses, nonsmooth_modes, dampers, others, blocks, simulated)
+COMPUTED = (
+    two_masses,
+    nonsmooth_modes,
+    dampers,
+    others,
+    blocks,
+    belt_oscillator,
+    turning_pendulum,
+    simulated,
+)
 
 
 def numbers(program: Program) -> list[Number]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a new user does with an installed wheel; run by scripts/wheel.
 
-wheel_check.py                     a map in threads, processes and merged shares, its figure, a motion, a check
+wheel_check.py                     a map in threads, processes and merged shares, a figure, a motion
 wheel_check.py --compare ONE TWO   whether two maps have the same bits
 """
 

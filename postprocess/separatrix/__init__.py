@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from separatrix.maps import basin as basin
     from separatrix.maps import points as points
     from separatrix.maps import sweep as sweep
+    from separatrix.measuring.along import measures_along as measures_along
+    from separatrix.measuring.api import measures as measures
+    from separatrix.measuring.api import tipping as tipping
+    from separatrix.measuring.survival import survival as survival
     from separatrix.motions import trajectory as trajectory
     from separatrix.open import decode_flags as decode_flags
     from separatrix.open import decode_word as decode_word
@@ -54,11 +58,15 @@ _HOME = {
     "flag_names": "separatrix.open",
     "linspace": "separatrix.cases",
     "load": "separatrix.cases",
+    "measures": "separatrix.measuring.api",
+    "measures_along": "separatrix.measuring.along",
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
     "stability": "separatrix.orbits",
+    "survival": "separatrix.measuring.survival",
     "sweep": "separatrix.maps",
     "table": "separatrix.open",
+    "tipping": "separatrix.measuring.api",
     "trajectory": "separatrix.motions",
 }
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("separatrix")
 class Accessor:
-    """The result of `basin`, `boundary`, `sweep`, `points`, `branches`, `trajectory` or `open_result`."""
+    """The result of `basin`, `boundary`, `sweep`, `points`, `branches`, `trajectory`, `measures_along`."""
 
     def __init__(self, result: xr.Dataset) -> None:
         """Take any Dataset; what is no result is refused when it is asked."""
@@ -31,7 +31,7 @@ class Accessor:
 
     @property
     def kind(self) -> str:
-        """The kind of result: basin, boundary, sweep, points, branches or trajectory."""
+        """The kind of result: basin, boundary, sweep, points, branches, trajectory or measures."""
         kind = self._result.attrs.get("kind")
         if kind is None:
             raise SeparatrixError("this Dataset is no result of Separatrix (no attribute kind)", USAGE)
@@ -125,7 +125,8 @@ class Accessor:
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
         "phase", "energy" and "contact", of points "regime", of branches "branches", of boundaries
-        "boundary". Notebooks show the figure; `savefig` writes it, `save` in several formats.
+        "boundary", of measures along a parameter "erosion", of survival "survival". Notebooks show the
+        figure; `savefig` writes it, `save` in several formats.
 
         `over`: of boundaries, the map to draw them over.
 
@@ -134,7 +135,7 @@ class Accessor:
         shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
         """
         from separatrix import style
-        from separatrix.figures import basin, boundary, branches, points, sweep, trajectory
+        from separatrix.figures import basin, boundary, branches, erosion, points, survival, sweep, trajectory
         from separatrix.labels import plain
 
         kind = self.kind
@@ -148,7 +149,10 @@ class Accessor:
             elif kind == "boundary":
                 made = boundary.figures(None, self._result, heading, look, over)
             else:
-                modules = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
+                modules = {
+                    "sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches,
+                    "measures": erosion, "survival": survival,
+                }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
         if name is not None and name not in made:
             raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)

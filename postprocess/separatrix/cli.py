@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import basin, boundary, branches, contact, points, sweep, trajectory
+from separatrix.figures import basin, boundary, branches, contact, erosion, points, sweep, trajectory
 from separatrix.figures.animation import animate
 from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
@@ -23,7 +23,13 @@ from separatrix.save import FORMATS, save
 from separatrix.version import __version__
 
 _FILM_DPI = 150
-_BY_KIND = {"sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches}
+_BY_KIND = {
+    "sweep": sweep,
+    "trajectory": trajectory,
+    "points": points,
+    "branches": branches,
+    "measures": erosion,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -99,12 +105,14 @@ def _make(path: Path, options: argparse.Namespace) -> list[Path]:
             return [_animated(path, result, folder / f"{stem}_animation", title, look, options)]
         return [
             written
-            for name, figure in _figures(path, result, options.field, title, look).items()
+            for name, figure in _figures(path, result, options.field, title, look, options.branches).items()
             for written in save(figure, folder / f"{stem}_{name}", options.formats, options.dpi)
         ]
 
 
-def _figures(path: Path, result: object, field: str | None, title: str, look: Look) -> dict[str, Figure]:
+def _figures(
+    path: Path, result: object, field: str | None, title: str, look: Look, orbits: Path | None = None
+) -> dict[str, Figure]:
     kind = result.attrs["kind"]
     if kind == "basin":
         return basin.figures(path, result, field, title, look)
@@ -112,6 +120,9 @@ def _figures(path: Path, result: object, field: str | None, title: str, look: Lo
         return boundary.figures(path, result, title, look)
     if field:
         raise SeparatrixError(f"{path}: --field is for basin files, this is a {kind} file", USAGE)
+    if orbits and kind == "measures":
+        with reading(orbits), open_result(orbits) as found:
+            return erosion.figures(result, title, look, found)
     return _BY_KIND[kind].figures(result, title, look)
 
 
@@ -176,6 +187,12 @@ def _parser() -> Parser:
         "--difference",
         action="store_true",
         help="two basin files of the same points: also the map of the first, black where the second differs",
+    )
+    parser.add_argument(
+        "--branches",
+        metavar="FILE",
+        type=Path,
+        help="files of measures along a parameter: draw these branches over the same parameter above them",
     )
     parser.add_argument("--title", help="title of the figures [that of the file]")
     parser.add_argument(

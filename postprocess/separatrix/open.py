@@ -18,7 +18,7 @@ from separatrix.words import decode_word
 
 FORMAT = "separatrix"
 FORMAT_VERSION = 1
-KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary")
+KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary", "measures")
 TABLES = ("catalogue", "limits", "saddles")
 
 

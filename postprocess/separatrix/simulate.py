@@ -21,6 +21,7 @@ __all__ = [
     "StoppedError",
     "number",
     "search_slices",
+    "section_points",
     "trajectory",
 ]
 
@@ -152,6 +153,34 @@ def trajectory(
         _columns(EVENT_COLUMNS, events[: found[1]]),
         _numbers(SUMMARY, summary),
     )
+
+
+def section_points(
+    model: Model,
+    point: tuple[float, float],
+    period: int,
+    angle: float = 0.0,
+    values: Mapping[str, float] | None = None,
+) -> np.ndarray:
+    """Return all x [m], v [m/s] of a cycle at a crank angle [rad], from its `point` at crank angle 0.
+
+    `period` in drive periods; one row for each.
+    """
+    turn = angle % (2 * np.pi)
+    length = 2 * np.pi / model.drive_frequency(values or {})
+    found = [(float(point[0]), float(point[1]))]
+    if turn > 0:
+        found = [_end(model, (*found[0], 0.0), values, length * turn / (2 * np.pi))]
+    for _ in range(period - 1):
+        found.append(_end(model, (*found[-1], turn), values, length))
+    return np.array(found)
+
+
+def _end(
+    model: Model, start: tuple[float, float, float], values: Mapping[str, float] | None, duration: float
+) -> tuple[float, float]:
+    end = trajectory(model, start, values, duration, samples_per_period=-1).summary
+    return end["x"], end["v"]
 
 
 class Catalogue:

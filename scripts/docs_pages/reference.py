@@ -16,7 +16,13 @@ FAMILIES = {
     "body": "Bodies", "restoring": "Restoring forces", "friction": "Friction", "contact": "Contacts",
     "drive": "Drives", "part": "Parts of a machine of several bodies",
 }  # fmt: skip
-TOOLS = ("separatrix-figures", "separatrix-view", "separatrix-discover", "separatrix-structure")
+TOOLS = (
+    "separatrix-figures",
+    "separatrix-measures",
+    "separatrix-view",
+    "separatrix-discover",
+    "separatrix-structure",
+)
 # one of each kind of file, small
 RUNS = {
     "basin": ("basin_coulomb.toml", ["axis[1].count=3", "axis[2].count=3"]),

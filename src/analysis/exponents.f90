@@ -15,7 +15,7 @@ module exponents
   implicit none
   private
 
-  public :: lyapunov_exponents, zero_one_test, type_of_motion
+  public :: lyapunov_exponents, zero_one_test, type_of_motion, period_of_section
 
   integer, parameter :: batches = 32
   !> Frequencies of the 0-1 test.
@@ -206,6 +206,21 @@ contains
     correlation = 0
     if (norm2(y) > 0) correlation = sum(x*y)/(norm2(x)*norm2(y))
   end function correlation
+
+  !> Smallest number of drive periods after which positions on the section come back over as many, 0: none up to half of them.
+  !> They agree within `tolerance` of their range.
+  pure integer function period_of_section(section, tolerance) result(period)
+    real(wp), intent(in) :: section(:), tolerance
+    integer :: n
+    n = size(section)
+    associate (room => tolerance*(maxval(section) - minval(section)))
+      do period = 1, n/2
+        if (abs(section(n) - section(n - period)) > room) cycle
+        if (all(abs(section(n - period + 1:) - section(n - 2*period + 1:n - period)) <= room)) return
+      end do
+    end associate
+    period = 0
+  end function period_of_section
 
   !> What a motion is, by its largest exponent and the 0-1 test `k`, at three standard errors; not known where they do not agree.
   pure integer function type_of_motion(spectrum, k) result(motion)

@@ -4,14 +4,15 @@
 !> A motion that has come to no cycle: the box of its section points, its features over many periods, and whether neighbouring
 !> motions drift apart, without which nobody knows what it is: perhaps a long transient.
 module aperiodic
-  use attractors, only: attractor_t, find_capture, kind_chaotic, kind_not_known, make_points, most_coordinates
+  use attractors, only: attractor_t, kind_chaotic, kind_not_known, make_points, most_coordinates
+  use capture, only: captor_of
   use circle, only: nearest_turn, point_near
   use elementary, only: exponential, logarithm
   use exact_return, only: returns_t, watch_returns
   use kinds, only: int64, wp
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, features_over, rest_lasts, scales_of, section_point, section_state, &
+  use strobe, only: advance_strobe_period, coordinates_of, features_over, scales_of, section_point, section_state, &
     strobe_at, strobe_t
   implicit none
   private
@@ -59,7 +60,7 @@ contains
       ok = reason == 0
       if (.not. ok) return
       associate (now => section_point(moving, strobe))
-        known = find_capture(catalogue, now, tally%slips > slips .or. .not. rest_lasts(moving)) > 0
+        known = captor_of(moving, catalogue, strobe, tally%slips > slips) > 0
         if (known) return
         call widen(found, spread(now, 2, 2))
         call follow_neighbour(moving, found%coordinates, scale, before, now, direction, drift(i))
@@ -91,7 +92,7 @@ contains
       call advance_strobe_period(moving, strobe, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      known = find_capture(catalogue, section_point(moving, strobe), tally%slips > slips .or. .not. rest_lasts(moving)) > 0
+      known = captor_of(moving, catalogue, strobe, tally%slips > slips) > 0
       if (known) return
       call watch_returns(moving, strobe, tally%chatters, returns)
       if (returns%period > 0) return

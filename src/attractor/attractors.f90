@@ -33,7 +33,7 @@ module attractors
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 
-  integer, parameter :: packed_scalars = 24 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
+  integer, parameter :: packed_scalars = 26 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
   !> Share of its size by which a box of section points is widened on each side.
   real(wp), parameter :: box_margin = 0.05_wp
   !> Fewest numbers of a packed attractor.
@@ -72,6 +72,10 @@ module attractors
     !> A motion of two bodies between their stops, which it does not touch: it may be anywhere. The coordinates are those
     !> after the first.
     logical :: any_place = .false.
+    !> A cycle of a machine without a clock: its section is where the watched coordinate turns round, see `turn_section`.
+    logical :: by_event = .false.
+    !> Time that one cycle takes [s]; 0 of what is none.
+    real(wp) :: duration = 0
     !> Section points, canonical one first; for period 0 lower and upper corner of the box.
     real(wp), allocatable :: points(:, :)
     !> Scales of the coordinates, and for each point the metric in scaled coordinates in which the map contracts.
@@ -134,16 +138,21 @@ contains
   end subroutine wrap_range
 
   !> Index of the attractor whose verified neighbourhood holds a point on the section; 0 if none.
-  !> `slipped` tells whether the body moved during the last whole period.
-  pure integer function find_capture(catalogue, point, slipped) result(found)
+  !> `slipped` tells whether the body moved during the last whole period. With `by_event` the point is on the section of a
+  !> machine without a clock, and only cycles known there are looked at; else only the others.
+  pure integer function find_capture(catalogue, point, slipped, by_event) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
     logical, intent(in) :: slipped
+    logical, intent(in), optional :: by_event
+    logical :: events
     integer :: k, i
     found = 0
+    events = .false.
+    if (present(by_event)) events = by_event
     do k = 1, size(catalogue)
       associate (attractor => catalogue(k))
-        if (attractor%any_place) cycle
+        if (attractor%any_place .or. (attractor%by_event .neqv. events)) cycle
         if (attractor%rests) then
           if (.not. slipped) found = k
         else
@@ -253,7 +262,7 @@ contains
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
         f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
         merge(1.0_wp, 0.0_wp, attractor%any_place), real(attractor%kind, wp), attractor%turn, &
-        f%rotation, attractor%scale, &
+        f%rotation, merge(1.0_wp, 0.0_wp, attractor%by_event), attractor%duration, attractor%scale, &
         real(attractor%multipliers), aimag(attractor%multipliers)]
     end associate
     if (allocated(attractor%points)) packed(packed_scalars + 1:) = &
@@ -277,9 +286,11 @@ contains
     attractor%any_place = packed(21) > 0
     attractor%kind = nint(packed(22))
     attractor%turn = packed(23)
-    attractor%scale = packed(25:24 + most_coordinates)
-    attractor%multipliers = cmplx(packed(25 + most_coordinates:24 + 2*most_coordinates), &
-                                  packed(25 + 2*most_coordinates:packed_scalars), wp)
+    attractor%by_event = packed(25) > 0
+    attractor%duration = packed(26)
+    attractor%scale = packed(27:26 + most_coordinates)
+    attractor%multipliers = cmplx(packed(27 + most_coordinates:26 + 2*most_coordinates), &
+                                  packed(27 + 2*most_coordinates:packed_scalars), wp)
     count = (size(packed) - packed_scalars)/packed_per_point
     if (count == 0) return
     call make_points(attractor, count)

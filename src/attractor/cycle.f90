@@ -13,7 +13,8 @@ module cycle
   use matrices, only: cholesky, eigenvalues, solve, spectral_radius
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, reset_tally, tally_t
-  use strobe, only: advance_strobe_period, cycle_word, features_over, scales_of, section_point, strobe_at, strobe_t
+  use strobe, only: advance_strobe_period, cycle_word, features_over, scales_of, section_point, strobe_at, strobe_t, turn_of
+  use turn_section, only: has_no_clock
   implicit none
   private
 
@@ -30,8 +31,8 @@ module cycle
 contains
 
   !> Image of a section point (its coordinates, SI) after `periods` drive periods and what happened on the
-  !> way; `ok` is false if the trajectory had to be given up.
-  pure subroutine map_point(moving, point, periods, image, tally, ok, wants_v_max)
+  !> way; `ok` is false if the trajectory had to be given up. `duration` [s] is the time that it took.
+  pure subroutine map_point(moving, point, periods, image, tally, ok, wants_v_max, duration)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
@@ -39,6 +40,7 @@ contains
     type(tally_t), intent(out) :: tally
     logical, intent(out) :: ok
     logical, intent(in), optional :: wants_v_max
+    real(wp), intent(out), optional :: duration
     type(strobe_t) :: strobe
     real(wp) :: reached(most_coordinates)
     integer :: i, reason
@@ -46,8 +48,10 @@ contains
     if (present(wants_v_max)) tally%wants_v_max = wants_v_max
     call reset_tally(tally, strobe%state, allocated(moving%pair))
     reason = 0
+    if (present(duration)) duration = 0
     do i = 1, periods
       call advance_strobe_period(moving, strobe, tally, reason)
+      if (present(duration)) duration = duration + strobe%lasted
       if (reason /= 0) exit
     end do
     reached = section_point(moving, strobe)
@@ -70,7 +74,8 @@ contains
     call map_point(moving, guess, period, image, tally, found)
     if (.not. found) return
     attractor%coordinates = n
-    attractor%turn = moving%machine%turn
+    attractor%by_event = moving%by_event
+    attractor%turn = turn_of(moving)
     attractor%period = period
     attractor%scale = scale_of(moving, tally)
     point = guess
@@ -87,10 +92,14 @@ contains
       if (.not. found) return
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
-    call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true.)
+    call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true., attractor%duration)
     ! Rounding may put the point and its image on different sides of the seam.
     if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
-    attractor%features = features_over(moving, tally, real(attractor%period, wp))
+    if (moving%by_event) then
+      attractor%features = features_over(moving, tally, attractor%duration/moving%machine%period)
+    else
+      attractor%features = features_over(moving, tally, real(attractor%period, wp))
+    end if
     if (attractor%period > 1) attractor%features%word = &
       cycle_word(moving, strobe_at(moving, attractor%points(:n, 1)), attractor%period)
     if (is_linear(moving) .and. tally%impacts == 0) then
@@ -132,7 +141,7 @@ contains
     do i = 1, most_newton
       call map_point(moving, point, period, image, tally, converged)
       if (.not. converged) return
-      miss = (point_near(image, point, moving%machine%turn) - point)/scale
+      miss = (point_near(image, point, turn_of(moving)) - point)/scale
       if (norm2(miss) <= 64*epsilon(1.0_wp)) return
       if (i > 4 .and. norm2(miss) < 1e-11_wp .and. norm2(miss) >= best) return
       best = min(best, norm2(miss))
@@ -205,7 +214,7 @@ contains
       if (.not. ok) return
       call map_point(moving, behind, period, image_behind, tally, ok)
       if (.not. ok) return
-      image_ahead = point_near(image_ahead, image_behind, moving%machine%turn)
+      image_ahead = point_near(image_ahead, image_behind, turn_of(moving))
       jacobian(:, k) = (image_ahead - image_behind)/scale/((ahead(k) - behind(k))/scale(k))
     end do
   end subroutine differentiate
@@ -274,6 +283,8 @@ contains
     smallest = huge(smallest)
     do i = 1, attractor%period
       call map_point(moving, attractor%points(:attractor%coordinates, i), attractor%period, image, reference(i), ok)
+      ! A neighbour of an equilibrium never comes to rest.
+      if (has_no_clock(moving) .and. reference(i)%slips == 0) reference(i)%sticks = 0
       bounds = eigenvalue_bounds(attractor, i)
       smallest = min(smallest, bounds(1))
     end do

@@ -6,7 +6,8 @@
 module discover
   use aperiodic, only: add_aperiodic, meets_chaos, outlast, watch_long
   use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_rest, longest_period, make_points, &
-    most_coordinates, regime_non_impact
+    most_coordinates, regime_at_rest, regime_non_impact
+  use capture, only: captor_of
   use circle, only: point_near
   use contact_law, only: contact_t
   use cycle, only: map_point, refine_cycle
@@ -17,8 +18,9 @@ module discover
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
   use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, has_section, rest_lasts, scales_of, &
-    section_point, section_state, start_strobe, strobe_t, without_stops
+    section_point, section_state, start_strobe, strobe_t, turn_of, without_stops
   use trajectory, only: span_t
+  use turn_section, only: has_no_clock
   implicit none
   private
 
@@ -150,7 +152,61 @@ contains
     if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, strobe, returns%period, found, ok)
     if (.not. ok) call recognise(moving, strobe, min(max_period, longest_period), found, ok)
     if (.not. ok .and. returns%period > 0) call exact_cycle(moving, strobe, returns%period, found, ok)
+    if (.not. has_no_clock(moving)) return
+    if (ok) then
+      call take_as_one_point(moving, found)
+      call tell_equilibrium(found)
+    else
+      call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
+    end if
   end subroutine identify
+
+  !> Rest that nothing but the springs decides is one point, which attracts from all around, not a set held by friction.
+  pure subroutine take_as_one_point(moving, found)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(inout) :: found
+    type(attractor_t) :: point
+    logical :: ok
+    if (.not. found%rests) return
+    call refine_cycle(moving, found%points(:found%coordinates, 1), 1, point, ok)
+    if (.not. ok) return
+    point%section = found%section
+    found = point
+  end subroutine take_as_one_point
+
+  !> A motion that does not change from one time to any later one: an equilibrium.
+  pure subroutine tell_equilibrium(found)
+    type(attractor_t), intent(inout) :: found
+    if (found%rests .or. found%features%amplitude > 1e-9_wp*found%scale(1)) return
+    found%kind = kind_rest
+    found%duration = 0
+    associate (f => found%features)
+      f%regime = regime_at_rest
+      f%x_max = found%section(1)
+      f%x_min = f%x_max
+      f%amplitude = 0
+      f%v_max = 0
+    end associate
+  end subroutine tell_equilibrium
+
+  !> The limit cycle of a machine without a clock at which a settled state is, by its returns to where it turns round.
+  pure subroutine recognise_by_event(moving, strobe, max_period, found, ok)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    integer, intent(in) :: max_period
+    type(attractor_t), intent(out) :: found
+    logical, intent(out) :: ok
+    type(motion_t) :: turning
+    type(strobe_t) :: later
+    type(tally_t) :: unused
+    integer :: reason
+    turning = moving
+    turning%by_event = .true.
+    later = strobe
+    call advance_strobe_period(turning, later, unused, reason)
+    ok = reason == 0
+    if (ok) call recognise(turning, later, max_period, found, ok)
+  end subroutine recognise_by_event
 
   !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
   pure logical function holds(catalogue, found)
@@ -158,7 +214,7 @@ contains
     if (found%any_place) then
       holds = find_box(catalogue, [0.0_wp, found%points(:, 1)], found%features%regime) > 0
     else
-      holds = find_capture(catalogue, found%points(:, 1), .not. found%rests) > 0
+      holds = find_capture(catalogue, found%points(:, 1), .not. found%rests, found%by_event) > 0
     end if
   end function holds
 
@@ -180,7 +236,7 @@ contains
       call advance_strobe_period(moving, strobe, tally, reason)
       stretch%ok = reason == 0
       if (.not. stretch%ok) return
-      stretch%known = find_capture(catalogue, section_point(moving, strobe), .not. whole .or. tally%slips > slips) > 0
+      stretch%known = captor_of(moving, catalogue, strobe, .not. whole .or. tally%slips > slips) > 0
       if (stretch%known) return
       call watch_returns(moving, strobe, tally%chatters, stretch%returns)
       if (stretch%returns%period > 0 .and. stretch%returns%chattered) exit
@@ -233,7 +289,7 @@ contains
     if (ok) first = 2
     associate (sizes => scales_of(moving, (tally%x_max - tally%x_min)/2))
       do p = 1, max_period
-        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), moving%machine%turn)) cycle
+        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), turn_of(moving))) cycle
         if (first == 1) then
           call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
           if (ok) found%section = section_state(moving, found%points(:, 1))

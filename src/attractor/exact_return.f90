@@ -100,6 +100,7 @@ contains
     tally%wants_v_max = .true.
     call collect(moving, first, attractor%period, points(:, :attractor%period), chattered(:attractor%period), tally, found)
     attractor%points = points(:, :attractor%period - 1)
+    attractor%duration = attractor%period*moving%machine%period
     attractor%features = features_over(moving, tally, real(attractor%period, wp))
     attractor%features%word = cycle_word(moving, first, attractor%period)
     attractor%section = section_state(moving, attractor%points(:, 1))

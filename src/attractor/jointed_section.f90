@@ -6,7 +6,7 @@
 module jointed_section
   use attractors, only: most_coordinates
   use eigen, only: symmetric_eigen
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_section, jointed_t, most_degrees
   use jointed_motion, only: jointed_motion_t, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
@@ -14,7 +14,8 @@ module jointed_section
   implicit none
   private
 
-  public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed
+  public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed, &
+    watched_speed
 
 contains
 
@@ -29,7 +30,7 @@ contains
     n = machine%n
     depends = machine%stiffness/max(maxval(abs(machine%stiffness)), tiny(1.0_wp))
     do j = 1, size(machine%joints)
-      if (machine%joints(j)%kind == joint_friction) cycle
+      if (machine%joints(j)%kind == joint_friction .or. machine%joints(j)%kind == joint_section) cycle
       do i = 1, n
         depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
       end do
@@ -53,6 +54,14 @@ contains
     call directions_of(moving%machine, directions, n)
     n = n + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
   end function coordinates_of_jointed
+
+  !> Number of the coordinate that is the velocity of the watched place.
+  pure integer function watched_speed(moving) result(at)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp) :: directions(most_degrees, most_degrees)
+    call directions_of(moving%machine, directions, at)
+    at = at + moving%machine%watched
+  end function watched_speed
 
   !> Whether there is room for the coordinates.
   pure logical function fits_section(moving)

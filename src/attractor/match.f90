@@ -74,7 +74,8 @@ contains
     integer :: i, n
     distance = huge(1.0_wp)
     n = a%coordinates
-    if (a%period /= b%period .or. a%features%regime /= b%features%regime .or. n /= b%coordinates) return
+    if (a%period /= b%period .or. a%features%regime /= b%features%regime .or. n /= b%coordinates .or. &
+        (a%by_event .neqv. b%by_event)) return
     if (abs(a%features%rotation - b%features%rotation) > 0 .and. a%period > 0) return
     if (a%rests .or. a%period == 0) then
       distance = 0

@@ -3,7 +3,7 @@
 
 !> The cycle that one motion has come to by its end.
 module settled_cycle
-  use attractors, only: attractor_t, kind_cycle
+  use attractors, only: attractor_t, kind_cycle, kind_rest
   use discover, only: discover_attractors, sort_attractors
   use kinds, only: wp
   use motion, only: motion_t
@@ -35,7 +35,7 @@ contains
     call run_trajectory(moving, own, span, start(1), start(2), start(3), again)
     if (again%reason /= reason_settled) return
     cycle = own(again%attractor)
-    if (cycle%kind == kind_cycle) outcome%window = cycle%features
+    if (cycle%kind == kind_cycle .or. (cycle%kind == kind_rest .and. .not. cycle%rests)) outcome%window = cycle%features
   end subroutine describe_cycle
 
 end module settled_cycle

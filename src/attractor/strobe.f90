@@ -5,7 +5,8 @@
 !> coordinates that fix it there. Those of one body are x and v, and what its laws remember: the force of Dahl's friction, the speed
 !> at which a contact that lasts began. Of two, what nothing depends on is left out: the driving
 !> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
-!> velocity of both where nothing ties either to the ground.
+!> velocity of both where nothing ties either to the ground. With `by_event` the section is where the motion of a machine without a
+!> clock turns round, see `turn_section`.
 module strobe
   use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck, wrap_range
   use contact_law, only: contact_t
@@ -23,11 +24,14 @@ module strobe
   use pair_flight, only: body_state, driver_of, energy_of
   use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
   use pair_motion, only: advance_pair, advance_pair_period, start_pair
+  use turn_section, only: advance_body_to_turn, advance_jointed_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
+    jointed_at_turn, jointed_turn_point, scales_of_turn
   implicit none
   private
 
   public :: strobe_t, coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, section_state, &
-    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, cycle_word, rest_lasts, energy_now, record_end
+    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, cycle_word, rest_lasts, energy_now, &
+    record_end, advance_to_section, turn_point, turn_of
 
   !> Coordinates of two bodies.
   integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5, of_two = 5
@@ -37,6 +41,8 @@ module strobe
     type(state_t) :: state
     type(pair_state_t) :: pair
     type(jointed_state_t) :: jointed
+    !> Time from the last section to this one [s].
+    real(wp) :: lasted = 0
   end type strobe_t
 
 contains
@@ -89,7 +95,9 @@ contains
   !> Number of coordinates on the section.
   pure integer function coordinates_of(moving) result(n)
     type(motion_t), intent(in) :: moving
-    if (allocated(moving%jointed)) then
+    if (moving%by_event) then
+      n = coordinates_of_turn(moving)
+    else if (allocated(moving%jointed)) then
       n = coordinates_of_jointed(moving%jointed)
     else if (allocated(moving%pair)) then
       n = count(counts_of(moving))
@@ -211,8 +219,15 @@ contains
     real(wp) :: all_of_them(of_two)
     integer :: n
     if (allocated(moving%jointed)) then
-      strobe%jointed = jointed_at(moving%jointed, point)
+      if (moving%by_event) then
+        strobe%jointed = jointed_at_turn(moving%jointed, point)
+      else
+        strobe%jointed = jointed_at(moving%jointed, point)
+      end if
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      return
+    else if (moving%by_event) then
+      strobe%state = body_at_turn(moving, point(1))
       return
     else if (.not. allocated(moving%pair)) then
       strobe%state = body_at(moving, point)
@@ -238,7 +253,10 @@ contains
     real(wp) :: point(most_coordinates), all_of_them(of_two)
     integer :: n
     point = 0
-    if (allocated(moving%jointed)) then
+    if (moving%by_event) then
+      point = turn_point(moving, strobe)
+      return
+    else if (allocated(moving%jointed)) then
       point = jointed_point(moving%jointed, strobe%jointed)
       return
     else if (.not. allocated(moving%pair)) then
@@ -277,7 +295,9 @@ contains
     integer :: n
     w = moving%machine%drive_frequency
     scales = 1
-    if (allocated(moving%jointed)) then
+    if (moving%by_event) then
+      scales = scales_of_turn(moving, half_range)
+    else if (allocated(moving%jointed)) then
       scales = scales_of_jointed(moving%jointed, half_range)
     else if (.not. allocated(moving%pair)) then
       length = half_range
@@ -293,6 +313,12 @@ contains
       scales(:n) = pack(length*[1.0_wp, w, 1.0_wp, w, 1/w], counts)
     end if
   end function scales_of
+
+  !> What the first coordinate repeats after on the section.
+  pure real(wp) function turn_of(moving)
+    type(motion_t), intent(in) :: moving
+    turn_of = merge(0.0_wp, moving%machine%turn, moving%by_event)
+  end function turn_of
 
   !> Moves to `time_end` [s after the section, at most one period]; `reason` as in `advance`.
   pure subroutine advance_strobe(moving, strobe, time_end, tally, reason, log)
@@ -320,6 +346,11 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
+    if (moving%by_event) then
+      call advance_to_section(moving, strobe, tally, reason)
+      return
+    end if
+    strobe%lasted = moving%machine%period
     if (allocated(moving%jointed)) then
       call advance_jointed_period(moving%jointed, strobe%jointed, tally, reason, log)
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
@@ -331,6 +362,33 @@ contains
       call take_turns(moving%machine%turn, strobe%state, tally)
     end if
   end subroutine advance_strobe_period
+
+  !> Moves a machine without a clock to where it turns round; `reason` is `reason_time_over` if it does not.
+  pure subroutine advance_to_section(moving, strobe, tally, reason)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(inout) :: strobe
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    if (allocated(moving%jointed)) then
+      call advance_jointed_to_turn(moving%jointed, strobe%jointed, strobe%lasted, tally, reason)
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    else
+      call advance_body_to_turn(moving, strobe%state, strobe%lasted, tally, reason)
+    end if
+  end subroutine advance_to_section
+
+  !> Coordinates of a state there, zeros after the last.
+  pure function turn_point(moving, strobe) result(point)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(in) :: strobe
+    real(wp) :: point(most_coordinates)
+    point = 0
+    if (allocated(moving%jointed)) then
+      point = jointed_turn_point(moving%jointed, strobe%jointed)
+    else
+      point(1) = body_turn_point(moving, strobe%state)
+    end if
+  end function turn_point
 
   !> Features of what was counted over `periods` drive periods. Two bodies that do not slip may well move.
   pure function features_over(moving, tally, periods) result(features)

@@ -4,11 +4,12 @@
 !> One trajectory from its start to its label: a pure function of the machine, the frozen catalogue and
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
-  use attractors, only: attractor_t, features_t, find_box, find_capture
+  use attractors, only: attractor_t, features_t, find_box
+  use capture, only: captor_of
   use kinds, only: int64, wp
   use motion, only: advance, motion_t
   use motion_state, only: log_t, place_of, reset_tally, tally_t
-  use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, rest_lasts, section_point, &
+  use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, section_point, &
     start_strobe, strobe_t
   use status, only: reason_settled, reason_time_over
   implicit none
@@ -222,7 +223,7 @@ contains
     logical, intent(in) :: slipped
     type(course_t), intent(inout) :: course
     type(outcome_t), intent(inout) :: outcome
-    course%captured = find_capture(catalogue, section_point(moving, course), slipped .or. .not. rest_lasts(moving))
+    course%captured = captor_of(moving, catalogue, course, slipped)
     if (course%captured == 0) then
       outcome%settle_time = -1
     else if (outcome%settle_time < 0) then

@@ -5,7 +5,7 @@
 module c_labels
   use attractors, only: attractor_t, most_coordinates
   use basin, only: basin_variables, catalogue_t, label_slices, outcome_values, search_starts
-  use c_machine, only: prepare_machine, prepared_t, start_problem
+  use c_machine, only: is_start, prepare_machine, prepared_t
   use c_text, only: answer
   use case_setup, only: span_of
   use discover, only: discover_attractors, sort_attractors
@@ -95,7 +95,7 @@ contains
           call fail(error, exit_resumable, 'stopped while searching for attractors')
           exit
         end if
-        if (len(start_problem(prepared, starts(:, i))) > 0) cycle
+        if (.not. is_start(prepared, starts(:, i))) cycle
         call discover_attractors(prepared%journey%moving, prepared%journey%span, starts(:, i:i), settings%max_period, &
                                  self%attractors)
       end do
@@ -220,7 +220,7 @@ contains
     type(outcome_t) :: outcomes(size(starts, 2))
     integer, allocatable :: allowed(:)
     integer :: i
-    allowed = pack([(i, i=1, size(starts, 2))], [(len(start_problem(self%prepared, starts(:, i))) == 0, i=1, size(starts, 2))])
+    allowed = pack([(i, i=1, size(starts, 2))], [(is_start(self%prepared, starts(:, i)), i=1, size(starts, 2))])
     call run_trajectories(self%prepared%journey, self%attractors, starts(:, allowed), outcomes(:size(allowed)))
     values = 0
     do i = 1, size(allowed)

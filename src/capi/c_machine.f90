@@ -24,7 +24,7 @@ module c_machine
   implicit none
   private
 
-  public :: prepare_machine, start_problem
+  public :: is_start, prepare_machine, start_problem
 
   !> The case with its values, the starts of its axes as a grid of one slice, and the machine.
   type, public :: prepared_t
@@ -97,5 +97,26 @@ contains
       problem = 'found a number that is not finite'
     end if
   end function start_problem
+
+  !> Whether a start is one: finite, and not beyond a barrier. Of what is asked of many starts by many threads no text is made.
+  pure logical function is_start(prepared, start)
+    type(prepared_t), intent(in) :: prepared
+    real(wp), intent(in) :: start(3)
+    type(jointed_state_t) :: state
+    real(wp) :: barriers(2)
+    is_start = all(ieee_is_finite(start))
+    if (.not. is_start) return
+    associate (moving => prepared%journey%moving)
+      if (allocated(moving%jointed)) then
+        state = start_of_jointed(moving%jointed, start(1), start(2), start(3))
+        is_start = .not. any(state%q /= state%q)
+      else if (allocated(moving%pair)) then
+        is_start = len(start_problem(prepared, start)) == 0
+      else
+        barriers = barrier_positions(moving%machine%contact)
+        is_start = start(1) <= barriers(1) .and. start(1) >= barriers(2)
+      end if
+    end associate
+  end function is_start
 
 end module c_machine

@@ -31,7 +31,12 @@ contains
     case (kind_not_known)
       line = line//', not known to be periodic'
     case default
-      line = line//', period '//to_text(attractor%period)
+      if (attractor%by_event) then
+        line = line//', limit cycle of '//to_text(attractor%duration, 8)//' s'
+        if (attractor%period > 1) line = line//' with '//to_text(attractor%period)//' turns'
+      else
+        line = line//', period '//to_text(attractor%period)
+      end if
     end select
     line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
            to_text(attractor%features%impacts_per_period, 4)//' impacts per period'

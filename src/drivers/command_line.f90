@@ -402,9 +402,10 @@ contains
         '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
         '  takes a small part of the time of the map.'//nl
     case ('stability')
-      lines = 'separatrix stability CASE [--periods N]: Lyapunov exponents and the kind of one motion'//nl// &
+      lines = 'separatrix stability CASE|MAP [--periods N]: Lyapunov exponents and the kind of a motion'//nl// &
         '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
-        '  the 0-1 test, and what the motion is. One body. Writes no file.'//nl// &
+        '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period (chaotic, quasi-periodic,'//nl// &
+        '  long transient, period above the limit, not known). One body. Writes no file.'//nl// &
         '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl
     case ('trajectory')
       lines = 'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &

@@ -171,6 +171,7 @@ contains
     call add('attractor', type_int32, '1', 'label', real(all_of_them%id, wp))
     call add('regime', type_int8, '1', 'regime, coded as in the map', real(all_of_them%features%regime, wp))
     call add('period', type_int16, '1', 'period in drive periods', real(all_of_them%period, wp))
+    call add('cycle_time', type_float64, 's', 'time that one cycle takes; 0 of what is none', all_of_them%duration)
     call add('event_word', type_int64, '1', 'events of one period', real(all_of_them%features%word, wp))
     call add('x', type_float64, 'm', 'position at the section, crank angle 0', all_of_them%section(1))
     call add('v', type_float64, 'm/s', 'velocity at the section, crank angle 0', all_of_them%section(2))

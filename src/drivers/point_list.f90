@@ -1,11 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Reads a list of starts: CSV with a header of x0, v0 and optionally ratio, in any order.
+!> Reads a list of starts: CSV with a header of x0, v0 and optionally ratio and the starts of further bodies, in any order.
 module point_list
+  use axis, only: name_length
+  use case_parameters, only: parameter_bounds
+  use case_values, only: bounds_t
   use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: int64, wp
+  use law_table, only: is_start_parameter, law_choice_t
   use output_check, only: is_folder
   use status, only: exit_bad_case, exit_no_input
   use text, only: number_length, read_number, replace_all, starts_with, to_text
@@ -21,24 +25,29 @@ module point_list
   type, public :: point_list_t
     !> Starts [m, m/s] and drive ratio of each.
     real(wp), allocatable :: x0(:), v0(:), ratio(:)
+    !> Starts of further bodies (rows as named; points), in the units of the parameters.
+    character(len=name_length), allocatable :: names(:)
+    real(wp), allocatable :: further(:, :)
     integer :: points = 0
   end type point_list_t
 
 contains
 
-  !> Reads `path`; without a column `ratio` every point has `default_ratio`. Errors name the line, what was found
-  !> and what is allowed: code 66 for a file that cannot be read, 65 for its content.
-  subroutine read_point_list(path, default_ratio, contact, list, error)
+  !> Reads `path`; without a column `ratio` every point has `default_ratio`. `laws` say which bodies there are. Errors name the
+  !> line, what was found and what is allowed: code 66 for a file that cannot be read, 65 for its content.
+  subroutine read_point_list(path, default_ratio, contact, laws, list, error)
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: default_ratio
     type(contact_t), intent(in) :: contact
+    type(law_choice_t), intent(in) :: laws(:)
     type(point_list_t), intent(out) :: list
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text, line
-    real(wp) :: row(3)
-    integer :: number, columns(3), width
+    real(wp), allocatable :: row(:)
+    integer, allocatable :: columns(:)
+    integer :: number, width
     integer(int64) :: from, length
-    allocate (list%x0(0), list%v0(0), list%ratio(0))
+    allocate (list%x0(0), list%v0(0), list%ratio(0), list%names(0), list%further(0, 0))
     if (is_folder(path)) then
       call fail(error, exit_no_input, "list of points '"//path//"': it is a folder")
       return
@@ -55,7 +64,6 @@ contains
       return
     end if
     number = 0
-    columns = -1
     from = 1
     if (starts_with(text, byte_order_mark)) from = 1 + len(byte_order_mark)
     do while (from <= len(text, int64))
@@ -65,20 +73,22 @@ contains
       from = from + length + 1
       number = number + 1
       if (len(line) == 0 .or. starts_with(line, '#')) cycle
-      if (columns(1) < 0) then
-        call read_header(path, number, line, columns, width, error)
+      if (.not. allocated(columns)) then
+        call read_header(path, number, line, laws, columns, list%names, width, error)
+        if (.not. allocated(error)) list%further = reshape([real(wp) ::], [size(list%names), 0])
       else
-        call read_row(path, number, line, columns, width, default_ratio, contact, row, error)
+        call read_row(path, number, line, columns, list%names, width, default_ratio, contact, row, error)
         if (.not. allocated(error)) call append(list, row)
       end if
       if (allocated(error)) exit
     end do
     if (allocated(error)) return
-    if (columns(1) < 0 .or. list%points == 0) call fail(error, exit_bad_case, path// &
+    if (list%points == 0) call fail(error, exit_bad_case, path// &
       ': found no points, needed is a header x0,v0 (optionally ratio) and a line per point')
     list%x0 = list%x0(:list%points)
     list%v0 = list%v0(:list%points)
     list%ratio = list%ratio(:list%points)
+    list%further = list%further(:, :list%points)
   end subroutine read_point_list
 
   !> Number of line feeds.
@@ -91,15 +101,21 @@ contains
     end do
   end function count_lines
 
-  !> Positions of x0, v0, ratio in the header; 0 for an absent ratio.
-  subroutine read_header(path, number, line, columns, width, error)
+  !> Positions of x0, v0, ratio and the further `names` in the header; 0 for an absent ratio.
+  subroutine read_header(path, number, line, laws, columns, names, width, error)
     character(len=*), intent(in) :: path, line
     integer, intent(in) :: number
-    integer, intent(out) :: columns(3), width
+    type(law_choice_t), intent(in) :: laws(:)
+    integer, allocatable, intent(out) :: columns(:)
+    character(len=name_length), allocatable, intent(out) :: names(:)
+    integer, intent(out) :: width
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: name
+    type(bounds_t) :: bounds
+    logical :: known
     integer :: column
-    columns = 0
+    columns = [0, 0, 0]
+    allocate (names(0))
     width = count_fields(line)
     do column = 1, width
       name = field(line, column)
@@ -111,9 +127,19 @@ contains
       case ('ratio')
         call take(3)
       case default
-        call fail(error, exit_bad_case, path//':'//to_text(number)//": found column '"//name// &
-                  "', allowed are x0, v0, ratio")
-        return
+        known = is_start_parameter(name) .and. len(name) <= name_length
+        if (known) call parameter_bounds(laws, name, bounds, known)
+        if (.not. known) then
+          call fail(error, exit_bad_case, path//':'//to_text(number)//": found column '"//name// &
+                    "', allowed are x0, v0, ratio, and of several bodies body.NAME.x0, body.NAME.v0 ...")
+          return
+        end if
+        if (any(names == name)) then
+          call take(3 + findloc(names == name, .true., 1))
+        else
+          names = [character(len=name_length) :: names, name]
+          columns = [columns, column]
+        end if
       end select
     end do
     if (.not. allocated(error) .and. any(columns(:2) == 0)) call fail(error, exit_bad_case, path//':'// &
@@ -130,25 +156,27 @@ contains
 
   end subroutine read_header
 
-  subroutine read_row(path, number, line, columns, width, default_ratio, contact, row, error)
+  subroutine read_row(path, number, line, columns, further, width, default_ratio, contact, row, error)
     character(len=*), intent(in) :: path, line
-    integer, intent(in) :: number, columns(3), width
+    integer, intent(in) :: number, columns(:), width
+    character(len=*), intent(in) :: further(:)
     real(wp), intent(in) :: default_ratio
     type(contact_t), intent(in) :: contact
-    real(wp), intent(out) :: row(3)
+    real(wp), allocatable, intent(out) :: row(:)
     real(wp) :: barriers(2)
     type(error_t), allocatable, intent(out) :: error
-    character(len=*), parameter :: names(3) = [character(len=5) :: 'x0', 'v0', 'ratio']
+    character(len=name_length) :: names(size(columns))
     character(len=:), allocatable :: where_found, word
     integer :: k, status
     where_found = path//':'//to_text(number)//': '
-    row = [0.0_wp, 0.0_wp, default_ratio]
+    names = [character(len=name_length) :: 'x0', 'v0', 'ratio', further]
+    row = [0.0_wp, 0.0_wp, default_ratio, spread(0.0_wp, 1, size(further))]
     if (count_fields(line) /= width) then
       call fail(error, exit_bad_case, where_found//'found '//to_text(count_fields(line))//' values, the header has '// &
                 to_text(width)//' columns')
       return
     end if
-    do k = 1, 3
+    do k = 1, size(columns)
       if (columns(k) == 0) cycle
       word = field(line, columns(k))
       status = 1
@@ -207,16 +235,20 @@ contains
   !> Adds a point; storage doubles when it is full.
   subroutine append(list, row)
     type(point_list_t), intent(inout) :: list
-    real(wp), intent(in) :: row(3)
+    real(wp), intent(in) :: row(:)
+    integer :: more
     if (list%points == size(list%x0)) then
-      list%x0 = [list%x0, spread(0.0_wp, 1, max(64, list%points))]
-      list%v0 = [list%v0, spread(0.0_wp, 1, max(64, list%points))]
-      list%ratio = [list%ratio, spread(0.0_wp, 1, max(64, list%points))]
+      more = max(64, list%points)
+      list%x0 = [list%x0, spread(0.0_wp, 1, more)]
+      list%v0 = [list%v0, spread(0.0_wp, 1, more)]
+      list%ratio = [list%ratio, spread(0.0_wp, 1, more)]
+      list%further = reshape(list%further, [size(list%names), list%points + more], pad=[0.0_wp])
     end if
     list%points = list%points + 1
     list%x0(list%points) = row(1)
     list%v0(list%points) = row(2)
     list%ratio(list%points) = row(3)
+    list%further(:, list%points) = row(4:)
   end subroutine append
 
 end module point_list

@@ -5,13 +5,14 @@
 module points_driver
   use attractors, only: attractor_t
   use checksum, only: crc32
+  use axis, only: axis_t, name_length
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
   use endings, only: report_reasons
   use errors, only: error_t, fail
-  use file_layout, only: add_reason, add_regime
-  use grid, only: grid_t, machine_with, slice_motion
+  use file_layout, only: add_reason, add_regime, axis_dimension
+  use grid, only: grid_t, machine_with, make_grid, point_start, sample_axis, slice_motion
   use kinds, only: int64, int8, wp
   use lane_preparation, only: prepare_lanes
   use map_file, only: map_file_t
@@ -30,16 +31,19 @@ module points_driver
   implicit none
   private
 
-  public :: run_points, open_list_journey, read_list, describe_list, end_points
+  public :: run_points, open_list_journey, read_list, read_further, describe_list, end_points
 
   integer, parameter, public :: points_per_tile = 256
   !> Starts, final state, impacts, last impact speed, regime, reason.
   integer, parameter :: bytes_per_point = 6*8 + 4 + 2
   !> x, v, impacts, last impact speed, regime, reason.
   integer, parameter :: point_variables = 6
+  !> Attribute that names the starts of further bodies.
+  character(len=*), parameter :: further_starts = 'further_starts'
 
   type, extends(point_work_t), public :: list_work_t
-    type(grid_t) :: grid
+    !> The machine of the list, and the starts: a grid along the points.
+    type(grid_t) :: grid, starts
     type(journey_t) :: journey
     type(point_list_t) :: list
     real(wp) :: ratio = -1
@@ -69,7 +73,8 @@ contains
     work%block = block_size(work%journey)
     if (.not. allocated(error)) work%ratio = work%journey%moving%machine%drive%ratio
     if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%journey%moving%machine%contact, &
-                                                     work%list, error)
+                                                     session%the_case%laws, work%list, error)
+    if (.not. allocated(error)) work%starts = starts_of(work%grid, work%list)
     if (.not. allocated(error)) call check_periods(work%journey%span, shortest_period(work), error)
     call session%stop_if(error)
     path = output_path(command%output, command%path, command%name)
@@ -126,6 +131,25 @@ contains
     journey%span%extension = 1
     journey%describe = describe_regime
   end subroutine open_list_journey
+
+  !> The starts of a list as a grid along its points.
+  pure function starts_of(grid, list) result(starts)
+    type(grid_t), intent(in) :: grid
+    type(point_list_t), intent(in) :: list
+    type(grid_t) :: starts
+    type(axis_t) :: along(1)
+    real(wp), allocatable :: drawn(:, :)
+    integer :: i
+    along(1)%name = sample_axis
+    along(1)%unit = '1'
+    along(1)%values = [(real(i, wp), i=1, size(list%x0))]
+    allocate (drawn(2 + size(list%names), size(list%x0)))
+    drawn(1, :) = list%x0
+    drawn(2, :) = list%v0
+    drawn(3:, :) = list%further
+    starts = make_grid(along, grid%laws, grid%start, grid%options, [character(len=name_length) :: 'x0', 'v0', list%names], drawn)
+  end function starts_of
+
   !> The drive period of the fastest point.
   pure real(wp) function shortest_period(work)
     type(list_work_t), intent(in) :: work
@@ -142,6 +166,7 @@ contains
     sum_so_far = crc32(transfer(list%x0, one), 0_int64)
     sum_so_far = crc32(transfer(list%v0, one), sum_so_far)
     sum_so_far = crc32(transfer(list%ratio, one), sum_so_far)
+    if (size(list%names) > 0) sum_so_far = crc32(transfer(list%further, one), sum_so_far)
     identity = to_text(sum_so_far)
   end function list_identity
 
@@ -155,11 +180,38 @@ contains
     if (.not. allocated(error)) call reader%read_values('/x0', list%x0, error)
     if (.not. allocated(error)) call reader%read_values('/v0', list%v0, error)
     if (.not. allocated(error)) call reader%read_values('/ratio', list%ratio, error)
+    if (.not. allocated(error)) call read_further(reader, list, error)
     if (.not. allocated(error)) call reader%close(error)
     if (allocated(error)) return
     if (size(list%v0) /= size(list%x0) .or. size(list%ratio) /= size(list%x0)) call fail(error, exit_io, &
       "'"//path//"' is damaged: x0, v0 and ratio have different lengths")
   end subroutine read_list
+
+  !> The starts of further bodies in the file of a run; none are named where there are none.
+  subroutine read_further(reader, list, error)
+    type(reader_t), intent(in) :: reader
+    type(point_list_t), intent(inout) :: list
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: rest
+    real(wp), allocatable :: column(:), columns(:)
+    integer :: length
+    allocate (list%names(0), columns(0))
+    rest = ''
+    if (reader%has_attribute('/', further_starts)) call reader%text_attribute('/', further_starts, rest, error)
+    do while (len_trim(rest) > 0 .and. .not. allocated(error))
+      length = index(rest//' ', ' ') - 1
+      list%names = [character(len=name_length) :: list%names, rest(:length)]
+      rest = rest(min(length + 2, len(rest) + 1):)
+      call reader%read_values('/'//axis_dimension(list%names(size(list%names))), column, error)
+      if (.not. allocated(error)) columns = [columns, column]
+    end do
+    if (allocated(error)) return
+    if (size(columns) /= size(list%names)*size(list%x0)) then
+      call fail(error, exit_io, "'"//reader%path//"' is damaged: starts have different lengths")
+      return
+    end if
+    list%further = transpose(reshape(columns, [size(list%x0), size(list%names)]))
+  end subroutine read_further
 
   !> Attributes, starts and variables of the file.
   subroutine describe_list(session, list, schema)
@@ -173,10 +225,19 @@ contains
   subroutine describe_points(list, schema)
     type(point_list_t), intent(in) :: list
     type(schema_t), intent(inout) :: schema
+    character(len=:), allocatable :: names
+    integer :: k
     call schema%add_dimension('point', size(list%x0, kind=int64))
     call add('x0', 'm', 'initial position', list%x0)
     call add('v0', 'm/s', 'initial velocity', list%v0)
     call add('ratio', '1', 'drive angular frequency over natural angular frequency', list%ratio)
+    names = ''
+    do k = 1, size(list%names)
+      names = names//' '//trim(list%names(k))
+      call add(axis_dimension(list%names(k)), trim(merge('m  ', 'm/s', index(list%names(k), '.x0') > 0)), &
+               trim(list%names(k))//' at the start', list%further(k, :))
+    end do
+    if (len(names) > 0) call schema%add_attribute('', further_starts, names(2:))
     call schema%add_variable('x', type_float64, ['point'], units='m', long_name='final position', tiled=.true.)
     call schema%add_variable('v', type_float64, ['point'], units='m/s', long_name='final velocity', tiled=.true.)
     call schema%add_variable('impacts', type_int32, ['point'], units='1', long_name='number of impacts', tiled=.true.)
@@ -228,11 +289,11 @@ contains
     real(wp), intent(out) :: values(:, :)
     type(outcome_t) :: outcomes(size(points))
     type(attractor_t) :: no_catalogue(0)
-    real(wp) :: starts(3, size(points))
+    real(wp) :: starts(3 + size(work%starts%others), size(points))
     integer :: i
-    starts(1, :) = work%list%x0(points)
-    starts(2, :) = work%list%v0(points)
-    starts(3, :) = work%grid%start(3)
+    do i = 1, size(points)
+      starts(:, i) = point_start(work%starts, [points(i)])
+    end do
     call run_trajectories(work%journey, no_catalogue, starts, outcomes)
     do i = 1, size(points)
       associate (outcome => outcomes(i))
@@ -251,7 +312,8 @@ contains
     end associate
   end subroutine note_list_point
 
-  !> The table x0,v0,ratio,x,v,impacts,last_impact_speed,reason; numbers read back to the same bits.
+  !> The table x0,v0,ratio,x,v,impacts,last_impact_speed,reason, starts of further bodies behind ratio; numbers read back to
+  !> the same bits.
   subroutine write_csv(csv, path, list, error)
     character(len=*), intent(in) :: csv, path
     type(point_list_t), intent(in) :: list
@@ -259,7 +321,8 @@ contains
     type(reader_t) :: reader
     real(wp), allocatable :: x(:), v(:), impacts(:), speed(:), reason(:)
     type(table_t) :: table
-    integer :: i
+    character(len=:), allocatable :: further
+    integer :: i, k
     call open_final(path, reader, error)
     if (.not. allocated(error)) call reader%read_values('/x', x, error)
     if (.not. allocated(error)) call reader%read_values('/v', v, error)
@@ -269,10 +332,18 @@ contains
     if (.not. allocated(error)) call reader%close(error)
     if (allocated(error)) return
     call table%create(csv)
-    call table%line('x0,v0,ratio,x,v,impacts,last_impact_speed,reason')
+    further = ''
+    do k = 1, size(list%names)
+      further = further//trim(list%names(k))//','
+    end do
+    call table%line('x0,v0,ratio,'//further//'x,v,impacts,last_impact_speed,reason')
     do i = 1, size(x)
-      call table%line(to_text(list%x0(i))//','//to_text(list%v0(i))//','//to_text(list%ratio(i))//','//to_text(x(i))//','// &
-                      to_text(v(i))//','//to_text(nint(impacts(i)))//','//to_text(speed(i))//','// &
+      further = ''
+      do k = 1, size(list%names)
+        further = further//to_text(list%further(k, i))//','
+      end do
+      call table%line(to_text(list%x0(i))//','//to_text(list%v0(i))//','//to_text(list%ratio(i))//','//further// &
+                      to_text(x(i))//','//to_text(v(i))//','//to_text(nint(impacts(i)))//','//to_text(speed(i))//','// &
                       trim(reason_names(nint(reason(i)))))
     end do
     call table%close(error)

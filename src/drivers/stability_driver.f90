@@ -1,7 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> `separatrix stability`: Lyapunov exponents of the motion from [start], and what kind of motion it is.
+!> `separatrix stability`: Lyapunov exponents of the motion from [start], or of the entries of a map without a period, and what
+!> kind of motion it is.
 module stability_driver
   use body_family, only: body_neighbourhood, family_t
   use case_check, only: require_start
@@ -9,12 +10,15 @@ module stability_driver
   use command_line, only: command_t
   use errors, only: error_t
   use exponents, only: lyapunov_exponents, motion_names, spectrum_t, type_of_motion, zero_one_test
+  use files, only: file_exists, is_special, is_text
   use journal, only: json_number, json_text
   use kinds, only: wp
+  use launcher, only: launched_rank
   use motion, only: start_state
   use motion_state, only: state_t
   use one_body, only: one_body_t
   use session, only: open_session, session_t
+  use stability_of_map, only: most_points, run_stability_of_map
   use status, only: exit_done
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
@@ -23,13 +27,29 @@ module stability_driver
 
   public :: run_stability
 
-  !> Section points that the 0-1 test looks at, at most.
-  integer, parameter :: most_points = 5000
-
 contains
 
-  !> Runs the command; ends the program with the exit code on errors.
-  subroutine run_stability(command)
+  !> Runs the command on a case, which ends the program, or on a map.
+  subroutine run_stability(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    if (is_map(command%path)) then
+      if (launched_rank() == 0) call run_stability_of_map(command, error)
+    else
+      call run_stability_of_case(command)
+    end if
+  end subroutine run_stability
+
+  !> Whether a path is that of a file in HDF5, not of a case: a regular file that is no text.
+  logical function is_map(path)
+    character(len=*), intent(in) :: path
+    is_map = file_exists(path)
+    if (is_map) is_map = .not. is_special(path)
+    if (is_map) is_map = .not. is_text(path)
+  end function is_map
+
+  !> The motion of a case; ends the program with the exit code on errors.
+  subroutine run_stability_of_case(command)
     type(command_t), intent(in) :: command
     type(session_t) :: session
     type(family_t) :: family
@@ -65,7 +85,7 @@ contains
       end if
     end if
     call session%end_with(exit_done)
-  end subroutine run_stability
+  end subroutine run_stability_of_case
 
   !> What was found, with errors and the check.
   subroutine report(session, spectrum, k)

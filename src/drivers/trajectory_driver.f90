@@ -4,7 +4,7 @@
 !> `separatrix trajectory`: one motion, its time history and every event.
 module trajectory_driver
   use angle_units, only: unit_of
-  use attractors, only: attractor_t, features_t, regime_names
+  use attractors, only: attractor_t, features_t, kind_rest, regime_names
   use case_check, only: require_start
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
@@ -13,7 +13,7 @@ module trajectory_driver
   use errors, only: error_t, fail
   use file_layout, only: add_events, axis_dimension
   use grid, only: grid_t, slice_motion
-  use jointed, only: jointed_t
+  use jointed, only: joint_section, jointed_t
   use journal, only: duration_text
   use kinds, only: int64, wp
   use map_final, only: write_whole
@@ -31,6 +31,7 @@ module trajectory_driver
   use text_table, only: table_t
   use written_check, only: check_written
   use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
+  use turn_section, only: has_no_clock
   implicit none
   private
 
@@ -147,6 +148,7 @@ contains
     end if
     call schema%add_attribute('', 'window', span%window)
     call schema%add_attribute('', 'period', cycle%period)
+    if (cycle%duration > 0) call schema%add_attribute('', 'cycle_time', cycle%duration)
     associate (f => outcome%window)
       call schema%add_attribute('', 'amplitude', f%amplitude)
       call schema%add_attribute('', 'x_max', f%x_max)
@@ -239,16 +241,17 @@ contains
     type(schema_t), intent(inout) :: schema
     character(len=:), allocatable :: names
     real(wp), allocatable :: joints(:, :)
-    integer :: i
-    if (size(machine%joints) == 0) return
+    integer :: i, count_joints
+    count_joints = count(machine%joints%kind /= joint_section)
+    if (count_joints == 0) return
     names = ''
-    do i = 1, size(machine%joints)
+    do i = 1, count_joints
       names = names//trim(machine%joints(i)%name)//' '
     end do
     allocate (joints(4, log%events))
     if (log%events > 0) joints = log%event_joint(:, :log%events)
     call schema%add_variable('event_joint', type_int8, ['event'], units='1', long_name='joint', &
-                             flag_values=[(i, i=1, size(machine%joints))], flag_meanings=trim(names), data=joints(1, :))
+                             flag_values=[(i, i=1, count_joints)], flag_meanings=trim(names), data=joints(1, :))
     call schema%add_variable('event_joint_x', type_float64, ['event'], units='m', &
                              long_name='joint coordinate: second body minus first', data=joints(2, :))
     call schema%add_variable('event_joint_v_before', type_float64, ['event'], units='m/s', &
@@ -346,7 +349,8 @@ contains
         '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
         to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
-      call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, drive period '// &
+      call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, '// &
+        trim(merge('period of the slowest mode', 'drive period              ', has_no_clock(moving)))//' '// &
         to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
     end associate
   end subroutine report
@@ -359,6 +363,8 @@ contains
     character(len=:), allocatable :: text
     if (cycle%period > 0) then
       text = 'over its cycle of period '//to_text(cycle%period)
+      if (cycle%by_event) text = 'over its limit cycle of '//to_text(cycle%duration, 10)//' s'
+      if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
     else if (span%whole_periods) then
       text = 'last '//to_text(nint(span%window/moving%machine%period))//' drive periods'
     else

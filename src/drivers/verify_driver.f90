@@ -18,10 +18,12 @@ module verify_driver
   use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64, real32, wp
+  use law_table, only: change_parameter
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
-  use points_driver, only: open_list_journey
+  use point_list, only: point_list_t
+  use points_driver, only: open_list_journey, read_further
   use random, only: uniform
   use reference, only: run_reference
   use refinement, only: origin_contradicted
@@ -316,11 +318,16 @@ contains
     type(journey_t) :: journey
     type(catalogue_t) :: none
     type(outcome_t) :: outcomes(1)
+    type(case_t) :: own
+    type(point_list_t) :: list
     real(wp), allocatable :: table(:, :)
     real(wp) :: results(6, 1), start(3, 1)
     character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
-    integer :: i, place(1), point
+    integer :: i, k, place(1), point
+    logical :: known
     call reader%read_columns('/'//names, table, error)
+    if (.not. allocated(error)) list%x0 = table(:, 1)
+    if (.not. allocated(error)) call read_further(reader, list, error)
     if (allocated(error)) return
     allocate (none%attractors(0))
     audit%whole = size(table, 1) <= sample
@@ -332,7 +339,11 @@ contains
         return
       end if
       axes(1) = axis_t('drive.ratio', '1', [table(point, 3)])
-      grid = grid_of(the_case, axes(:merge(1, 0, table(point, 3) > 0)))
+      own = the_case
+      do k = 1, size(list%names)
+        call change_parameter(own%laws, list%names(k), list%further(k, point), known)
+      end do
+      grid = grid_of(own, axes(:merge(1, 0, table(point, 3) > 0)))
       call open_list_journey(grid, the_case, journey, error)
       if (.not. allocated(error)) call check_periods(journey%span, journey%moving%machine%period, error)
       if (allocated(error)) then

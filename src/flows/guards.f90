@@ -5,7 +5,7 @@
 !> of one form, constant + place s + speed u + force lambda of a joint.
 module guards
   use contact_law, only: contact_kelvin_voigt
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_joints
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, jointed_t, most_joints
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
@@ -17,9 +17,10 @@ module guards
   integer, parameter, public :: most_guards = 3*most_joints
 
   !> What a fallen guard means: a slide ends; friction gives way upwards or downwards; the upper or lower stop is reached; a
-  !> closed contact is let go; a pressed one is without force; one without force pushes again; a soft stop is left.
+  !> closed contact is let go; a pressed one is without force; one without force pushes again; a soft stop is left; the watched
+  !> coordinate turns round.
   integer, parameter, public :: slide_ends = 1, slides_up = 2, slides_down = 3, meets_upper = 4, meets_lower = 5, &
-    lets_go = 6, force_ends = 7, force_returns = 8, leaves = 9
+    lets_go = 6, force_ends = 7, force_returns = 8, leaves = 9, turns_round = 10
 
   type, public :: joint_guard_t
     integer :: joint = 0, meaning = 0
@@ -80,6 +81,8 @@ contains
           end if
         case (joint_soft)
           call soft_guards(machine, state, j, list, count_guards)
+        case (joint_section)
+          if (phase /= 0) call put(list, count_guards, joint_guard_t(j, turns_round, speed=d, from_zero=changed))
         end select
       end associate
     end do

@@ -56,6 +56,8 @@ module motion
     real(wp) :: layer = 0
     !> Two bodies, which have an event loop of their own.
     type(pair_motion_t), allocatable :: pair
+    !> The section is where the motion turns round, in the place of a time.
+    logical :: by_event = .false.
     !> Several bodies with joints.
     type(jointed_motion_t), allocatable :: jointed
   end type motion_t
@@ -103,15 +105,15 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
   !> trajectory had to be given up (codes of module `status`). With `slip_speed` no further than to a slip in the other
-  !> direction that is so fast [m/s].
-  pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed)
+  !> direction that is so fast [m/s], with `seam` no further than to a slip through that place [m], or its opposite.
+  pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed, seam)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp), intent(in), optional :: slip_speed
+    real(wp), intent(in), optional :: slip_speed, seam
     real(wp) :: before
     integer :: stalls, other
     reason = 0
@@ -124,7 +126,7 @@ contains
       before = state%time
       select case (state%mode)
       case (mode_slip_plus, mode_slip_minus)
-        call slip_on(moving, state, time_end, tally, reason, log)
+        call slip_on(moving, state, time_end, tally, reason, log, seam)
       case default
         call rest_on(moving, state, time_end, tally, log)
       end select
@@ -133,6 +135,9 @@ contains
       if (state%x /= state%x .or. state%v /= state%v .or. state%time /= state%time) reason = reason_not_finite
       stalls = merge(0, stalls + 1, state%time > before)
       if (stalls >= most_stalls) call break_tie(moving, state, time_end)
+      if (present(seam)) then
+        if (abs(state%x) >= seam .and. abs(state%v) > 0) exit
+      end if
       if (.not. present(slip_speed) .or. reason /= 0) cycle
       if (state%mode == other .and. abs(state%v) >= slip_speed) exit
     end do
@@ -155,14 +160,15 @@ contains
     end if
   end subroutine advance_period
 
-  !> One flight and the event at its end.
-  pure subroutine slip_on(moving, state, time_end, tally, reason, log)
+  !> One flight and the event at its end, none at a `seam`.
+  pure subroutine slip_on(moving, state, time_end, tally, reason, log, seam)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
+    real(wp), intent(in), optional :: seam
     type(state_t) :: start
     real(wp) :: barrier, before
     integer :: outcome, direction, first_sample
@@ -176,6 +182,7 @@ contains
       end if
       barrier = merge(moving%machine%contact%soft_upper, moving%machine%contact%soft_lower, direction > 0)
     end if
+    if (present(seam)) barrier = direction*seam
     before = state%time
     inside = moving%layer > 0 .and. abs(state%v) <= moving%layer
     outcome = flight_barrier
@@ -197,13 +204,15 @@ contains
     select case (outcome)
     case (flight_barrier)
       tally%v_max = max(tally%v_max, state%v)
-      if (moving%machine%contact%soft) then
+      if (present(seam)) then
+        state%x = barrier
+      else if (moving%machine%contact%soft) then
         call touch(state, direction, tally, log)
       else
         call collide(moving, state, direction, time_end, tally, log)
       end if
     case (flight_speed_reached)
-      tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
+      if (.not. present(seam)) tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
       call come_to_rest(moving, state, event_turning_point, tally, log)
     case (flight_failed)
       reason = reason_step_failed

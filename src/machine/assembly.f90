@@ -324,7 +324,7 @@ contains
     integer :: i
     if (machine%n > most_degrees) then
       call fail(error, exit_bad_case, 'body: found too many bodies, allowed at most 16 coordinates')
-    else if (size(machine%joints) > most_joints) then
+    else if (size(machine%joints) >= most_joints) then
       call fail(error, exit_bad_case, 'joints: found too many, allowed at most 12')
     end if
     if (allocated(error)) return

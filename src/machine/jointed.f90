@@ -14,13 +14,13 @@ module jointed
 
   public :: wave_value, offset_of
 
-  integer, parameter, public :: most_degrees = 16, most_joints = 12
+  !> One joint more than a machine may have: the section of a motion without a clock.
+  integer, parameter, public :: most_degrees = 16, most_joints = 13
 
-  !> Kinds of joints: dry friction, spring and slider in series, rigid contact, contact with a force over penetration, and
-  !> a spring whose force is not linear.
-  integer, parameter, public :: joint_friction = 1, joint_elastic = 2, joint_contact = 3, joint_soft = 4, joint_spring = 5
-  character(len=*), parameter, public :: joint_names(5) = [character(len=16) :: 'friction', 'elastic friction', &
-    'contact', 'soft contact', 'spring']
+  !> Kinds of joints: dry friction, spring and slider in series, rigid contact, contact with a force over penetration,
+  !> a spring whose force is not linear, and one without force at which the watched coordinate turns round.
+  integer, parameter, public :: joint_friction = 1, joint_elastic = 2, joint_contact = 3, joint_soft = 4, joint_spring = 5, &
+    joint_section = 6
 
   !> How the speeds after an impact of several contacts at once are found.
   integer, parameter, public :: together_newton = 0, together_sequence = 1

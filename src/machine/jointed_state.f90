@@ -15,7 +15,8 @@ module jointed_state
   public :: turning_at, joint_motion, joint_force, joint_energy, free_force, key_of, is_held, acts_as_spring, is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
-  !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2).
+  !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not
+  !> looked for (0), the watched coordinate moves towards it (+1) or away (-1).
   type, public :: jointed_state_t
     real(wp) :: q(most_degrees) = 0, v(most_degrees) = 0
     !> Since the section [s].
@@ -25,6 +26,8 @@ module jointed_state
     real(wp) :: slider(most_joints) = 0, touch_speed(most_joints) = 0
     !> The joint has just changed its phase: the guard of its new phase starts at zero. +1, -1: the stop it has left.
     integer :: left(most_joints) = 0
+    !> The motion without a clock has just reached the section.
+    logical :: at_section = .false.
   end type jointed_state_t
 
 contains

@@ -115,7 +115,8 @@ contains
     if (is_pair(grid%laws)) return
     do i = 1, size(neighbours)
       if (neighbours(i)%rests) cycle
-      starts = reshape([starts, neighbours(i)%points(:2, 1), 0.0_wp, grid%others], [size(starts, 1), size(starts, 2) + 1])
+      starts = reshape([starts, merge(neighbours(i)%section(:2), neighbours(i)%points(:2, 1), neighbours(i)%by_event), 0.0_wp, &
+                        grid%others], [size(starts, 1), size(starts, 2) + 1])
     end do
   end function search_starts
 

@@ -10,7 +10,8 @@ module settling
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, scales_of, section_point, strobe_t
+  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, scales_of, section_point, strobe_t, turn_of
+  use turn_section, only: has_no_clock
   implicit none
   private
 
@@ -28,8 +29,10 @@ module settling
   integer, parameter :: most_periods = 65536
 
   type, public :: settled_t
-    !> In drive periods; 0 = not known, as the motion has not settled.
+    !> In drive periods, of a machine without a clock in turns; 0 = not known, as the motion has not settled.
     integer :: period = 0
+    !> Time that one cycle takes [s], 0 where none is known.
+    real(wp) :: duration = 0
     !> Has not settled, but is near a cycle: a slow transient, no chaos.
     logical :: near_cycle = .false.
     !> Where the search ended, on the section: on the cycle if the motion has settled, a whole number of cycles from the start.
@@ -45,8 +48,25 @@ module settling
 contains
 
   !> Follows a motion from `start`, on the section, until it has settled on a cycle of at most `longest` drive periods, or its
-  !> returns no longer shrink and `patience` drive periods are over.
+  !> returns no longer shrink and `patience` drive periods are over. Without a clock it may settle on an equilibrium, or on a cycle
+  !> with at most `longest` turns.
   pure subroutine settle(moving, start, longest, patience, settled)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: start
+    integer, intent(in) :: longest, patience
+    type(settled_t), intent(out) :: settled
+    type(motion_t) :: turning
+    type(settled_t) :: turned
+    call settle_on_section(moving, start, longest, patience, settled)
+    if (settled%period > 0 .or. settled%reason /= 0 .or. .not. has_no_clock(moving)) return
+    turning = moving
+    turning%by_event = .true.
+    call settle_on_section(turning, start, longest, patience, turned)
+    if (turned%reason == 0) settled = turned
+  end subroutine settle
+
+  !> The same with the section as it is.
+  pure subroutine settle_on_section(moving, start, longest, patience, settled)
     type(motion_t), intent(in) :: moving
     type(strobe_t), intent(in) :: start
     integer, intent(in) :: longest, patience
@@ -82,7 +102,11 @@ contains
       call run_periods(moving, settled%period - modulo(periods, settled%period), tally, settled)
       if (settled%reason == 0) call run_periods(moving, settled%period, tally, settled)
       if (settled%reason /= 0) settled%period = 0
-      settled%features = features_over(moving, tally, real(max(1, settled%period), wp))
+      if (moving%by_event) then
+        settled%features = features_over(moving, tally, settled%duration/moving%machine%period)
+      else
+        settled%features = features_over(moving, tally, real(max(1, settled%period), wp))
+      end if
       settled%features%word = 0
       if (settled%period > 0) settled%features%word = cycle_word(moving, settled%state, settled%period)
     else
@@ -90,7 +114,7 @@ contains
       settled%features%word = 0
     end if
     settled%mark = mark_of(moving, settled%features)
-  end subroutine settle
+  end subroutine settle_on_section
 
   !> By what limits are told: the regime of two bodies, of one body whether there are impacts.
   pure integer function mark_of(moving, features) result(mark)
@@ -122,9 +146,11 @@ contains
     type(settled_t), intent(inout) :: settled
     integer :: i
     call reset_tally(tally, settled%state%state, allocated(moving%pair))
+    settled%duration = 0
     do i = 1, periods
       call advance_strobe_period(moving, settled%state, tally, settled%reason)
       if (settled%reason /= 0) return
+      settled%duration = settled%duration + settled%state%lasted
     end do
   end subroutine run_periods
 
@@ -141,7 +167,7 @@ contains
     misses = 0
     do p = 1, last/2
       do i = min(last/2, last - 2*p + 1), last - p
-        associate (later => point_near(points(:n, i + p), points(:n, i), moving%machine%turn))
+        associate (later => point_near(points(:n, i + p), points(:n, i), turn_of(moving)))
           misses(p) = max(misses(p), norm2((later - points(:n, i))/sizes(:n)))
         end associate
       end do

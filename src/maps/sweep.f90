@@ -14,8 +14,9 @@ module sweep
   use settling, only: mark_of, settle, settled_t
   use span_check, only: check_periods
   use status, only: reason_time_over
-  use strobe, only: advance_strobe_period, features_over, resume_strobe, strobe_t
+  use strobe, only: advance_strobe_period, advance_to_section, features_over, resume_strobe, strobe_t
   use trajectory, only: span_t
+  use turn_section, only: has_no_clock
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -74,6 +75,7 @@ contains
       end if
       if (i > periods - samples) held%samples(:, i - periods + samples) = [held%state%state%x, held%state%state%v]
     end do
+    if (has_no_clock(moving)) call sample_turns(moving, held%state, held%samples)
     held%reason = reason_time_over
     held%features = features_over(moving, tally, real(in_window, wp))
     held%mark = mark_of(moving, held%features)
@@ -89,6 +91,23 @@ contains
       seen%rotation = cycle%rotation
     end associate
   end subroutine hold_parameter
+
+  !> Where a machine without a clock turns round next, rows x [m] and v [m/s]; the state as it is, where it does not.
+  pure subroutine sample_turns(moving, state, samples)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: state
+    real(wp), intent(out) :: samples(:, :)
+    type(strobe_t) :: later
+    type(tally_t) :: unused
+    integer :: i, reason
+    samples = spread([state%state%x, state%state%v], 2, size(samples, 2))
+    later = state
+    do i = 1, size(samples, 2)
+      call advance_to_section(moving, later, unused, reason)
+      if (reason /= 0) return
+      samples(:, i) = [later%state%x, later%state%v]
+    end do
+  end subroutine sample_turns
 
   !> Features of a hold without an end: not numbers.
   pure function no_features() result(features)

@@ -38,50 +38,34 @@ contains
     type(log_t), intent(inout), optional :: log
     type(jointed_state_t) :: start
     type(path_t) :: path
-    reason = 0
-    if (options%flight == flight_adaptive .or. is_marched(machine, state%phase)) then
-      call march_on(machine, flow, options, state, until, list, count_guards, fallen, watch, steps, reason, log)
-      return
-    end if
-    start = state
-    call fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
-    if (present(log)) call log_flight(machine, flow, path, start, state%time - start%time, log)
-    steps = steps + watch%evaluations
-    watch%evaluations = 0
-  end subroutine fly
-
-  !> The same step by step.
-  pure subroutine march_on(machine, flow, options, state, until, list, count_guards, fallen, watch, steps, reason, log)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(options_t), intent(in) :: options
-    type(jointed_state_t), intent(inout) :: state
-    real(wp), intent(in) :: until
-    type(joint_guard_t), intent(out) :: list(most_guards)
-    integer, intent(out) :: count_guards, reason
-    logical, intent(out) :: fallen(most_guards)
-    type(watch_t), intent(inout) :: watch
-    integer(int64), intent(inout) :: steps
-    type(log_t), intent(inout), optional :: log
-    type(marched_flight_t) :: flight
-    type(jointed_state_t) :: start
-    type(path_t) :: path
     logical :: ended, failed
     reason = 0
-    call begin_flight(machine, flow, state, options%tolerance, flight)
-    list = flight%list
-    count_guards = flight%count_guards
-    do
+    if (.not. (options%flight == flight_adaptive .or. is_marched(machine, state%phase))) then
       start = state
-      call step_flight(machine, flight, state, until, path, fallen, ended, failed, watch)
-      if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
-      steps = steps + 1
-      if (failed) reason = reason_step_failed
-      if (steps > options%step_budget) reason = reason_step_budget
-      if (.not. all(abs(state%q(:machine%n)) <= options%domain)) reason = reason_left_domain
-      if (ended .or. reason /= 0) exit
-    end do
+      call fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
+      if (present(log)) call log_flight(machine, flow, path, start, state%time - start%time, log)
+      steps = steps + watch%evaluations
+      watch%evaluations = 0
+      return
+    end if
+    ! Large: made where it is needed.
+    block
+      type(marched_flight_t) :: flight
+      call begin_flight(machine, flow, state, options%tolerance, flight)
+      list = flight%list
+      count_guards = flight%count_guards
+      do
+        start = state
+        call step_flight(machine, flight, state, until, path, fallen, ended, failed, watch)
+        if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
+        steps = steps + 1
+        if (failed) reason = reason_step_failed
+        if (steps > options%step_budget) reason = reason_step_budget
+        if (.not. all(abs(state%q(:machine%n)) <= options%domain)) reason = reason_left_domain
+        if (ended .or. reason /= 0) exit
+      end do
+    end block
     watch%evaluations = 0
-  end subroutine march_on
+  end subroutine fly
 
 end module jointed_flight

@@ -3,7 +3,7 @@
 
 !> A jointed structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
 module jointed_flows
-  use jointed, only: jointed_t
+  use jointed, only: joint_contact, joint_section, joint_t, jointed_t
   use kinds, only: wp
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: flight_adaptive, options_t
@@ -19,6 +19,8 @@ module jointed_flows
     type(options_t) :: options
     type(mode_flow_t), allocatable :: flows(:)
     integer :: harmonics = 0
+    !> Number of the joint that is the section of a machine without a clock; 0: the section is a time.
+    integer :: section = 0
     !> Share by which the acceleration of a gap may change until its chatter has died away; 0: no chatter is completed.
     real(wp) :: chatter_share = 1e-5_wp
   end type jointed_motion_t
@@ -35,19 +37,44 @@ contains
     moving%options = options
     moving%harmonics = harmonics_of(machine)
     joints = size(machine%joints)
+    if (.not. machine%driven) then
+      moving%section = joints + 1
+      moving%machine%joints = [machine%joints, section_of(machine)]
+    end if
     if (joints <= few_joints) then
       allocate (moving%flows(2**joints))
       do key = 0, 2**joints - 1
-        call build_flow(machine, key, with_matrix(moving), moving%flows(key + 1))
+        call build_flow(moving%machine, key, with_matrix(moving), moving%flows(key + 1))
       end do
     else
       allocate (moving%flows(joints + 1))
-      call build_flow(machine, 0, with_matrix(moving), moving%flows(1))
+      call build_flow(moving%machine, 0, with_matrix(moving), moving%flows(1))
       do i = 1, joints
-        call build_flow(machine, ibset(0, i - 1), with_matrix(moving), moving%flows(i + 1))
+        call build_flow(moving%machine, ibset(0, i - 1), with_matrix(moving), moving%flows(i + 1))
       end do
     end if
   end subroutine prepare_jointed
+
+  !> The section of a machine without a clock: the maxima of the watched coordinate; its minima where a rigid stop cuts the
+  !> maxima off, for there the speed jumps.
+  pure type(joint_t) function section_of(machine) result(section)
+    type(jointed_t), intent(in) :: machine
+    integer :: j
+    logical :: upper, lower
+    upper = .false.
+    lower = .false.
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j), along => machine%joints(j)%row(machine%watched))
+        if (joint%kind /= joint_contact) cycle
+        upper = upper .or. (along > 0 .and. joint%upper < huge(along)) .or. (along < 0 .and. joint%lower > -huge(along))
+        lower = lower .or. (along > 0 .and. joint%lower > -huge(along)) .or. (along < 0 .and. joint%upper < huge(along))
+      end associate
+    end do
+    section%name = 'section'
+    section%kind = joint_section
+    allocate (section%row(machine%n), source=0.0_wp)
+    section%row(machine%watched) = merge(-1, 1, upper .and. .not. lower)
+  end function section_of
 
   !> Whether a flight may be marched: it needs the rows of the exponential series.
   pure logical function with_matrix(moving)

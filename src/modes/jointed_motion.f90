@@ -4,7 +4,8 @@
 !> The event loop of a jointed structure: fly to the first guard, make the transition, until a time.
 module jointed_motion
   use constants, only: two_pi
-  use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up
+  use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up, &
+    turns_round
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
   use jointed_flight, only: fly
   use jointed_flows, only: jointed_motion_t, prepare_jointed, ready, with_matrix
@@ -17,11 +18,12 @@ module jointed_motion
   use motion_state, only: append_word, event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
     event_turning_point, log_t, tally_t, word_period
-  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed
+  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
+    reason_time_over
   implicit none
   private
 
-  public :: jointed_motion_t, prepare_jointed, start_jointed, advance_jointed, advance_jointed_period
+  public :: jointed_motion_t, prepare_jointed, start_jointed, advance_jointed, advance_jointed_period, advance_to_turn
 
   !> Events without progress in time after which the phases are held for an instant, and how often that may be.
   integer, parameter :: most_stalls = 8, most_holds = 100
@@ -90,16 +92,17 @@ contains
     type(watch_t) :: watch
     real(wp) :: before
     integer :: count_guards, stalls, holds, burst, key
-    logical :: fallen(most_guards), ok
+    logical :: fallen(most_guards), ok, turned
     reason = 0
     stalls = 0
     holds = 0
     burst = 0
+    state%at_section = .false.
     watch%extremes = [tally%x_min, tally%x_max]
     watch%top_speed = tally%v_max
     watch%wants_speed = tally%wants_v_max
     associate (machine => moving%machine)
-      do while (state%time < time_end)
+      do while (state%time < time_end .and. .not. state%at_section)
         tally%events = tally%events + 1
         if (tally%events > moving%options%event_budget) reason = reason_event_budget
         if (holds >= most_holds) reason = reason_step_failed
@@ -118,6 +121,8 @@ contains
         if (state%time > before) state%left = 0
         stalls = merge(0, stalls + 1, state%time > before)
         burst = merge(burst, 0, state%time - before < burst_gap*machine%period)
+        turned = any(fallen .and. list%meaning == turns_round)
+        fallen = fallen .and. list%meaning /= turns_round
         if (any(fallen)) then
           start = state
           call transition(moving, state, list, fallen, stalls >= most_stalls, burst, tally, ok)
@@ -128,6 +133,7 @@ contains
             holds = holds + 1
           end if
         end if
+        if (moving%section > 0) call follow_section(moving, turned, state)
         if (tally%steps > moving%options%step_budget) reason = reason_step_budget
         if (.not. all(abs(state%q(:machine%n)) <= moving%options%domain)) reason = reason_left_domain
         if (any(state%q /= state%q) .or. any(state%v /= state%v)) reason = reason_not_finite
@@ -137,6 +143,28 @@ contains
       tally%v_max = watch%top_speed
     end associate
   end subroutine advance_jointed
+
+  !> The watched coordinate has `turned` round, or an impact may have turned it: the section is behind it then, not reached.
+  pure subroutine follow_section(moving, turned, state)
+    type(jointed_motion_t), intent(in) :: moving
+    logical, intent(in) :: turned
+    type(jointed_state_t), intent(inout) :: state
+    real(wp) :: u
+    associate (phase => state%phase(moving%section))
+      if (phase == 0) return
+      if (turned) then
+        state%at_section = phase > 0
+        phase = -phase
+        state%left(moving%section) = 1
+        return
+      end if
+      u = sum(moving%machine%joints(moving%section)%row*state%v(:moving%machine%n))
+      if (abs(u) > moving%machine%negligible_speed .and. phase*u < 0) then
+        phase = -phase
+        state%left(moving%section) = 0
+      end if
+    end associate
+  end subroutine follow_section
 
   !> Events and losses of a transition.
   pure subroutine log_transition(moving, before, after, list, fallen, log)
@@ -210,6 +238,37 @@ contains
     end do
     call append_word(tally, word_period)
   end subroutine advance_jointed_period
+
+  !> Moves a machine without a clock to its next section, within `longest` [s], and starts the clock anew; `lasted` [s] is the time
+  !> that it took. `reason` is `reason_time_over` where it does not come to the section.
+  pure subroutine advance_to_turn(moving, longest, state, lasted, tally, reason)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: longest
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(out) :: lasted
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    real(wp) :: start, u
+    integer :: j
+    start = state%time
+    associate (phase => state%phase(moving%section))
+      if (phase == 0) then
+        u = sum(moving%machine%joints(moving%section)%row*state%v(:moving%machine%n))
+        phase = merge(1, -1, u > 0)
+        state%left(moving%section) = 0
+      end if
+    end associate
+    call advance_jointed(moving, state, start + longest, tally, reason)
+    if (reason == 0 .and. .not. state%at_section) reason = reason_time_over
+    lasted = state%time - start
+    do j = 1, size(moving%machine%joints)
+      ! Sliders are placed on surfaces that run on.
+      if (moving%machine%joints(j)%kind == joint_elastic) state%slider(j) = &
+        state%slider(j) - moving%machine%joints(j)%offset%rate*state%time
+    end do
+    state%time = 0
+    call append_word(tally, word_period)
+  end subroutine advance_to_turn
 
   !> Counts a flight in which anything moves.
   pure subroutine note_slip(moving, state, key, tally)

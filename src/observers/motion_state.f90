@@ -10,7 +10,7 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
-    place_of, take_turns, append_word, open_log, record_event, record_sample, put_sample_book, put_column
+    place_of, take_turns, move_turn, append_word, open_log, record_event, record_sample, put_sample_book, put_column
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -201,14 +201,21 @@ contains
     real(wp) :: taken
     if (.not. turn > 0) return
     taken = state%x - nearest_turn(state%x, 0.0_wp, turn)
-    if (.not. abs(taken) > turn/2) return
+    if (abs(taken) > turn/2) call move_turn(turn, taken, state, tally)
+  end subroutine take_turns
+
+  !> Takes `taken`, whole turns, off an angle.
+  pure subroutine move_turn(turn, taken, state, tally)
+    real(wp), intent(in) :: turn, taken
+    type(state_t), intent(inout) :: state
+    type(tally_t), intent(inout), optional :: tally
     state%x = state%x - taken
     state%turned = state%turned + taken
     if (.not. present(tally)) return
     tally%x_max = tally%x_max - taken
     tally%x_min = tally%x_min - taken
     tally%turns = tally%turns + nint(taken/turn, int64)
-  end subroutine take_turns
+  end subroutine move_turn
 
   !> Extremes of the position are taken at the ends of flights: between them x is monotone.
   pure subroutine note_position(tally, state)

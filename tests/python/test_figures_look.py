@@ -195,6 +195,28 @@ def test_marks_lie_on_the_attractors(library: Path) -> None:
                 assert (xs[0], vs[0]) == (row["x"], row["v"])
 
 
+def test_attractors_of_several_bodies_are_not_marked(library: Path) -> None:
+    """The plane of one body does not hold them: a mark would lie anywhere, also in another basin."""
+    case = sx.Case.from_dict(
+        {
+            "body": {"a": {"mass": 1.0}, "b": {"mass": 1.0}},
+            "spring": {
+                "ground": {"between": ["a"], "stiffness": 1.0, "damping": 0.2},
+                "link": {"between": ["a", "b"], "stiffness": 1.0, "damping": 0.2},
+            },
+            "drive": {"shaker": {"law": "force", "body": "a", "amplitude": 0.6, "frequency": 1.3}},
+            "watch": {"body": "b"},
+            "run": {"duration": 100.0},
+        }
+    )
+    result = sx.basin(case, x0=(-1.0, 1.0, 4), v0=(-1.0, 1.0, 4))
+    assert result.separatrix.attractors["period"].tolist() == [1]
+    assert list(section.points(result, {})) == []
+    figure = result.separatrix.plot("attractor", caption="full")
+    assert all(line.get_markerfacecolor() != "white" for line in figure.axes[0].lines)
+    assert "attractors are not marked" in figure.separatrix_caption
+
+
 def test_marks_are_those_of_the_slice(library: Path) -> None:
     result = sx.basin(sx.Case.from_text(CASE), drive__ratio=[1.1, 1.2, 1.3], x0=9, v0=9, progress=False)
     one = sx.basin(sx.Case.from_text(CASE).with_(drive__ratio=1.2), x0=9, v0=9, progress=False)

@@ -183,3 +183,12 @@ def test_starts_that_are_not_allowed() -> None:
         trajectory(model, (0.4, 0, 0), duration=1e6, samples_per_period=10**6)
     with pytest.raises(CaseError, match="contact.restitution"):
         trajectory(model, (0.4, 0, 0), {"contact.restitution": 2.0})
+
+
+def test_starts_that_are_not_allowed_of_several_threads() -> None:
+    """None is taken for an allowed one, and nothing breaks, however many threads are refused at once."""
+    catalogue = Catalogue(Model.from_text(CASE))
+    beyond = np.tile([5.0, 0.0, 0.0], (1000, 1))
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(catalogue.labels, [beyond] * 100):
+            assert not found["reason"].any() and not found["attractor"].any()

@@ -45,3 +45,67 @@ def test_what_makes_no_sense_is_refused(run):
     ended = run("-o", "file.h5")
     assert ended.returncode == 64
     assert "writes no file" in ended.stderr
+
+
+def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp_path: Path):
+    """Chaos beside a cycle at a soft wall, chaos at a rigid one with its exact sum; cycles are left out."""
+
+    def typed(case: str, *settings: str) -> tuple[dict, list[dict]]:
+        target = tmp_path / f"{case}.h5"
+        words = [separatrix, "basin", source_dir / "examples" / "validation" / f"{case}.toml", "-o", target]
+        words += [word for item in settings for word in ("--set", item)]
+        subprocess.run([*words, "-q", "--force"], check=True)
+        asked = [separatrix, "stability", target, "--periods", "4000", "--json"]
+        ended = subprocess.run(asked, capture_output=True, text=True, check=True)
+        first, *entries = map(json.loads, ended.stdout.splitlines())
+        return first, entries
+
+    first, entries = typed("soft_impact")
+    assert (first["without_period"], first["attractors"], len(entries)) == (1, 2, 1)
+    assert entries[0]["type"] == "chaotic" and entries[0]["zero_one"] > 0.9
+    # areas shrink by the damping alone
+    assert sum(entries[0]["exponents"]) == pytest.approx(-0.04, abs=1e-9)
+    axes = "axis=[{name='x0', from=-3, to=-0.1, count=8}, {name='v0', from=-2, to=2, count=8}]"
+    _, entries = typed("budd_dux", "contact.upper=0.0", axes)
+    assert entries[0]["type"] == "chaotic"
+    assert entries[0]["exponents"][0] > 10 * entries[0]["errors"][0] > 0
+    assert entries[0]["sum"] == pytest.approx(entries[0]["exact_sum"], abs=1e-8)
+    first, entries = typed("budd_dux")
+    assert (first["without_period"], entries) == (0, [])
+
+
+def test_a_period_above_the_limit_is_told(separatrix: Path, source_dir: Path, tmp_path: Path):
+    """A cycle of three periods in a map that looks for one alone."""
+    case = tmp_path / "petals.toml"
+    case.write_text(
+        """body.mass = 1
+restoring = { law = "linear", stiffness = 1 }
+friction = { law = "viscous", damping = 0.04 }
+contact = { law = "newton", restitution = 0.8, upper = 0 }
+drive = { law = "harmonic", amplitude = 1, ratio = 2.6 }
+run.duration = 500
+attractors.max_period = 1
+axis = [{ name = "x0", from = -2.5, to = 0, count = 8 }, { name = "v0", from = -3, to = 3, count = 8 }]
+"""
+    )
+    target = tmp_path / "map.h5"
+    subprocess.run([separatrix, "basin", case, "-o", target, "-q"], check=True)
+    asked = [separatrix, "stability", target, "--periods", "4000", "--json"]
+    ended = subprocess.run(asked, capture_output=True, text=True, check=True)
+    _, *entries = map(json.loads, ended.stdout.splitlines())
+    assert [(one["type"], one["period"]) for one in entries] == [("period_above_the_limit", 3)]
+    assert entries[0]["exponents"][0] < 0
+
+
+def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):
+    target = tmp_path / "motion.h5"
+    case = source_dir / "examples" / "trajectory_coulomb_1.05.toml"
+    subprocess.run([separatrix, "trajectory", case, "-o", target, "-q"], check=True)
+    ended = subprocess.run([separatrix, "stability", target], capture_output=True, text=True, check=False)
+    assert ended.returncode == 65
+    assert "allowed is a map (basin) with a catalogue, or a case" in ended.stderr
+    (tmp_path / "torn.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 50)
+    ended = subprocess.run(
+        [separatrix, "stability", tmp_path / "torn.h5"], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 74

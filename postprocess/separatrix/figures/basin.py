@@ -23,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from separatrix import style
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes, recoloured
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import inset, marks, shares
+from separatrix.figures import inset, marks, section, shares
 from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
@@ -116,6 +116,8 @@ def basin_map(
         marked = marks.draw(grid, whole, result, across, others, places, look)
         handles = [marks.on_legend(handle, marked) for handle in handles]
         caption += ["markers: points of the attractors on the section"] if marked else []
+        if section.coordinates(result) > 2:
+            caption.append("attractors are not marked: they have more coordinates than the picture")
     caption += _count_caption(result, field, panels, len(places_of_all), look)
     if part is not None:
         caption.append(f"right: the part framed, {count_text(part[field].size)} points")

@@ -16,18 +16,22 @@ from separatrix.variables import is_start
 
 # Attractors of a slice, and points of one, beyond which marks hide the map.
 _MOST, _LONGEST = 12, 64
+# Coordinates that the plane of x0 and v0 shows all of.
+_PLANE = 2
 
 
 def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Yield label, positions and velocities of each periodic attractor of one slice.
 
     They are those at the crank angle of the starts. `place`: the position on the axes that are not x0 and v0.
-    Nothing comes of two bodies, whose section has more coordinates, of a file without a case, and without the
-    library.
+    Nothing comes of several bodies, whose section has more coordinates, of a file without a case, and without
+    the library.
     """
+    if coordinates(result) > _PLANE:
+        return
     catalogue = table(result, "catalogue")
     case = resolved_case(result)
-    if "attractor" not in catalogue or not case or "driven_mass" in case.get("body", {}):
+    if "attractor" not in catalogue or not case:
         return
     parameters = [name for name in result["regime"].dims if not is_start(name)]
     shape = tuple(result.sizes[name] for name in parameters)
@@ -43,27 +47,15 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
         for row in rows[:_MOST]:
             entry = {name: catalogue[name].values[row] for name in ("attractor", "period", "x", "v")}
             if 0 < entry["period"] <= _LONGEST:
-                yield (int(entry["attractor"]), *_flown(model, values, entry, angle))
+                point = float(entry["x"]), float(entry["v"])
+                found = simulate.section_points(model, point, int(entry["period"]), angle, values)
+                yield (int(entry["attractor"]), *found.T)
     except (CaseError, KeyError):
         return
 
 
-def _flown(
-    model: Model, values: dict[str, float], entry: Mapping, angle: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """All points of an attractor at a crank angle [rad] from its point at 0."""
-    period = 2 * np.pi / model.drive_frequency(values)
-    state = float(entry["x"]), float(entry["v"])
-    turn = angle % (2 * np.pi)
-    if turn > 0:
-        state = _next(model, values, (*state, 0.0), period * turn / (2 * np.pi))
-    found = [state]
-    for _ in range(int(entry["period"]) - 1):
-        found.append(_next(model, values, (*found[-1], turn), period))
-    x, v = np.array(found).T
-    return x, v
-
-
-def _next(model: Model, values: dict[str, float], start: tuple, duration: float) -> tuple[float, float]:
-    end = simulate.trajectory(model, start, values, duration, samples_per_period=-1).summary
-    return end["x"], end["v"]
+def coordinates(result: xr.Dataset) -> int:
+    """Return the number of coordinates of the section: 2 of one body."""
+    if "driven_mass" in resolved_case(result).get("body", {}):
+        return 2 * _PLANE
+    return int(result.sizes.get("coordinate", _PLANE))

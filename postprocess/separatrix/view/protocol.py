@@ -320,9 +320,11 @@ def attractors(desk: Desk, parameters: Parameters) -> bytes:
         catalogue, labels = machine.catalogue(source.parameters_at(at) | changed, number, flag)
     finally:
         desk.views.leave(page, view, flag)
+    # Points with more coordinates are not in the plane of x and v.
+    flat = [one.points.shape[1] == 2 and not one.numbers["two_bodies"] for one in catalogue.attractors]
     found = [
-        one.numbers | {"attractor": int(label), "points": one.points[:, :2].tolist()}
-        for one, label in zip(catalogue.attractors, labels[1:], strict=True)
+        one.numbers | {"attractor": int(label), "points": one.points.tolist() if drawn else []}
+        for one, label, drawn in zip(catalogue.attractors, labels[1:], flat, strict=True)
     ]
     return pack({"attractors": found})
 

@@ -15,7 +15,7 @@ export function marksOf({ file, across, up, at, starter, attractorPoints, links,
       marks.push({ kind: "saddle", x: point[phase[0]], y: point[phase[1]] });
     }
     for (const one of attractorPoints || []) {
-      if (one.period === 0 || one.two_bodies) continue;
+      if (one.period === 0) continue;
       for (const point of one.points) marks.push({ kind: "attractor", x: point[phase[0]], y: point[phase[1]], colour: css(classColour(one.attractor)) });
     }
   }

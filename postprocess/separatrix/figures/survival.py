@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The share of motions that random blows have not taken out of their basin, and the law of rare blows."""
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from separatrix import style
+from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.labels import axis_label, plain
+from separatrix.layout import compose
+
+
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+    """Return the figure by name."""
+    look.require("survival under blows")
+    return {"survival": diagram(result, title, look)}
+
+
+def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the share over the time with its band, and the law with its own."""
+    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 55.0)))
+    ax = figure.add_subplot()
+    time = result["time"].values
+    lines = []
+    for name, colour, text in (
+        ("survival", style.OKABE_ITO[1], "motions struck again and again"),
+        ("law", style.OKABE_ITO[0], "law of rare blows, exp(-rate p t)"),
+    ):
+        lines += ax.plot(time, result[name].values, color=colour, label=text)
+        low, high = result[f"{name}_lower"].values, result[f"{name}_upper"].values
+        ax.fill_between(time, low, high, color=colour, alpha=0.25, linewidth=0)
+    ax.set_xlim(time[0], time[-1])
+    ax.set_ylim(0, 1.02)
+    ax.set_xlabel(axis_label(result["time"]))
+    ax.set_ylabel("share of the motions in their basin")
+    about = result.attrs
+    caption = [
+        *caption_pieces(result, look, describe_case(result)),
+        f"attractor {about['attractor']}, {about['motions']} motions, {about['rate']:.4g} blows a second of "
+        f"standard deviation {about['deviation']:.4g} m/s, p = {about['p']:.4g}; bands: 95 % confidence",
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), lines)
+    return figure

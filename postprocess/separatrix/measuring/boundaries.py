@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measures of the boundaries of a map: entropy, uncertainty exponent, Wada."""
+
+import math
+
+import numpy as np
+
+from separatrix.measuring import entropy, uncertainty, wada
+from separatrix.measuring.maps import Slice
+from separatrix.measuring.report import Measure
+from separatrix.measuring.sampling import share_interval
+
+#: Radii of the discs, in parts of the shortest side.
+RADII = (1 / 20, 1 / 40, 1 / 80, 1 / 160)
+#: Level of the test that a boundary is smooth.
+LEVEL = 0.01
+_NEEDS = "needs new starts"
+
+
+def basin_entropy(found: Slice) -> list[Measure]:
+    """Entropy of all discs and of those with two basins, over several radii."""
+    told = (
+        "Sb: the mean over discs of -sum p ln p, p the shares of the basins among the starts drawn in a disc"
+    )
+    edge = "Sbb: the same over the discs in which more than one basin was found; above ln 2 it is fractal"
+    names = ("basin_entropy", "boundary_basin_entropy")
+    if found.machine is None:
+        return [
+            Measure(name, text, limits=(*found.limits, _NEEDS))
+            for name, text in zip(names, (told, edge), strict=True)
+        ]
+    size = float(found.region.size.min())
+    radii = [size * part for part in RADII]
+    results = [
+        entropy.basin_entropy(found.machine.labels, found.region, radius, seed=found.seed) for radius in radii
+    ]
+    first = results[0]
+    slope = entropy.exponent(results)
+    curve = {
+        "radii": radii,
+        "mixed_discs": [one.mixed for one in results],
+        "left_out": [one.left for one in results],
+        "all_discs": [one.all_discs for one in results],
+        "boundary": [one.boundary for one in results],
+        "smooth": [one.smooth for one in results],
+        "probability_if_smooth": [one.probability for one in results],
+        "uncertainty_exponent": slope,
+    }
+    parameters = {
+        "radius": first.radius,
+        "unit": found.unit,
+        "discs": first.discs,
+        "starts_a_disc": first.starts,
+    }
+    limits = list(found.limits)
+    if first.left:
+        limits.append(f"{first.left} discs left out: a label not known, or no start there")
+    boundary_limits = [*limits, verdict(results)]
+    return [
+        Measure(
+            names[0],
+            told,
+            "1",
+            None,
+            *first.all_discs,
+            "95 %, Student over the discs",
+            parameters,
+            tuple(limits),
+            curve,
+        ),
+        Measure(
+            names[1],
+            edge,
+            "1",
+            None,
+            *first.boundary,
+            "95 %, Student over the discs",
+            {**parameters, "discs": first.mixed, "of_a_smooth_boundary": first.smooth},
+            tuple(boundary_limits),
+            curve,
+        ),
+    ]
+
+
+def verdict(results: list[entropy.Entropy]) -> str:
+    """Say what the test of smoothness finds; a Bonferroni bound over the radii."""
+    probability = min(1.0, len(results) * min(one.probability for one in results))
+    finest = results[-1]
+    if finest.mixed < 10:
+        return "fewer than 10 discs of the smallest radius meet a boundary: whether it is smooth is not known"
+    if probability < LEVEL:
+        return (
+            f"rougher than a smooth boundary, which would give so much with probability {probability:.2g}: "
+            "fractal at these radii, or points where three basins meet"
+        )
+    return (
+        f"as of a smooth boundary at these radii (probability {probability:.2g}, level {LEVEL:g}); "
+        "finer structure is not excluded"
+    )
+
+
+def uncertainty_exponent(found: Slice) -> Measure:
+    """Exponent of the share of uncertain starts over the decades of their uncertainty."""
+    told = (
+        "alpha: the share of starts whose label differs at the distance eps goes as eps^alpha; 1 of "
+        "a smooth "
+        "boundary, its dimension is that of the window less alpha"
+    )
+    if found.machine is None:
+        return Measure("uncertainty_exponent", told, limits=(*found.limits, _NEEDS))
+    one = uncertainty.uncertainty_exponent(found.machine.labels, found.region, seed=found.seed)
+    limits = list(found.limits)
+    if one.lost > 0:
+        limits.append(f"{100 * one.lost:.3g} % of the starts have no known label and count as certain")
+    size = float(found.region.size.min())
+    limits.append(
+        "says nothing of what is smaller than the least eps, 1e-10 of the shortest side of the window"
+    )
+    if not math.isfinite(one.value):
+        limits.append("no uncertain starts: no boundary was met")
+    fitted = one.sizes[(one.sizes <= 1e-2 * size * (1 + 1e-9)) & (one.shares > 0)]
+    slopes = one.slopes[np.isfinite(one.slopes)]
+    parameters = {"eps": (float(one.sizes[0]), float(one.sizes[-1])), "unit": found.unit}
+    if len(fitted) and len(slopes):
+        parameters |= {
+            "fitted_below": float(fitted[0]),
+            "local_slopes": (float(slopes.min()), float(slopes.max())),
+        }
+    return Measure(
+        "uncertainty_exponent",
+        told,
+        "1",
+        None,
+        one.value,
+        one.lower,
+        one.upper,
+        "95 %, jackknife over 8 runs",
+        parameters,
+        tuple(limits),
+        {"eps": one.sizes, "shares": one.shares, "relative_errors": one.errors, "local_slopes": one.slopes},
+    )
+
+
+def wada_merging(found: Slice) -> Measure:
+    """Share of boundary points of the map that are not on the boundary of every basin."""
+    told = (
+        "share of the boundary points of the map that are farther than 2 points from the boundary "
+        "of some basin "
+        "against all others merged; 0 if all basins share one boundary"
+    )
+    basins = [label for label in np.unique(found.grid) if label > 0]
+    if len(basins) < 3:
+        return Measure(
+            "wada_merging", told, limits=(*found.limits, f"{len(basins)} basins: Wada needs three")
+        )
+    distances, shares = wada.merging(found.grid, tuple(np.isfinite(found.region.turns)))
+    value = float(shares[2]) if len(shares) > 2 else 0.0
+    return Measure(
+        "wada_merging",
+        told,
+        "1",
+        None,
+        value,
+        math.nan,
+        math.nan,
+        "",
+        {"basins": tuple(map(int, basins)), "distance": "2 points"},
+        (*found.limits, "resolution of the map: says nothing of what is smaller than its points"),
+        {"distances": distances, "shares_farther": shares, "largest_distance": float(distances[-1])},
+    )
+
+
+def wada_grid(found: Slice) -> Measure:
+    """Share of the cells on boundaries that show all basins when refined."""
+    told = (
+        "W_N: the share of the map's cells with corners of two labels that show all N basins once "
+        "the segments "
+        "between their corners are bisected with new starts; 1 says Wada, 0 that no three basins "
+        "meet"
+    )
+    basins = [label for label in np.unique(found.grid) if label > 0]
+    if len(basins) < 3:
+        return Measure("wada_grid", told, limits=(*found.limits, f"{len(basins)} basins: Wada needs three"))
+    if found.machine is None:
+        return Measure("wada_grid", told, limits=(*found.limits, _NEEDS))
+    cells = wada.grid_method(found.machine.labels, found.grid, found.axes, seed=found.seed)
+    steps = len(cells.shares) - 1
+    total = int(cells.counts[-1].sum())
+    hits = int(cells.counts[-1][-1])
+    return Measure(
+        "wada_grid",
+        told,
+        "1",
+        None,
+        hits / max(1, total),
+        *share_interval(hits, total),
+        "95 %, Clopper and Pearson over the cells",
+        {"basins": cells.basins, "cells": total, "halvings": steps},
+        (*found.limits, f"segments of 2^-{steps} of a cell; a share that goes to 1 proves nothing below"),
+        {"cells_by_number_of_basins": cells.counts, "shares": cells.shares},
+    )

@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long a motion survives random blows: motions that are struck, beside the law of rare blows."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from separatrix.errors import USAGE, SeparatrixError
+from separatrix.measuring.maps import Slice, slice_of
+from separatrix.measuring.sampling import NOT_KNOWN, generator, share_interval
+from separatrix.open import open_result
+from separatrix.progress import Progress, Report
+from separatrix.version import __version__
+
+__all__ = ["survival"]
+
+_TIMES = 60
+# More blows than anybody waits for: the horizon ends a motion.
+_MOST_BLOWS = 100_000
+
+
+def survival(
+    result: xr.Dataset | str | Path,
+    attractor: int,
+    *,
+    rate: float,
+    deviation: float,
+    horizon: float | None = None,
+    motions: int = 2000,
+    slice: Mapping[str, float] | None = None,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: bool | Report | None = None,
+) -> xr.Dataset:
+    """Return the share of motions that random blows have not taken out of their basin, over the time.
+
+    Parameters
+    ----------
+    result, attractor, slice
+        A map over x0 and v0 of one machine, the motion that is struck, and values of the map's parameters.
+    rate
+        Mean number of blows a second; they come at random (Poisson).
+    deviation
+        Each changes the velocity by a normal random number of this standard deviation [m/s].
+    horizon
+        Seconds that are watched; None: 20 blows on average.
+    motions
+        How many motions are struck, all from the attractor at random crank angles.
+    seed, threads
+        What is drawn depends on the seed; the result does not depend on `threads`.
+
+    A motion has left when the state right after a blow lies in another basin, or its label is not known
+    (`not_known` counts these). `survival` is the share that has not left, with its 95 % interval;
+    `law` is exp(-rate p t) of rare blows, which find the machine settled again: `p` is the probability that
+    one blow at a random crank angle leaves the basin, from `motions` blows of its own. Where the two differ,
+    blows meet motions that have not settled.
+    """
+    if not (rate > 0 and deviation > 0 and motions >= 10):
+        raise SeparatrixError("survival: allowed are rate > 0, deviation > 0 and motions from 10", USAGE)
+    result = open_result(result) if isinstance(result, str | Path) else result
+    found = slice_of(result, slice, None, threads)
+    _require(found, attractor)
+    length = 20.0 / rate if horizon is None else float(horizon)
+    states = _on_motion(found, attractor, 2 * motions, generator(seed, 10))
+    once, _ = _strike(found, attractor, states[:motions].copy(), deviation, generator(seed, 11))
+    left, unknown = np.full(motions, np.inf), np.zeros(motions, bool)
+    random = generator(seed, 12)
+    state, clock = states[motions:].copy(), np.zeros(motions)
+    todo = np.arange(motions)
+    with Progress(progress) as told:
+        for _ in range(_MOST_BLOWS):
+            # drawn for all, so that a motion's blows do not depend on the others
+            waits = random.exponential(1 / rate, motions)[todo]
+            going = clock[todo] + waits <= length
+            told("motions", motions - int(going.sum()), motions)
+            kicks = generator(seed, 13, int(random.integers(1 << 62)))
+            todo, waits = todo[going], waits[going]
+            if not len(todo):
+                break
+            clock[todo] += waits
+            state[todo] = _flown(found, state[todo], waits)
+            out, lost = _strike(found, attractor, state, deviation, kicks, todo)
+            left[todo[out]] = clock[todo[out]]
+            unknown[todo[lost]] = True
+            todo = todo[~out]
+    return _dataset(result, attractor, once, left, unknown, length, rate, deviation)
+
+
+def _require(found: Slice, attractor: int) -> None:
+    if found.machine is None or found.names != ("x0", "v0"):
+        raise SeparatrixError(
+            "survival: needs a map over x0 and v0 whose new starts the library labels", USAGE
+        )
+    if attractor not in found.entries:
+        raise SeparatrixError(
+            f"survival: found attractor {attractor}, allowed {', '.join(map(str, found.entries))}", USAGE
+        )
+    case = found.machine.case
+    from separatrix.library import effects
+
+    acting = {one.name: one.acts for one in effects().values()}
+    if any(acting.get(name) == "sensor" for name in case.resolved.get("effect", {})):
+        raise SeparatrixError("survival: the case has an effect of the sensor; take it out", USAGE)
+    if found.machine.section(attractor) is None:
+        raise SeparatrixError("survival: needs a motion with a period", USAGE)
+
+
+def _period(found: Slice) -> float:
+    return 2 * np.pi / found.machine.case.model.drive_frequency(found.machine.values)
+
+
+def _on_motion(found: Slice, own: int, count: int, random: np.random.Generator) -> np.ndarray:
+    """States x, v, crank angle of the motion at random times of it."""
+    points = found.machine.section(own, 0.0) * found.scale
+    angles = random.uniform(0, 2 * np.pi, count)
+    chosen = points[random.integers(0, len(points), count)]
+    starts = np.column_stack([chosen, np.zeros(count)])
+    return _flown(found, starts, angles / (2 * np.pi) * _period(found))
+
+
+def _flown(found: Slice, states: np.ndarray, waits: np.ndarray) -> np.ndarray:
+    """States after each has been left alone for its time; its crank angle has turned on."""
+    machine = found.machine
+    paths = list(machine.values)
+    parts = machine.case.model.segments(
+        paths, np.array([machine.values[path] for path in paths]), states, np.arange(len(states) + 1), waits,
+        derivatives=False,
+    )  # fmt: skip
+    angle = np.mod(states[:, 2] + 2 * np.pi * waits / _period(found), 2 * np.pi)
+    return np.column_stack([parts.x, parts.v, angle])
+
+
+def _strike(
+    found: Slice,
+    own: int,
+    states: np.ndarray,
+    deviation: float,
+    random: np.random.Generator,
+    todo: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Change the velocities of `states` in place; whether each is out of the basin, and not known."""
+    todo = np.arange(len(states)) if todo is None else todo
+    states[todo, 1] += deviation * random.standard_normal(len(states))[todo]
+    labels = found.machine.labels_of(states[todo])
+    return labels != own, labels == NOT_KNOWN
+
+
+def _dataset(
+    result: xr.Dataset, attractor: int, once: np.ndarray, left: np.ndarray, unknown: np.ndarray,
+    horizon: float, rate: float, deviation: float,
+) -> xr.Dataset:  # fmt: skip
+    times = np.linspace(0, horizon, _TIMES + 1)
+    count = len(left)
+    alive = np.array([np.sum(left > time) for time in times])
+    ends = np.array([share_interval(int(one), count) for one in alive])
+    p, (low, high) = float(np.mean(once)), share_interval(int(once.sum()), count)
+    law = {"law": p, "law_lower": high, "law_upper": low}
+    data = {"survival": alive / count, "survival_lower": ends[:, 0], "survival_upper": ends[:, 1]}
+    data |= {name: np.exp(-rate * value * times) for name, value in law.items()}
+    told = {"units": "1", "long_name": "share of the motions that have not left"}
+    return xr.Dataset(
+        {name: ("time", values, told) for name, values in data.items()},
+        {"time": ("time", times, {"units": "s", "long_name": "time"})},
+        {
+            "kind": "survival", "title": str(result.attrs.get("title", "")), "attractor": attractor,
+            "rate": rate, "deviation": deviation, "motions": count, "p": p, "p_lower": low, "p_upper": high,
+            "not_known": int(unknown.sum()), "source": f"Separatrix {__version__}",
+            "resolved_case": str(result.attrs.get("resolved_case", "")),
+        },
+    )  # fmt: skip

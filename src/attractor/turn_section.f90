@@ -1,0 +1,153 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The section of a machine without a clock: the motion is looked at where the watched coordinate turns round, at its maxima (at
+!> its minima where a rigid stop cuts the maxima off), so that the phase of a limit cycle, which nothing decides, is left out.
+!> An angle that goes round has no maxima: its section is the passage of the half turn as well. Both are one coordinate,
+!>   s = x at a maximum, s = +-(turn/2 + |v|/w) at the half turn, upwards or downwards,
+!> which is continuous where the maximum comes to the half turn.
+module turn_section
+  use attractors, only: most_coordinates
+  use jointed_motion, only: advance_to_turn, jointed_motion_t
+  use jointed_section, only: coordinates_of_jointed, fits_section, jointed_at, jointed_point, scales_of_jointed, watched_speed
+  use jointed_state, only: jointed_state_t
+  use kinds, only: wp
+  use motion, only: advance, motion_t, start_state
+  use motion_state, only: append_word, mode_slip_minus, move_turn, state_t, tally_t, word_period
+  use status, only: reason_time_over
+  implicit none
+  private
+
+  public :: has_no_clock, coordinates_of_turn, body_at_turn, body_turn_point, jointed_at_turn, jointed_turn_point, scales_of_turn, &
+    advance_body_to_turn, advance_jointed_to_turn
+
+  !> Longest return to the section, in periods of the slowest mode: a belt may carry a body for long.
+  integer, parameter :: longest_return = 256
+
+contains
+
+  !> Whether no drive gives a time: several bodies without one, or an angle under forces that turn it.
+  pure logical function has_no_clock(moving)
+    type(motion_t), intent(in) :: moving
+    if (allocated(moving%jointed)) then
+      has_no_clock = moving%jointed%section > 0 .and. fits_section(moving%jointed)
+    else if (allocated(moving%pair)) then
+      has_no_clock = .false.
+    else
+      associate (machine => moving%machine)
+        has_no_clock = machine%turn > 0 .and. .not. machine%drive%ratio > 0 .and. .not. machine%drive%interval > 0 .and. &
+                       .not. machine%effects%dahl_stiffness > 0
+      end associate
+    end if
+  end function has_no_clock
+
+  !> Number of coordinates on the section: the speed that is zero there is none.
+  pure integer function coordinates_of_turn(moving) result(n)
+    type(motion_t), intent(in) :: moving
+    n = 1
+    if (allocated(moving%jointed)) n = coordinates_of_jointed(moving%jointed) - 1
+  end function coordinates_of_turn
+
+  !> A body with the coordinate `s` on the section.
+  pure type(state_t) function body_at_turn(moving, s) result(state)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: s
+    associate (half => moving%machine%turn/2)
+      if (abs(s) > half) then
+        state = start_state(moving, -sign(half, s), sign(abs(s) - half, s)*moving%machine%drive_frequency, 0.0_wp)
+      else
+        state = start_state(moving, s, 0.0_wp, 0.0_wp)
+      end if
+    end associate
+  end function body_at_turn
+
+  !> The coordinate of a body on the section.
+  pure real(wp) function body_turn_point(moving, state) result(s)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(in) :: state
+    s = state%x
+    if (passes_half_turn(moving, state)) s = sign(moving%machine%turn/2 + abs(state%v)/moving%machine%drive_frequency, state%v)
+  end function body_turn_point
+
+  pure logical function passes_half_turn(moving, state) result(passes)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(in) :: state
+    passes = abs(state%x) >= moving%machine%turn/2 .and. abs(state%v) > 0
+  end function passes_half_turn
+
+  !> Moves a body to the section and starts the clock anew; `lasted` [s] is the time that it took. `reason` is
+  !> `reason_time_over` where it does not come to the section.
+  pure subroutine advance_body_to_turn(moving, state, lasted, tally, reason)
+    type(motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    real(wp), intent(out) :: lasted
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    real(wp) :: start, until
+    start = state%time
+    until = start + longest_return*moving%machine%period
+    do
+      call advance(moving, state, until, tally, reason, slip_speed=0.0_wp, seam=moving%machine%turn/2)
+      if (reason /= 0) exit
+      if (state%time >= until) reason = reason_time_over
+      if (reason /= 0) exit
+      if (passes_half_turn(moving, state)) then
+        call move_turn(moving%machine%turn, sign(moving%machine%turn, state%v), state, tally)
+        exit
+      end if
+      if (state%mode == mode_slip_minus) exit
+    end do
+    lasted = state%time - start
+    state%time = 0
+    call append_word(tally, word_period)
+  end subroutine advance_body_to_turn
+
+  !> A structure with the coordinates `point` on the section.
+  pure type(jointed_state_t) function jointed_at_turn(moving, point) result(state)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    integer :: at
+    at = watched_speed(moving)
+    state = jointed_at(moving, [point(:at - 1), 0.0_wp, point(at:coordinates_of_jointed(moving) - 1)])
+    state%phase(moving%section) = -1
+    state%left(moving%section) = 1
+  end function jointed_at_turn
+
+  !> Coordinates of a structure on the section, zeros after the last.
+  pure function jointed_turn_point(moving, state) result(point)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    real(wp) :: point(most_coordinates)
+    point = jointed_point(moving, state)
+    associate (at => watched_speed(moving))
+      point(at:) = [point(at + 1:), 0.0_wp]
+    end associate
+  end function jointed_turn_point
+
+  !> Moves a structure to the section, see `advance_to_turn`.
+  pure subroutine advance_jointed_to_turn(moving, state, lasted, tally, reason)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(out) :: lasted
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    call advance_to_turn(moving, longest_return*moving%machine%period, state, lasted, tally, reason)
+  end subroutine advance_jointed_to_turn
+
+  !> Sizes of the coordinates in a motion over `half_range` of the position.
+  pure function scales_of_turn(moving, half_range) result(scales)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: half_range
+    real(wp) :: scales(most_coordinates)
+    scales = 1
+    if (.not. allocated(moving%jointed)) then
+      scales(1) = half_range
+      return
+    end if
+    scales = scales_of_jointed(moving%jointed, half_range)
+    associate (at => watched_speed(moving%jointed))
+      scales(at:) = [scales(at + 1:), 1.0_wp]
+    end associate
+  end function scales_of_turn
+
+end module turn_section

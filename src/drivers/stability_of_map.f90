@@ -1,0 +1,299 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> `separatrix stability MAP`: what the entries of a map's catalogue are that have no period.
+module stability_of_map
+  use body_family, only: body_neighbourhood, family_t
+  use case_reader, only: load_case_text
+  use case_setup, only: grid_of
+  use case_type, only: case_t
+  use command_line, only: command_t
+  use errors, only: error_t, fail
+  use exponents, only: lyapunov_exponents, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
+    motion_transient, period_of_section, spectrum_t, type_of_motion, zero_one_test
+  use grid, only: grid_t, point_laws, point_slice, point_start
+  use journal, only: journal_t, json_number, json_text
+  use kinds, only: int64, wp
+  use map_reader, only: open_final, reader_t
+  use motion, only: start_state
+  use motion_state, only: state_t
+  use one_body, only: one_body_t
+  use status, only: exit_bad_case
+  use text, only: replace_all, to_text
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: run_stability_of_map
+
+  !> Section points that the 0-1 test looks at, at most.
+  integer, parameter, public :: most_points = 5000
+  !> Points on the section are the same within this share of their range.
+  real(wp), parameter :: same = 1e-7_wp
+  !> Code of a rest in the catalogue.
+  integer, parameter :: kind_rest = 2
+
+  integer, parameter :: not_known = 0, chaotic = 1, quasi_periodic = 2, long_transient = 3, above_limit = 4
+  character(len=*), parameter :: type_names(0:4) = [character(len=22) :: 'not_known', 'chaotic', 'quasi_periodic', &
+    'long_transient', 'period_above_the_limit']
+
+  !> An entry without a period, and a start of the map that it captured.
+  type :: entry_t
+    integer :: label = 0
+    integer(int64) :: slice = 0
+    integer, allocatable :: index(:)
+  end type entry_t
+
+  !> What was found of an entry.
+  type :: finding_t
+    type(spectrum_t) :: spectrum
+    real(wp) :: zero_one = 0
+    integer :: type = not_known, period = 0
+  end type finding_t
+
+contains
+
+  !> Tells the type of every entry of period 0 with its exponents. Code 65 for a file that is no map of attractors.
+  subroutine run_stability_of_map(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    type(journal_t) :: journal
+    type(reader_t) :: reader
+    type(case_t) :: the_case
+    type(grid_t) :: grid
+    type(entry_t), allocatable :: entries(:)
+    type(error_t), allocatable :: ignored
+    integer :: i, total
+    call journal%open(.true., command%json, command%quiet)
+    call journal%open_copy(command%log, error)
+    if (.not. allocated(error)) call open_final(command%path, reader, error)
+    if (allocated(error)) return
+    call read_map(reader, the_case, grid, entries, total, error)
+    call reader%close(ignored)
+    if (allocated(error)) return
+    call journal%line('entries', to_text(size(entries))//' of '//to_text(total)//' attractors have no known period', &
+                      '"without_period": '//to_text(size(entries))//', "attractors": '//to_text(total))
+    if (command%validate .or. command%dry_run) return
+    do i = 1, size(entries)
+      call tell(journal, grid, the_case, entries(i), command%periods)
+    end do
+  end subroutine run_stability_of_map
+
+  !> The case of a map, its grid, and the entries without a period among the `total`.
+  subroutine read_map(reader, the_case, grid, entries, total, error)
+    type(reader_t), intent(in) :: reader
+    type(case_t), intent(out) :: the_case
+    type(grid_t), intent(out) :: grid
+    type(entry_t), allocatable, intent(out) :: entries(:)
+    integer, intent(out) :: total
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: kind, resolved
+    character(len=128) :: no_overrides(0)
+    real(wp), allocatable :: columns(:, :), kinds(:)
+    logical, allocatable :: wanted(:)
+    integer :: i
+    integer, allocatable :: rows(:)
+    total = 0
+    call reader%text_attribute('/', 'kind', kind, error)
+    if (allocated(error)) return
+    if (kind /= 'basin' .or. .not. reader%has('/catalogue/period')) then
+      call fail(error, exit_bad_case, ''''//reader%path//''' is a file of kind '//kind// &
+                ', allowed is a map (basin) with a catalogue, or a case')
+      return
+    end if
+    call reader%read_text('/provenance/resolved_case', resolved, error)
+    if (.not. allocated(error)) call load_case_text(resolved, reader%path//' (resolved case)', no_overrides, the_case, error)
+    if (.not. allocated(error)) call reader%read_columns([character(len=20) :: '/catalogue/slice', '/catalogue/attractor', &
+                                                          '/catalogue/period'], columns, error)
+    if (allocated(error)) return
+    grid = grid_of(the_case, the_case%axes)
+    total = size(columns, 1)
+    wanted = nint(columns(:, 3)) == 0
+    if (reader%has('/catalogue/kind')) then
+      call reader%read_values('/catalogue/kind', kinds, error)
+      if (allocated(error)) return
+      wanted = wanted .and. nint(kinds) /= kind_rest
+    end if
+    rows = pack([(i, i=1, total)], wanted)
+    allocate (entries(size(rows)))
+    do i = 1, size(rows)
+      entries(i)%slice = nint(columns(rows(i), 1), int64)
+      entries(i)%label = nint(columns(rows(i), 2))
+    end do
+    if (size(entries) > 0) call find_starts(reader, grid, entries, error)
+  end subroutine read_map
+
+  !> For each entry the first point of the map that it captured; none is left without an index where there is one.
+  subroutine find_starts(reader, grid, entries, error)
+    type(reader_t), intent(in) :: reader
+    type(grid_t), intent(in) :: grid
+    type(entry_t), intent(inout) :: entries(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), allocatable :: lengths(:), lower(:), extent(:)
+    real(wp), allocatable :: labels(:)
+    integer :: row, i, n, left
+    integer, allocatable :: index(:)
+    call reader%lengths('/attractor', lengths, error)
+    if (allocated(error)) return
+    n = size(lengths)
+    if (n /= size(grid%axes)) then
+      call fail(error, exit_bad_case, ''''//reader%path//''' has not the axes of its case')
+      return
+    end if
+    lower = 0*lengths
+    extent = lengths
+    extent(1) = 1
+    left = size(entries)
+    do row = 0, int(lengths(1)) - 1
+      lower(1) = row
+      call reader%read_block('/attractor', lower, extent, labels, error)
+      if (allocated(error)) return
+      do i = 1, size(entries)
+        if (allocated(entries(i)%index)) cycle
+        call look_for(entries(i), grid, labels, int(lengths), row, index)
+        if (.not. allocated(index)) cycle
+        entries(i)%index = index
+        left = left - 1
+      end do
+      if (left == 0) return
+    end do
+  end subroutine find_starts
+
+  !> The index of the first of the `labels` of a row of the first axis that is the entry's, in its slice; not allocated without.
+  pure subroutine look_for(entry, grid, labels, lengths, row, index)
+    type(entry_t), intent(in) :: entry
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: labels(:)
+    integer, intent(in) :: lengths(:), row
+    integer, allocatable, intent(out) :: index(:)
+    integer :: here(size(lengths)), k, at, rest
+    do at = 1, size(labels)
+      if (nint(labels(at)) /= entry%label) cycle
+      rest = at - 1
+      do k = size(lengths), 2, -1
+        here(k) = 1 + modulo(rest, lengths(k))
+        rest = rest/lengths(k)
+      end do
+      here(1) = row + 1
+      if (point_slice(grid, here) /= entry%slice) cycle
+      index = here
+      return
+    end do
+  end subroutine look_for
+
+  !> Computes and tells what an entry is.
+  subroutine tell(journal, grid, the_case, entry, periods)
+    type(journal_t), intent(inout) :: journal
+    type(grid_t), intent(in) :: grid
+    type(case_t), intent(in) :: the_case
+    type(entry_t), intent(in) :: entry
+    integer, intent(in) :: periods
+    type(finding_t) :: found
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: name, words, data
+    name = 'attractor '//to_text(entry%label)
+    if (grid%slices > 1) name = name//' of slice '//to_text(entry%slice)
+    data = '"attractor": '//to_text(entry%label)//', "slice": '//to_text(entry%slice)
+    if (.not. allocated(entry%index)) then
+      call journal%line('entry', name//': not known: no point of the map was captured by it', data//', "type": "not_known"')
+      return
+    end if
+    call examine(grid, entry%index, periods, the_case%attractors%max_period, found, error)
+    if (allocated(error)) then
+      call journal%line('entry', name//': not known: '//error%message, data//', "type": "not_known"')
+      return
+    end if
+    words = name//': '//replace_all(trim(type_names(found%type)), '_', merge('-', ' ', found%type == quasi_periodic))
+    data = data//', "type": '//json_text(trim(type_names(found%type)))
+    if (found%period > 0) then
+      words = words//', settles on period '//to_text(found%period)
+      data = data//', "period": '//to_text(found%period)
+    end if
+    if (.not. found%spectrum%known) then
+      words = words//': the motion was given up, or met an event tangentially'
+    else
+      call add_numbers(found, words, data)
+    end if
+    call journal%line('entry', words, data)
+  end subroutine tell
+
+  !> Exponents with standard errors, their sum, the 0-1 test and what they are from.
+  subroutine add_numbers(found, words, data)
+    type(finding_t), intent(in) :: found
+    character(len=:), allocatable, intent(inout) :: words, data
+    character(len=:), allocatable :: values, errors
+    integer :: i
+    words = words//'; exponents'
+    values = ''
+    errors = ''
+    do i = 1, 2
+      associate (value => found%spectrum%exponents(i), error => found%spectrum%errors(i))
+        if (i == 2) then
+          words = words//' and'
+          values = values//', '
+          errors = errors//', '
+        end if
+        if (value < -huge(1.0_wp)/2) then
+          words = words//' -inf'
+          values = values//'null'
+          errors = errors//'null'
+        else
+          words = words//' '//to_text(value, 6)//' +- '//to_text(error, 2)
+          values = values//json_number(value)
+          errors = errors//json_number(error)
+        end if
+      end associate
+    end do
+    words = words//' 1/s'
+    data = data//', "exponents": ['//values//'], "errors": ['//errors//']'
+    if (found%spectrum%has_sum) then
+      words = words//', sum '//to_text(found%spectrum%sum_found, 10)//' (exact '//to_text(found%spectrum%sum_exact, 10)//')'
+      data = data//', "sum": '//json_number(found%spectrum%sum_found)//', "exact_sum": '//json_number(found%spectrum%sum_exact)
+    end if
+    words = words//'; 0-1 test '//to_text(found%zero_one, 3)//'; by '//to_text(found%spectrum%periods)// &
+            ' drive periods with '//to_text(found%spectrum%impacts)//' impacts'
+    data = data//', "zero_one": '//json_number(found%zero_one)//', "periods": '//to_text(found%spectrum%periods)// &
+           ', "impacts": '//to_text(found%spectrum%impacts)
+  end subroutine add_numbers
+
+  !> Exponents and 0-1 test of the motion from a point of the grid, over `periods` after a quarter as many, and its type. A
+  !> period up to `limit` would have been found by the map if the motion had settled. Code 65 where variations are not known.
+  subroutine examine(grid, index, periods, limit, found, error)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: index(:), periods, limit
+    type(finding_t), intent(out) :: found
+    type(error_t), allocatable, intent(out) :: error
+    type(family_t) :: family
+    type(neighbourhood_t) :: machines
+    type(state_t) :: state
+    real(wp) :: section(min(most_points, periods)), start(3 + size(grid%others))
+    family%laws = point_laws(grid, index)
+    family%options = grid%options
+    call body_neighbourhood(family, 0.0_wp, machines, error)
+    if (allocated(error)) return
+    start = point_start(grid, index)
+    select type (body => machines%centre)
+    type is (one_body_t)
+      state = start_state(body%moving, start(1), start(2), start(3))
+    end select
+    call lyapunov_exponents(machines, state, periods/4, periods, found%spectrum, section)
+    if (.not. found%spectrum%known) return
+    found%zero_one = zero_one_test(section)
+    select case (type_of_motion(found%spectrum, found%zero_one))
+    case (motion_chaotic)
+      found%type = chaotic
+    case (motion_neutral)
+      found%type = quasi_periodic
+    case (motion_transient)
+      found%type = long_transient
+    case (motion_contracting, motion_not_known)
+      found%type = not_known
+    end select
+    if (found%type == chaotic .or. found%type == quasi_periodic) return
+    ! A cycle contracts, and comes back to the same points.
+    if (.not. found%spectrum%exponents(1) < 0) return
+    found%period = period_of_section(section, same)
+    if (found%period > 0) found%type = merge(above_limit, long_transient, found%period > limit)
+  end subroutine examine
+
+end module stability_of_map
