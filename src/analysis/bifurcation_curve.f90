@@ -14,9 +14,9 @@ module bifurcation_curve
   implicit none
   private
 
-  public :: trace_curve, can_be_followed
+  public :: trace_curve, can_be_followed, curve_label
 
-  integer, parameter :: most_points = 400, most_secants = 50
+  integer, parameter :: most_points = 200, most_secants = 50
   !> Steps of the curve in natural sizes; turn of the tangent in one [cosine].
   real(wp), parameter :: first_step = 1e-3_wp, largest_step = 0.03_wp, smallest_step = 1e-8_wp, least_cosine = 0.95_wp
   !> A point of codimension two is interpolated between so many, with values of about this.
@@ -37,6 +37,12 @@ contains
     can_be_followed = any(label == [label_sn, label_pd, label_gr, label_gr_fold, label_stick])
   end function can_be_followed
 
+  !> The label of the curve through points of a label: both kinds of grazes lie on one.
+  pure integer function curve_label(label)
+    integer, intent(in) :: label
+    curve_label = merge(label_gr, label, label == label_gr_fold)
+  end function curve_label
+
   !> The curve through a labelled point, both ways; no points where it cannot be followed. `value` is the second parameter of
   !> the case.
   subroutine trace_curve(family, plan, point, value, curve)
@@ -50,8 +56,7 @@ contains
     real(wp), allocatable :: along(:)
     logical :: ok
     integer :: i
-    curve%label = point%label
-    if (point%label == label_gr_fold) curve%label = label_gr
+    curve%label = curve_label(point%label)
     allocate (curve%points(0))
     start%now%orbit = point%orbit
     start%now%free = value

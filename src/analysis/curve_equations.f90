@@ -195,13 +195,15 @@ contains
     now%free = now%free + by(n)
   end subroutine move
 
-  !> The equations and their derivatives by all unknowns, by differences of fourth order.
-  subroutine linearise(family, plan, place, left, slopes, ok)
+  !> The equations and their derivatives by all unknowns, by differences of fourth order, each over its largest; `rows` are the
+  !> factors.
+  subroutine linearise(family, plan, place, left, slopes, ok, rows)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
     type(place_t), intent(inout) :: place
     real(wp), intent(out) :: left(:), slopes(:, :)
     logical, intent(out) :: ok
+    real(wp), intent(out), optional :: rows(:)
     type(place_t) :: near
     real(wp) :: values(size(left), -2:2), change(size(left) + 1)
     integer :: i, k
@@ -221,7 +223,9 @@ contains
     end do
     do i = 1, size(left)
       associate (largest => maxval(abs(slopes(i, :))))
+        if (present(rows)) rows(i) = 1
         if (.not. largest > 0) cycle
+        if (present(rows)) rows(i) = 1/largest
         left(i) = left(i)/largest
         slopes(i, :) = slopes(i, :)/largest
       end associate
@@ -235,13 +239,22 @@ contains
     type(place_t), intent(inout) :: place
     real(wp), intent(in) :: along(:)
     logical, intent(out) :: ok
-    real(wp), dimension(size(along)) :: right, change
+    real(wp), dimension(size(along)) :: right, change, rows
     real(wp) :: slopes(size(along), size(along)), before, length
+    logical :: fresh
     integer :: i, n
     n = size(along)
     length = huge(length)
+    fresh = .false.
+    rows = 1
     do i = 1, most_newton
-      call linearise(family, plan, place, right(:n - 1), slopes(:n - 1, :), ok)
+      ! The derivatives are taken anew only where the steps do not shrink fast.
+      if (.not. fresh) then
+        call linearise(family, plan, place, right(:n - 1), slopes(:n - 1, :), ok, rows(:n - 1))
+      else
+        call residual(family, plan, place, right(:n - 1), ok=ok)
+        right = right*rows
+      end if
       if (.not. ok) return
       slopes(n, :) = along
       right(n) = 0
@@ -251,6 +264,7 @@ contains
       call move(family, plan, place%now, change)
       before = length
       length = norm2(change)
+      fresh = i == 1 .or. length < 0.2_wp*before
       if (length < 1e-14_wp .or. (length < converged_step .and. length > 0.1_wp*before)) exit
     end do
     ok = length < converged_step

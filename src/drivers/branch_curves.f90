@@ -3,8 +3,8 @@
 
 !> `separatrix branches --free`: the labels of branches as curves over a second parameter.
 module branch_curves
-  use bifurcation_curve, only: can_be_followed, curve_t, trace_curve
-  use branch_point, only: label_names, last_label, no_label
+  use bifurcation_curve, only: can_be_followed, curve_label, curve_t, trace_curve
+  use branch_point, only: label_names, last_label, no_label, point_t
   use branch_search, only: search_t
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names, parameter_value
   use case_type, only: case_t
@@ -15,7 +15,6 @@ module branch_curves
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_schema, only: name_length, schema_t, type_float64, type_int32, type_int8
-  use periodic_orbit, only: orbit_t
   use session, only: session_t
   use status, only: exit_bad_case
   use text, only: join, replace_all, to_text
@@ -93,30 +92,29 @@ contains
     do b = 1, size(search%branches)
       do i = 1, size(search%branches(b)%points)
         associate (point => search%branches(b)%points(i))
-          if (.not. can_be_followed(point%label)) cycle
+          if (.not. can_be_followed(point%label) .or. is_known(curves, point)) cycle
           call trace_curve(search%family, curves%plan, point, curves%value, curve)
-          if (size(curve%points) < 2) cycle
-          if (.not. is_known(curves, curve, point%orbit)) curves%list = [curves%list, curve]
+          if (size(curve%points) > 1) curves%list = [curves%list, curve]
         end associate
       end do
     end do
   end subroutine follow_labels
 
-  !> Whether a curve of the same label, period and number of events passes the value of the case where the orbit is.
-  pure logical function is_known(curves, curve, orbit)
+  !> Whether a curve of the same label and period passes a labelled point.
+  pure logical function is_known(curves, point)
     type(curves_t), intent(in) :: curves
-    type(curve_t), intent(in) :: curve
-    type(orbit_t), intent(in) :: orbit
-    integer :: c, i
+    type(point_t), intent(in) :: point
+    integer :: c, i, label
     real(wp) :: ranges(2), apart(2)
     ranges = curves%plan%highest - curves%plan%lowest
     is_known = .false.
+    label = curve_label(point%label)
     do c = 1, size(curves%list)
-      if (curves%list(c)%label /= curve%label) cycle
+      if (curves%list(c)%label /= label) cycle
       do i = 1, size(curves%list(c)%points)
         associate (there => curves%list(c)%points(i))
-          if (there%orbit%periods /= orbit%periods) cycle
-          apart = [there%orbit%parameter - orbit%parameter, there%free - curves%value]/ranges
+          if (there%orbit%periods /= point%orbit%periods) cycle
+          apart = [there%orbit%parameter - point%orbit%parameter, there%free - curves%value]/ranges
           is_known = is_known .or. maxval(abs(apart)) < same_point
         end associate
       end do
