@@ -79,6 +79,23 @@ THEIRS = {
     "rig.0.9": (RIG, "first graze, a = 0.9: w", 0.7639, 5e-5),
 }  # fmt: skip
 
+# located once more by the command `branches`, which is given a range of a parameter and nothing else
+FOLLOWED = (
+    *("dux.doubling", "dux.fold", "coco.graze", "coco.fold", "coco.curve.0.8", "coco.doubling.0.8"),
+    *("coco.curve.0.95", "coco.doubling.0.95", "coco.curve.1.05", "coco.fold.1.05"),
+    *("coco.curve.1.9", "coco.fold.1.9", "hartog.low", "hartog.high", "hartog.plain_low"),
+    *("hartog.plain_high", "hartog.undamped_low", "hartog.undamped_high", "soft.graze"),
+)
+THEIRS = {
+    name: row
+    for key, (source, what, *digits) in THEIRS.items()
+    for name, row in (
+        (key, (source, what, *digits)),
+        (f"{key}.branches", (source, f"{what}, by `branches`", *digits)),
+    )
+    if name == key or key in FOLLOWED
+}
+
 # what the program cannot be asked today
 NOT_YET = (
     (BUDD_DUX, "sigma = 0, chaos: sum of the exponents is 2 ln 0.8 times the rate of impacts",

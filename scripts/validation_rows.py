@@ -3,6 +3,7 @@
 """The rows of docs/validation.md: what the cases of examples/validation/ give."""
 
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 from separatrix import open_result, table
 from separatrix.library import Model
+from separatrix.open import decode_flags
 from stroboscopic import OFFSETS, WEIGHTS, Map, Orbit, doubling, fold, follow
 from validation_numbers import THEIRS
 
@@ -37,6 +39,22 @@ class Row:
         return "agrees" if abs(self.difference) <= THEIRS[self.key][3] else "DIFFERS"
 
 
+@dataclass(frozen=True)
+class Labels:
+    """Labels of the points of branches, with their parameter and the impacts of their orbits."""
+
+    names: np.ndarray
+    values: np.ndarray
+    impacts: np.ndarray
+
+    def at(self, *names: str, impacts: int | None = None) -> np.ndarray:
+        """Where one of some labels stands, ascending; on orbits with so many impacts."""
+        chosen = np.isin(self.names, names)
+        if impacts is not None:
+            chosen &= self.impacts == impacts
+        return np.unique(self.values[chosen])
+
+
 class Program:
     """Runs of the program on the cases of examples/validation/, and their models in the library."""
 
@@ -50,6 +68,17 @@ class Program:
         words = [self.path, command, CASES / f"{case}.toml", "-q", "--force", "-o", output]
         subprocess.run([*words, *(word for item in settings for word in ("--set", item))], check=True)
         return output
+
+    def labels(self, case: str, parameter: str, ends: tuple[float, float], *settings: str) -> "Labels":
+        """Follow the orbits of one drive period over a parameter; return the labels and where they stand."""
+        output = self.folder / f"{case}_branches.h5"
+        words = [self.path, "branches", CASES / f"{case}.toml", "-q", "--force", "-o", output]
+        words += ["--parameter", parameter, "--from", repr(ends[0]), "--to", repr(ends[1]), "--searches", "4"]
+        subprocess.run([*words, *(word for item in settings for word in ("--set", item))], check=True)
+        with open_result(output) as result:
+            chosen = result["period"].values == 1
+            names = decode_flags(result["label"]).values[chosen]
+            return Labels(names, result["parameter"].values[chosen], result["impacts"].values[chosen])
 
     def catalogue(self, case: str, *settings: str) -> dict[str, np.ndarray]:
         """Run a map; return its catalogue by column."""
@@ -315,4 +344,57 @@ def soft(program: Program) -> list[Row]:
     return rows
 
 
-COMPUTED = (budd_dux, chaos, coco, den_hartog, family, soft)
+def followed(program: Program) -> list[Row]:
+    """Folds, doublings, grazes and onsets of stick as the command `branches` finds and locates them."""
+    found, how = {}, {}
+
+    def follow_over(
+        keys: dict[str, Callable[[Labels], float]],
+        case: str,
+        parameter: str,
+        ends: tuple[float, float],
+        *settings: str,
+    ) -> None:
+        labels = program.labels(case, parameter, ends, *settings)
+        words = "".join(f" --set '{item}'" for item in settings)
+        for key, pick in keys.items():
+            found[f"{key}.branches"] = float(pick(labels))
+            how[f"{key}.branches"] = (
+                f"`separatrix branches examples/validation/{case}.toml --parameter {parameter}`{words}"
+            )
+
+    def graze(labels: Labels) -> float:
+        return labels.at("GR", "GR-fold")[0]
+
+    dux = {
+        "dux.doubling": lambda labels: labels.at("PD", impacts=1)[-1],
+        "dux.fold": lambda labels: -labels.at("SN", impacts=1)[0],
+    }
+    follow_over(dux, "budd_dux", "contact.upper", (-2.0, 0.1))
+    coco_keys = {"coco.graze": graze, "coco.fold": lambda labels: labels.at("SN", impacts=1)[0]}
+    follow_over(coco_keys, "impact_coco", "drive.amplitude", (0.05, 1.2))
+    for w, name, high in (
+        (0.8, "doubling", 1.0),
+        (0.95, "doubling", 1.0),
+        (1.05, "fold", 1.0),
+        (1.9, "fold", 6.0),
+    ):
+        label = "PD" if name == "doubling" else "SN"
+        keys = {
+            f"coco.curve.{w}": graze,
+            f"coco.{name}.{w}": lambda labels, label=label: labels.at(label, impacts=1)[-1],
+        }
+        follow_over(keys, "impact_coco", "drive.amplitude", (0.05, high), f"drive.ratio={w}")
+    plain = "friction.static_coefficient=1.0"
+    bare = 'friction={law="coulomb", kinetic_coefficient=1}'
+    for name, settings in {"": (), "plain_": (plain,), "undamped_": (bare,)}.items():
+        keys = {
+            f"hartog.{name}low": lambda labels: labels.at("stick_onset")[0],
+            f"hartog.{name}high": lambda labels: labels.at("stick_onset")[-1],
+        }
+        follow_over(keys, "dry_friction", "drive.ratio", (0.62, 1.45), *settings)
+    follow_over({"soft.graze": graze}, "soft_impact", "drive.ratio", (0.42, 0.6))
+    return [Row(key, value, how[key]) for key, value in found.items()]
+
+
+COMPUTED = (budd_dux, chaos, coco, den_hartog, family, soft, followed)

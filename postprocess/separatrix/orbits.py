@@ -22,7 +22,7 @@ __all__ = ["Stability", "branches", "stability"]
 # What the program names by its options.
 _IN_PYTHON = {
     "--parameter": "parameter", "--from": "start", "--to": "stop", "--searches": "searches",
-    "--periods": "periods",
+    "--periods": "periods", "--free-from": "free", "--free-to": "free", "--free": "free",
 }  # fmt: skip
 
 
@@ -59,6 +59,7 @@ def branches(
     stop: float | None = None,
     *,
     searches: int | None = None,
+    free: tuple[str, float, float] | None = None,
     x0: tuple[float, float] | None = None,
     v0: tuple[float, float] | None = None,
     output: str | Path | None = None,
@@ -75,6 +76,8 @@ def branches(
         The path of the parameter and its range; without one that of the sweep or the axis of the case.
     searches
         At how many values orbits are searched; 12 if not given.
+    free
+        A second parameter and its range, over which the labelled points are followed as curves.
     x0, v0
         Ranges of the starts from which they are searched [m, m/s]; those of the axes of the case, else twice
         the motion that the drive brings about.
@@ -94,6 +97,8 @@ def branches(
             options += [name, toml(value)]
     if searches is not None:
         options += ["--searches", str(searches)]
+    if free is not None:
+        options += ["--free", free[0], "--free-from", toml(free[1]), "--free-to", toml(free[2])]
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         target = (Path(folder) / "branches.h5" if output is None else Path(output).expanduser()).absolute()
         if output is not None and target.exists() and not overwrite:

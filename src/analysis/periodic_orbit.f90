@@ -18,7 +18,7 @@ module periodic_orbit
   private
 
   public :: orbit_of_motion, correct_orbit, tangent_of, direct, same_sequence, is_admissible, rotate_to_section, scales_of_orbit, &
-    move_along, section_points
+    move_along, section_points, shoot
 
   integer, parameter, public :: states = 2
   !> Orbits with more events are not followed.

@@ -3,6 +3,7 @@
 
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
+  use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
@@ -43,6 +44,7 @@ contains
     type(command_t), intent(in) :: command
     type(session_t) :: session
     type(search_t) :: search
+    type(curves_t) :: curves
     type(schema_t) :: schema
     type(bounds_t) :: bounds
     type(error_t), allocatable :: error
@@ -51,6 +53,7 @@ contains
     call open_session(command, session)
     path = output_path(command%output, command%path, command%name)
     call set_range(command, session%the_case, search, bounds, error)
+    if (.not. allocated(error)) call set_free(command, session%the_case, search, curves, error)
     if (.not. allocated(error)) call prepare_search(search, command%searches, error)
     call session%stop_if(error)
     call set_starts(session%the_case, search)
@@ -68,7 +71,9 @@ contains
         call session%journal%progress(int(i, int64))
       end do
       call follow_seeds(search)
+      if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, trim(bounds%unit))
+      call report_curves(session, search, curves)
     end if
     if (size(search%branches) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
       'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
@@ -76,6 +81,7 @@ contains
     call session%stop_if(error)
     call describe_file(session, 'branches', schema)
     if (session%team%is_root()) call describe_branches(search, trim(bounds%unit), schema)
+    if (session%team%is_root()) call describe_curves(curves, search%family%path, trim(bounds%unit), schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)
     call session%stop_if(error)

@@ -41,6 +41,10 @@ module command_line
     real(wp) :: from = 0, to = 0
     logical :: has_from = .false., has_to = .false.
     integer :: searches = 12
+    !> A second parameter, over which its labels are followed, and its range.
+    character(len=:), allocatable :: free
+    real(wp) :: free_from = 0, free_to = 0
+    logical :: has_free_from = .false., has_free_to = .false.
     !> `boundary`: invariant sets are grown within so many times the window of the map; 0 = none.
     real(wp) :: grow = 1
     !> `stability`: drive periods that are watched.
@@ -67,6 +71,7 @@ contains
     command%output = ''
     command%list = ''
     command%parameter = ''
+    command%free = ''
     command%csv = ''
     command%record = ''
     command%tile_times = ''
@@ -126,6 +131,8 @@ contains
       call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed is a whole number from 64')
     else if (command%name == 'branches' .and. len(command%parameter) == 0) then
       call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
+    else if (len(command%free) == 0 .and. (command%has_free_from .or. command%has_free_to)) then
+      call fail(error, exit_usage, '--free-from and --free-to are the range of --free NAME, which is missing')
     else if (command%force .and. command%resume) then
       call fail(error, exit_usage, '--force starts anew and --resume goes on: choose one')
     else
@@ -266,6 +273,14 @@ contains
     case ('--to')
       command%has_to = .true.
       call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
+    case ('--free')
+      command%free = value
+    case ('--free-from')
+      command%has_free_from = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the second parameter', command%free_from, error)
+    case ('--free-to')
+      command%has_free_to = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the second parameter', command%free_to, error)
     case ('--grow')
       call read_number_in(name, value, 0.0_wp, 1000.0_wp, 'windows', command%grow, error)
     case ('--searches')

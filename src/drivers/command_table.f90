@@ -37,7 +37,9 @@ module command_table
       'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
       '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
       '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
-      '  --searches N       values at which orbits are searched (default 12)'//nl, .true.), &
+      '  --searches N       values at which orbits are searched (default 12)'//nl// &
+      '  --free NAME        a second parameter, over which the labels found are followed as curves'//nl// &
+      '  --free-from A, --free-to B   its range, without which it is that of the axis of this parameter'//nl, .true.), &
     command_row_t('boundary', 'MAP', &
       'the boundaries between the basins of a map, as curves', &
       'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
@@ -99,7 +101,7 @@ module command_table
     character(len=130) :: help
   end type option_row_t
 
-  type(option_row_t), parameter, public :: options(31) = [ &
+  type(option_row_t), parameter, public :: options(34) = [ &
     option_row_t('--output', '-o', .true., '', &
       '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'), &
     option_row_t('--set', '', .true., 'basin sweep branches stability trajectory points', &
@@ -149,6 +151,12 @@ module command_table
     option_row_t('--to', '', .true., 'branches', &
       ''), &
     option_row_t('--searches', '', .true., 'branches', &
+      ''), &
+    option_row_t('--free', '', .true., 'branches', &
+      ''), &
+    option_row_t('--free-from', '', .true., 'branches', &
+      ''), &
+    option_row_t('--free-to', '', .true., 'branches', &
       ''), &
     option_row_t('--grow', '', .true., 'boundary', &
       ''), &

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from separatrix import style
+from separatrix import style, table
 from separatrix.figures import branches
 from separatrix.open import decode_flags, decode_words, open_result
 
@@ -58,6 +58,35 @@ def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
         assert "fold (SN)" in texts and "graze with a fold (GR-fold)" in texts
 
 
+def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
+    out, ended = run(
+        "impact_coco", *AMPLITUDE, "--free", "drive.ratio", "--free-from", "0.9", "--free-to", "1.1", "--json"
+    )
+    assert ended.returncode == 0, ended.stderr
+    logged = [
+        line for line in map(json.loads, ended.stdout.splitlines()) if line["event"] == "codimension_two"
+    ]
+    meeting = [line for line in logged if (line["label"], line["second"]) == ("SN", "GR")]
+    assert [line["free"] for line in meeting] == pytest.approx([0.998749217772], abs=1e-9)
+    with open_result(out) as result:
+        labels = decode_flags(result["curve_label"]).values
+        amplitude, ratio = result["curve_parameter"].values, result["curve_free"].values
+        assert set(labels) == {"GR", "SN"}
+        grazes = labels == "GR"
+        assert amplitude[grazes] == pytest.approx(np.hypot(1 - ratio**2, 0.1 * ratio)[grazes], abs=1e-10)
+        assert (ratio[grazes].min(), ratio[grazes].max()) == pytest.approx((0.9, 1.1), abs=1e-9)
+        # the folds leave the grazes with the square of the distance
+        away = (ratio - 0.998749217772)[labels == "SN"]
+        gap = (np.hypot(1 - ratio**2, 0.1 * ratio) - amplitude)[labels == "SN"]
+        near = (away > 1e-3) & (away < 1e-2)
+        assert near.sum() >= 2
+        assert np.polyfit(np.log(away[near]), np.log(gap[near]), 1)[0] == pytest.approx(2, abs=0.02)
+        with style.context():
+            figure = branches.figures(result, "title")["curves"]
+        texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        assert {"fold (SN)", "graze (GR)", "codimension two"} <= set(texts)
+
+
 @pytest.mark.parametrize(
     ("options", "code", "said"),
     [
@@ -67,6 +96,14 @@ def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
         (("--parameter", "body.mass"), 65, "--from and --to are needed"),
         (("--parameter", "drive.amplitude", "--from", "2", "--to", "1"), 65, "a range that rises"),
         (("--parameter", "contact.restitution", "--from", "0.5", "--to", "1.5"), 65, "--to"),
+        ((*AMPLITUDE, "--free", "drive.amplitude"), 65, "--free: found 'drive.amplitude'"),
+        ((*AMPLITUDE, "--free", "drive.ratio"), 65, "--free-from and --free-to are needed"),
+        (
+            (*AMPLITUDE, "--free", "drive.ratio", "--free-from", "2", "--free-to", "3"),
+            65,
+            "holds drive.ratio",
+        ),
+        ((*AMPLITUDE, "--free-from", "2"), 64, "--free NAME, which is missing"),
     ],
 )
 def test_what_makes_no_sense_is_refused(run, options, code, said):
@@ -86,6 +123,77 @@ def test_a_parameter_without_effect_has_straight_branches(run):
             chosen = result["branch"].values == number
             assert np.ptp(result["x"].values[chosen]) < 1e-9
         assert set(decode_flags(result["label"]).values) == {"none", "end_of_range"}
+
+
+# fold at which the impacting motion ends in a run up; grazes at which impacts start in it and in a run down
+ENDS = {
+    "coulomb": (1.341271279226, 0.8767783170526, 1.110177089292),
+    "viscous": (1.373806398979, 0.8709006271277, 1.114312918750),
+    "stribeck": (1.341270651726, 0.8767755243508, 1.110175552555),
+}
+
+
+@pytest.mark.parametrize("friction", ENDS)
+def test_what_begins_and_ends_the_impacting_motion(friction, run):
+    out, ended = run(f"../sweep_{friction}", "--parameter", "drive.ratio", "--searches", "1")
+    assert ended.returncode == 0, ended.stderr
+    with open_result(out) as result:
+        labels, period = decode_flags(result["label"]).values, result["period"].values
+        values, impacts = result["parameter"].values, result["impacts"].values
+        multipliers = result["multiplier_real"].values + 1j * result["multiplier_imag"].values
+        last = np.flatnonzero(np.diff(result["branch"].values, append=0, prepend=0)) - 1
+        assert values[(labels == "SN") & (period == 1)] == pytest.approx([ENDS[friction][0]], abs=1e-10)
+        assert values[(labels == "GR") & (period == 1)] == pytest.approx([ENDS[friction][1]], abs=1e-10)
+        assert values[(labels == "GR-fold") & (period == 1)] == pytest.approx([ENDS[friction][2]], abs=1e-10)
+        for k in np.flatnonzero(np.isin(labels, ["SN", "PD"])):
+            wanted = 1 if labels[k] == "SN" else -1
+            # where a branch ends in the doubling that it came from it has +1
+            ends_here = k in last or k - 1 in last
+            apart = [np.abs(multipliers[k] - way).min() for way in ((wanted, 1) if ends_here else (wanted,))]
+            assert min(apart) < 1e-8
+        if friction == "viscous":
+            # flights shrink areas by exp(-b T/m), an impact by the square of the restitution
+            calm = np.abs(multipliers).max(axis=1) < 1e2
+            product = multipliers.prod(axis=1).real
+            free = calm & (impacts == 0)
+            rate = np.log(product[free]) * values[free] / period[free]
+            assert np.ptp(rate) < 1e-11 * np.abs(rate).max()
+            expected = 0.25 ** impacts[calm] * np.exp(rate.mean() * period[calm] / values[calm])
+            # long orbits beside a graze have large derivatives and a small determinant
+            bar = np.where(period[calm] == 1, 1e-12, 1e-10)
+            assert np.all(np.abs(product[calm] - expected) < bar)
+
+
+def test_jumps_of_a_sweep_are_folds_and_grazes(separatrix, source_dir, tmp_path):
+    """Each limit that `sweep` brackets holds one of these, and which one is known from the branches."""
+    out = tmp_path / "sweep.h5"
+    case = source_dir / "examples" / "sweep_coulomb.toml"
+    subprocess.run(
+        [
+            separatrix,
+            "sweep",
+            case,
+            "-q",
+            "-o",
+            out,
+            "--set",
+            "sweep.starts=[2,2]",
+            "--set",
+            "sweep.step=0.02",
+        ],
+        check=True,
+    )
+    with open_result(out) as result:
+        limits = table(result, "limits")
+        names, lows, highs = (limits[key].values for key in ("name", "lower", "upper"))
+    fold, graze, jump = ENDS["coulomb"]
+    for name, value in {
+        "impacts_stop_up": fold,
+        "impacts_start_up": graze,
+        "impacts_start_down": jump,
+    }.items():
+        (k,) = np.flatnonzero(names == name)
+        assert lows[k] <= value <= highs[k]
 
 
 def test_a_signal_ends_it(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:

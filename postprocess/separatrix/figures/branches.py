@@ -32,11 +32,49 @@ _MARKS = {
     "too_long": ("|", "events too many to go on"),
 }
 
+# Colour and line of a curve in two parameters.
+_LINES = {"SN": ("C0", "-"), "PD": ("C1", "--"), "GR": ("C2", "-."), "stick_onset": ("C3", ":")}
+
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figure of a file of branches by name."""
     look.require("file of branches")
-    return {"branches": diagram(result, title, look)}
+    found = {"branches": diagram(result, title, look)}
+    if result.sizes.get("curve_point"):
+        found["curves"] = chart(result, title, look)
+    return found
+
+
+def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the curves of labelled points over both parameters, with their points of codimension two."""
+    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
+    ax = figure.add_subplot()
+    number, across, up = (result[name].values for name in ("curve", "curve_parameter", "curve_free"))
+    labels, second = (decode_flags(result[name]).values for name in ("curve_label", "curve_second"))
+    handles = {}
+    for curve in np.unique(number):
+        chosen = number == curve
+        name = str(labels[chosen][0])
+        colour, line = _LINES[name]
+        ax.plot(across[chosen], up[chosen], line, color=colour, linewidth=1.2)
+        handles[name] = Line2D([], [], color=colour, linestyle=line, label=_MARKS[name][1])
+    double = second != "none"
+    if double.any():
+        ax.plot(across[double], up[double], "o", color="black", markersize=4)
+        handles["double"] = Line2D(
+            [], [], marker="o", color="black", linestyle="none", markersize=4, label="codimension two"
+        )
+    for name, place in (("parameter", ax.set_xlabel), ("free", ax.set_ylabel)):
+        axis = result[f"curve_{name}"].copy()
+        axis.name = str(result.attrs[name]).replace(".", "_")
+        place(axis_label(axis))
+    caption = [
+        *caption_pieces(result, look, describe_case(result)),
+        f"{np.unique(number).size} curves of labelled points; there may be others",
+        plain(version_text(result)),
+    ]
+    compose(figure, title, shown(caption, look), list(handles.values()), columns=4)
+    return figure
 
 
 def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:

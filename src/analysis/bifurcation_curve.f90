@@ -1,0 +1,239 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Where a labelled point of a branch lies over a second parameter: its equations, followed by pseudo-arclength in all unknowns
+!> and both parameters. Where a second condition vanishes on the way the point is located: of codimension two.
+module bifurcation_curve
+  use body_family, only: family_t
+  use branch_point, only: label_gr, label_gr_fold, label_pd, label_sn, label_stick, no_label, point_t
+  use curve_equations, only: at_zero, beside_like, choose_monitor, correct, curve_plan_t, curve_point_t, looked_at, move, place_t, &
+    set_tangent, unknowns
+  use kinds, only: wp
+  use orbit_margins, only: margin_t, of_gap, of_impact
+  use periodic_orbit, only: states
+  implicit none
+  private
+
+  public :: trace_curve, can_be_followed, curve_label
+
+  integer, parameter :: most_points = 200, most_secants = 50
+  !> Steps of the curve in natural sizes; turn of the tangent in one [cosine].
+  real(wp), parameter :: first_step = 1e-3_wp, largest_step = 0.03_wp, smallest_step = 1e-8_wp, least_cosine = 0.95_wp
+  !> A point of codimension two is interpolated between so many, with values of about this.
+  integer, parameter :: nodes = 6
+  real(wp), parameter :: node_value = 1e-3_wp
+
+  !> A curve of the points of one label.
+  type, public :: curve_t
+    integer :: label = no_label
+    type(curve_point_t), allocatable :: points(:)
+  end type curve_t
+
+contains
+
+  !> Whether a label has a curve.
+  pure elemental logical function can_be_followed(label)
+    integer, intent(in) :: label
+    can_be_followed = any(label == [label_sn, label_pd, label_gr, label_gr_fold, label_stick])
+  end function can_be_followed
+
+  !> The label of the curve through points of a label: both kinds of grazes lie on one.
+  pure integer function curve_label(label)
+    integer, intent(in) :: label
+    curve_label = merge(label_gr, label, label == label_gr_fold)
+  end function curve_label
+
+  !> The curve through a labelled point, both ways; no points where it cannot be followed. `value` is the second parameter of
+  !> the case.
+  subroutine trace_curve(family, plan, point, value, curve)
+    type(family_t), intent(in) :: family
+    type(curve_plan_t), intent(in) :: plan
+    type(point_t), intent(in) :: point
+    real(wp), intent(in) :: value
+    type(curve_t), intent(out) :: curve
+    type(place_t) :: start
+    type(curve_point_t), allocatable :: back(:), further(:)
+    real(wp), allocatable :: along(:)
+    logical :: ok
+    integer :: i
+    curve%label = curve_label(point%label)
+    allocate (curve%points(0))
+    start%now%orbit = point%orbit
+    start%now%free = value
+    start%label = curve%label
+    call choose_monitor(family, plan, start, ok)
+    if (.not. ok) return
+    allocate (along(unknowns(start%now)), source=0.0_wp)
+    along(size(along)) = 1
+    call correct(family, plan, start, along, ok)
+    if (.not. ok) return
+    call set_tangent(family, plan, start, along, ok)
+    if (.not. ok) return
+    call trace_one_way(family, plan, start, back)
+    start%tangent = -start%tangent
+    call trace_one_way(family, plan, start, further)
+    curve%points = [[(back(i), i=size(back), 1, -1)], further(2:)]
+  end subroutine trace_curve
+
+  !> The point `length` further.
+  subroutine step_on(family, plan, place, length, next, ok)
+    type(family_t), intent(in) :: family
+    type(curve_plan_t), intent(in) :: plan
+    type(place_t), intent(in) :: place
+    real(wp), intent(in) :: length
+    type(place_t), intent(out) :: next
+    logical, intent(out) :: ok
+    next = place
+    next%now%second = no_label
+    call move(family, plan, next%now, length*place%tangent)
+    call correct(family, plan, next, place%tangent, ok)
+    if (ok) call set_tangent(family, plan, next, place%tangent, ok)
+  end subroutine step_on
+
+  !> From a point to the end of a range, or to where another condition vanishes and the events are others beyond.
+  subroutine trace_one_way(family, plan, start, points)
+    type(family_t), intent(in) :: family
+    type(curve_plan_t), intent(in) :: plan
+    type(place_t), intent(in) :: start
+    type(curve_point_t), allocatable, intent(out) :: points(:)
+    type(place_t) :: place, next
+    type(margin_t) :: before(2), after(2)
+    real(wp) :: step
+    logical :: ok
+    place = start
+    points = [place%now]
+    step = first_step
+    before = looked_at(family, plan, place)
+    do while (size(points) < most_points)
+      call step_on(family, plan, place, step, next, ok)
+      if (ok) ok = sum(next%tangent*place%tangent) > least_cosine
+      if (.not. ok) then
+        step = step/2
+        if (step < smallest_step) return
+        cycle
+      end if
+      if (.not. is_within(plan, next%now)) then
+        call end_at_range(family, plan, place, step, points)
+        return
+      end if
+      after = looked_at(family, plan, next)
+      if (after(1)%value < 0 .and. before(1)%value > at_zero) then
+        call locate(family, plan, place, step, 1, after(1), next, ok)
+        if (ok) points = [points, next%now]
+        return
+      end if
+      if (max(abs(before(2)%value), abs(after(2)%value)) < huge(1.0_wp) .and. before(2)%value*after(2)%value < 0) then
+        call locate(family, plan, place, step, 2, after(2), next, ok)
+        if (ok) points = [points, next%now]
+        call step_on(family, plan, place, step, next, ok)
+      end if
+      points = [points, next%now]
+      place = next
+      before = after
+      step = min(largest_step, 1.4_wp*step)
+    end do
+  end subroutine trace_one_way
+
+  pure logical function is_within(plan, now)
+    type(curve_plan_t), intent(in) :: plan
+    type(curve_point_t), intent(in) :: now
+    associate (both => [now%orbit%parameter, now%free])
+      is_within = all(both >= plan%lowest) .and. all(both <= plan%highest)
+    end associate
+  end function is_within
+
+  !> The last point within the ranges, by halving.
+  subroutine end_at_range(family, plan, place, step, points)
+    type(family_t), intent(in) :: family
+    type(curve_plan_t), intent(in) :: plan
+    type(place_t), intent(in) :: place
+    real(wp), intent(in) :: step
+    type(curve_point_t), allocatable, intent(inout) :: points(:)
+    type(place_t) :: tried, last
+    real(wp) :: low, high
+    logical :: ok
+    integer :: i
+    low = 0
+    high = step
+    do i = 1, most_secants
+      call step_on(family, plan, place, (low + high)/2, tried, ok)
+      if (ok) ok = is_within(plan, tried%now)
+      if (ok) then
+        low = (low + high)/2
+        last = tried
+      else
+        high = (low + high)/2
+      end if
+      if (high - low < 1e-12_wp) exit
+    end do
+    if (low > 0) points = [points, last%now]
+  end subroutine end_at_range
+
+  !> The point of codimension two within a step, where the margin or the test beside the curve that is like `passed` is zero.
+  !> Multipliers are large where an impact has no speed, so that the place is interpolated between points on both sides of it.
+  subroutine locate(family, plan, place, step, which, passed, there, ok)
+    type(family_t), intent(in) :: family
+    type(curve_plan_t), intent(in) :: plan
+    type(place_t), intent(in) :: place
+    real(wp), intent(in) :: step
+    integer, intent(in) :: which
+    type(margin_t), intent(in) :: passed
+    type(place_t), intent(out) :: there
+    logical, intent(out) :: ok
+    type(place_t) :: node
+    real(wp) :: low, high, f_low, f_high, s, f, distance, value(nodes), all(unknowns(place%now), nodes), weight(nodes)
+    integer :: i, k, n
+    low = 0
+    high = step
+    f_low = beside_like(family, plan, place, which, passed)
+    f_high = passed%value
+    do i = 1, most_secants
+      s = low + (high - low)*min(max(f_low/(f_low - f_high), 0.1_wp), 0.9_wp)
+      call step_on(family, plan, place, s, node, ok)
+      ! By chance too near to a graze.
+      if (.not. ok) s = s + 0.02_wp*(high - low)
+      if (.not. ok) call step_on(family, plan, place, s, node, ok)
+      if (.not. ok) return
+      f = beside_like(family, plan, node, which, passed)
+      if (abs(f) < node_value) exit
+      if (f < 0 .eqv. f_high < 0) then
+        high = s
+        f_high = f
+      else
+        low = s
+        f_low = f
+      end if
+    end do
+    s = s - f*(high - low)/(f_high - f_low)
+    distance = min(node_value*(high - low)/abs(f_high - f_low), 0.3_wp*largest_step)
+    n = size(all, 1)
+    do k = 1, nodes
+      call step_on(family, plan, place, s + (2*k - nodes - 1)*distance, node, ok)
+      if (.not. ok) return
+      value(k) = beside_like(family, plan, node, which, passed)
+      all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter, node%now%free]
+    end do
+    do k = 1, nodes
+      weight(k) = product(value/(value - value(k)), mask=[(i /= k, i=1, nodes)])
+    end do
+    there = node
+    there%now%orbit%y = matmul(all(:states, :), weight)
+    there%now%orbit%events%time = matmul(all(states + 1:n - 2, :), weight)
+    there%now%orbit%parameter = sum(all(n - 1, :)*weight)
+    there%now%free = sum(all(n, :)*weight)
+    there%now%second = label_of(place%label, which, passed)
+  end subroutine locate
+
+  !> Label of the second condition.
+  pure integer function label_of(label, which, passed) result(second)
+    integer, intent(in) :: label, which
+    type(margin_t), intent(in) :: passed
+    if (which == 2) then
+      second = merge(label_pd, label_sn, label == label_sn)
+    else
+      second = label_stick
+      if (passed%kind == of_impact .or. passed%kind == of_gap) second = label_gr
+    end if
+  end function label_of
+
+end module bifurcation_curve
