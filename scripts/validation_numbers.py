@@ -40,6 +40,7 @@ THEIRS = {
     "dux.resonant": (BUDD_DUX, "ratio 2, sigma = 0: impact speed", 20 / 3, DIGITS),
     "dux.resonant_trace": (BUDD_DUX, "ratio 2, sigma = 0: sum of the multipliers, both 0.8", 1.6, DIGITS),
     "dux.exponent": (BUDD_DUX, "sigma = 0: largest Lyapunov exponent of the chaos (1/s)", 0.14, 0.005),
+    "dux.sum": (BUDD_DUX, "the same: sum of the exponents less 2 ln 0.8 times the impacts (1/s)", 0.0, 1e-8),
     "coco.graze": (COCO, "graze: A", 0.1, DIGITS),
     "coco.sweep_graze": (COCO, "graze in the run up of a sweep: A", 0.1, DIGITS),
     "coco.speed": (COCO, "A = 1: impact speed", 1.695732937595, DIGITS),
@@ -98,8 +99,6 @@ THEIRS = {
 
 # what the program cannot be asked today
 NOT_YET = (
-    (BUDD_DUX, "sigma = 0, chaos: sum of the exponents is 2 ln 0.8 times the rate of impacts",
-     "no command computes Lyapunov exponents; differences between flights fail at grazing impacts"),
     (FAMILY, "the catalogue says \"family\" of marginally stable orbits",
      "the catalogue lists the orbits of the family one by one, see the row on it"),
     ("G. Csernak, G. Licsko, Meccanica 56 (2021); Int. J. Bifurcation Chaos 24 (2014)",

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import separatrix as sx
 from scipy.optimize import brentq
 from separatrix import open_result, table
 from separatrix.library import Model
@@ -141,12 +142,17 @@ def budd_dux(program: Program) -> list[Row]:
 def chaos(program: Program) -> list[Row]:
     """The chaos of the undamped impact oscillator with the wall at its rest position."""
     exponent = largest_exponent(Map(program.models["budd_dux"], {"contact.upper": 0.0}))
+    case = sx.load(CASES / "budd_dux.toml").with_(contact__upper=0.0)
+    found = sx.stability(case)
+    duration = found.periods * 2 * np.pi / program.models["budd_dux"].drive_frequency({})
+    lost = 2 * np.log(0.8) * found.impacts / duration
     return [
         Row(
             "dux.exponent",
             exponent,
             "`examples/validation/budd_dux.toml`, 200 pairs of motions of the library",
-        )
+        ),
+        Row("dux.sum", found.sum_found - lost, "`separatrix stability examples/validation/budd_dux.toml`"),
     ]
 
 
