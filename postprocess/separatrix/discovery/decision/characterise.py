@@ -22,6 +22,9 @@ _USABLE = 1e-6
 _HALVINGS = 3
 # factor of the lowest value of a constant below which a hidden state is none
 _FADED = 1.3
+# share of the best evidence from which on a variable of the same kind may be the right one, and the share of
+# the gap that the best closes from which on it is not
+_AKIN, _NEARLY_ALL = 0.4, 0.9
 
 
 @dataclass
@@ -79,7 +82,7 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
     others: dict[tuple[str, ...], Character] = {}
     for one in sorted(found, key=lambda one: -one.evidence):
         close = one.evidence > best.evidence - bench.options.separation * _left(best, base.fit)
-        if close and one.hypothesis.depends_on != best.hypothesis.depends_on:
+        if (close or _akin(one, best)) and one.hypothesis.depends_on != best.hypothesis.depends_on:
             others.setdefault(one.hypothesis.depends_on, one)
     return replace(decision, outcome="characterised", characters=[best, *others.values()])
 
@@ -88,6 +91,15 @@ def _known(best: Character, bench: Bench) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = bench.options
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > options.characterised
+
+
+def _akin(one: Character, best: Character) -> bool:
+    """Whether a hypothesis differs in its second variable alone, which a best with a gap left cannot tell."""
+    return (
+        one.hypothesis.depends_on[0] == best.hypothesis.depends_on[0]
+        and one.evidence > _AKIN * best.evidence
+        and min(best.closed, best.held_out_closed) < _NEARLY_ALL
+    )
 
 
 def _left(one: Character, fit) -> float:
