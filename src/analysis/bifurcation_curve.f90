@@ -122,6 +122,8 @@ contains
         if (ok) points = [points, next%now]
         return
       end if
+      ! Beyond a margin that was at zero before, or was not there: no motion of the machine.
+      if (after(1)%value < -at_zero) return
       if (max(abs(before(2)%value), abs(after(2)%value)) < huge(1.0_wp) .and. before(2)%value*after(2)%value < 0) then
         call locate(family, plan, place, step, 2, after(2), next, ok)
         if (ok) points = [points, next%now]
@@ -204,6 +206,8 @@ contains
         f_low = f
       end if
     end do
+    ok = abs(f_high - f_low) > 0
+    if (.not. ok) return
     s = s - f*(high - low)/(f_high - f_low)
     distance = min(node_value*(high - low)/abs(f_high - f_low), 0.3_wp*largest_step)
     n = size(all, 1)
@@ -216,6 +220,8 @@ contains
     do k = 1, nodes
       weight(k) = product(value/(value - value(k)), mask=[(i /= k, i=1, nodes)])
     end do
+    ok = sum(abs(value)) + sum(abs(weight)) < huge(1.0_wp)
+    if (.not. ok) return
     there = node
     there%now%orbit%y = matmul(all(:states, :), weight)
     there%now%orbit%events%time = matmul(all(states + 1:n - 2, :), weight)

@@ -123,11 +123,13 @@ contains
     if (place%monitor%kind == 0) left(n + 1) = merge(test(1), test(2), place%label == label_sn)
     if (place%monitor%kind /= 0) left(n + 1) = huge(1.0_wp)
     touch = -huge(touch)
-    do i = 1, size(margins%list)*merge(1, 0, place%monitor%kind /= 0)
-      if (.not. is_same(margins%list(i), place%monitor)) cycle
-      left(n + 1) = margins%list(i)%value
-      touch = margins%list(i)%time
-    end do
+    if (place%monitor%kind /= 0) then
+      do i = 1, size(margins%list)
+        if (.not. is_same(margins%list(i), place%monitor)) cycle
+        left(n + 1) = margins%list(i)%value
+        touch = margins%list(i)%time
+      end do
+    end if
     ok = all(abs(left) < 1e100_wp)
     if (.not. present(beside)) return
     beside = margin_t()

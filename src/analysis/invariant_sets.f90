@@ -8,6 +8,7 @@
 !> Hobson, J. Comput. Phys. 104 (1993)), at the level before first; what stays apart is a cut.
 module invariant_sets
   use body_family, only: map_with_variation
+  use circle, only: point_near
   use kinds, only: wp
   use matrices, only: solve
   use motion_state, only: tally_t
@@ -338,6 +339,7 @@ contains
       call map_with_variation(machines, y, 1, image, slopes, tally, ok)
       if (.not. ok) exit
       miss = section_distance(body, image, target)
+      image = point_near(image, target, body%moving%machine%turn)
       if (miss < least) best = y
       if (miss >= least .and. least < accuracy) exit
       ! Newton's method is quick, or it leads nowhere.

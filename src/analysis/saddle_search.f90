@@ -88,7 +88,7 @@ contains
       if (length < converged*1e-2_wp .or. (length < converged*1e2_wp .and. length >= 0.1_wp*before)) exit
     end do
     ok = length < converged*1e2_wp
-    if (ok) call describe(machines, body, point, periods, saddle, ok)
+    if (ok) call describe(machines, body, point_near(point, [0.0_wp, 0.0_wp], body%moving%machine%turn), periods, saddle, ok)
   end subroutine find_saddle
 
   !> Points, multipliers and word of the orbit through a fixed point; not `ok` if it is no saddle, or of a shorter period.
@@ -119,7 +119,7 @@ contains
       call map_with_variation(machines, saddle%points(:, k), 1, image, slopes, tally, ok)
       if (.not. ok) return
       words(k) = tally%word
-      if (k < periods) saddle%points(:, k + 1) = image
+      if (k < periods) saddle%points(:, k + 1) = point_near(image, [0.0_wp, 0.0_wp], body%moving%machine%turn)
       if (k == periods) exit
       ok = section_distance(body, image, point) > same_orbit
       if (.not. ok) return

@@ -46,14 +46,15 @@ contains
     type(schema_t) :: schema
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
-    integer :: axes(2), i
+    integer :: axes(2), i, slices
     call open_map_session(command, session, reader)
     grid = grid_of(session%the_case, session%the_case%axes)
     call check_axes(command%path, grid, axes, error)
     if (.not. allocated(error)) call check_slices(grid, span_of(session%the_case), error)
     call session%stop_if(error)
     path = result_path(command)
-    allocate (planes(product(grid%shape)/product(grid%shape(axes))), names(product(grid%shape)/product(grid%shape(axes))))
+    slices = product(pack(grid%shape, [(.not. any(axes == i), i=1, size(grid%shape))]))
+    allocate (planes(slices), names(slices))
     do i = 1, size(planes)
       call open_plane(grid, axes, i - 1, planes(i))
       call read_labels(reader, grid%shape, axes, planes(i)%index, planes(i)%labels, planes(i)%inferred, error)

@@ -343,9 +343,10 @@ contains
     status = verify(value, '0123456789.eE+-')
     if (status == 0) call read_number(value, number, status)
     if (status == 0 .and. number >= lowest .and. number <= highest) return
-    range = 'from '//to_text(lowest)//' to '//to_text(highest)
-    if (highest >= huge(highest)) range = 'above 0'
-    call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of "//unit//' '//range)
+    range = ' from '//to_text(lowest)//' to '//to_text(highest)
+    if (highest >= huge(highest)) range = ' above 0'
+    if (lowest <= -huge(lowest)) range = ''
+    call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of "//unit//range)
   end subroutine read_number_in
 
   subroutine read_integer(name, value, least, number, error)

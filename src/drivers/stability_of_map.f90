@@ -18,7 +18,7 @@ module stability_of_map
   use motion, only: start_state
   use motion_state, only: state_t
   use one_body, only: one_body_t
-  use status, only: exit_bad_case
+  use status, only: exit_bad_case, exit_usage
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
   implicit none
@@ -64,6 +64,9 @@ contains
     type(entry_t), allocatable :: entries(:)
     type(error_t), allocatable :: ignored
     integer :: i, total
+    if (size(command%overrides) > 0) call fail(error, exit_usage, '--set belongs to a case: stability takes that of its map')
+    if (len(command%draw) > 0) call fail(error, exit_usage, '--draw belongs to a case: stability MAP draws none')
+    if (allocated(error)) return
     call journal%open(.true., command%json, command%quiet)
     call journal%open_copy(command%log, error)
     if (.not. allocated(error)) call open_final(command%path, reader, error)

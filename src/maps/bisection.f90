@@ -57,7 +57,7 @@ contains
     integer, allocatable :: open_ones(:), labels(:)
     real(wp), allocatable :: starts(:, :), middle(:)
     type(interval_t), allocatable :: more(:)
-    integer :: i, k, count
+    integer :: number(size(from, 2)), i, k, count
     open_ones = pack([(i, i=1, size(intervals))], .not. intervals%done)
     left = size(open_ones)
     if (left == 0) return
@@ -69,14 +69,19 @@ contains
       end associate
     end do
     call label_starts(journey, catalogue, starts, labels)
+    number = 0
+    do k = 1, size(intervals)
+      number(intervals(k)%edge) = number(intervals(k)%edge) + 1
+    end do
     count = 0
     do k = 1, left
-      call take_half(intervals(open_ones(k)), middle(k), labels(k), more(count + 1), i)
+      call take_half(intervals(open_ones(k)), middle(k), labels(k), number(intervals(open_ones(k))%edge) < most_intervals, &
+                     more(count + 1), i)
       count = count + i
     end do
     do k = 1, left
       associate (one => intervals(open_ones(k)))
-        one%done = one%high - one%low <= tolerance(one%edge)
+        one%done = one%done .or. one%high - one%low <= tolerance(one%edge)
       end associate
     end do
     if (count > 0) then
@@ -84,17 +89,17 @@ contains
         more(k)%done = more(k)%high - more(k)%low <= tolerance(more(k)%edge)
       end do
       intervals = [intervals, more(:count)]
-      call stop_crowds(size(from, 2), intervals)
     end if
     left = size(intervals) - sum(merge(1, 0, intervals%done))
   end subroutine halve_intervals
 
   !> The half of an interval in which its label changes. With a third label in the middle it keeps the lower half, the upper is
-  !> `other`, and `others` is 1.
-  pure subroutine take_half(one, middle, label, other, others)
+  !> `other`, and `others` is 1; or, if it `may_split` no more, it stays as it is.
+  pure subroutine take_half(one, middle, label, may_split, other, others)
     type(interval_t), intent(inout) :: one
     real(wp), intent(in) :: middle
     integer, intent(in) :: label
+    logical, intent(in) :: may_split
     type(interval_t), intent(inout) :: other
     integer, intent(out) :: others
     others = 0
@@ -102,6 +107,8 @@ contains
       one%high = middle
     else if (label == one%below) then
       one%low = middle
+    else if (.not. may_split) then
+      one%done = .true.
     else
       others = 1
       other = interval_t(edge=one%edge, low=middle, high=one%high, below=label, above=one%above)
@@ -109,20 +116,6 @@ contains
       one%above = label
     end if
   end subroutine take_half
-
-  !> Ends the halving on edges that have fallen into many intervals.
-  pure subroutine stop_crowds(edges, intervals)
-    integer, intent(in) :: edges
-    type(interval_t), intent(inout) :: intervals(:)
-    integer :: number(edges), i
-    number = 0
-    do i = 1, size(intervals)
-      number(intervals(i)%edge) = number(intervals(i)%edge) + 1
-    end do
-    do i = 1, size(intervals)
-      if (number(intervals(i)%edge) >= most_intervals) intervals(i)%done = .true.
-    end do
-  end subroutine stop_crowds
 
   !> Sorts intervals along their edges, and joins two with a sliver of starts between them that are not known.
   pure subroutine join_slivers(intervals)

@@ -137,6 +137,8 @@ contains
     select type (body => machines%centre)
     type is (one_body_t)
       call fly_periods(body, point, periods, .false., image, events, mode, tally, ok)
+      ! At rest in an equilibrium, with nothing that holds it: its neighbours do not stick.
+      if (ok) ok = tally%sticks == 0 .or. holds(body)
       if (.not. ok) return
       call vary(machines, mode, point, events, periods*body%period, likeness*body%size_of*max(1, periods), by_start, ok, &
                 by_parameter)
@@ -145,6 +147,16 @@ contains
         body%slope(mode_at_end(mode, events), periods*body%period, image)
     end select
   end subroutine map_with_variation
+
+  !> Whether a body can stick: dry friction, or a barrier that it rests on.
+  pure logical function holds(body)
+    type(one_body_t), intent(in) :: body
+    associate (machine => body%moving%machine)
+      holds = machine%friction%kinetic > 0 .or. machine%friction%break_away > 0 .or. machine%friction%excess > 0 .or. &
+        abs(machine%effects%asymmetric_coulomb) > 0 .or. machine%effects%upwards%count > 0 .or. &
+        min(machine%contact%upper, -machine%contact%lower) < huge(1.0_wp)
+    end associate
+  end function holds
 
   !> Flies a body from a section point over `periods` drive periods: where it then is, the mode in which it began, and the events
   !> on the way, with `collapsed` a completed chatter as one. `ok` is false if the trajectory had to be given up.

@@ -161,6 +161,33 @@ def test_measures_along_a_parameter_go_on(case, tmp_path: Path, monkeypatch: pyt
     kept.close()
 
 
+def test_an_attractor_that_is_not_there_has_no_numbers(case) -> None:
+    where = {"axes": {"x0": 12, "v0": 12}, "new_starts": False, "progress": False}
+    found = sx.measures_along(case, "drive.ratio", [1.2, 1.4], attractors=2, **where)
+    shares = found["global_integrity"].sel(basin=2).values
+    assert 0 < shares[0] < 1
+    assert np.isnan(shares[1])
+    with pytest.raises(sx.SeparatrixError, match="attractors: found 9"):
+        sx.measures_along(case, "drive.ratio", [1.2], attractors=9, **where)
+
+
+def test_shares_of_random_starts_along_a_parameter_are_those_of_each_value(source_dir: Path) -> None:
+    text = (source_dir / "examples" / "basin_coulomb.toml").read_text()
+    sample = (
+        '[[sample]]\nname = "x0"\nfrom = 0\nto = 1.1\n[[sample]]\nname = "v0"\nfrom = -6\nto = 6\n'
+        '[grid]\nsamples = 60\n[[axis]]\nname = "drive.ratio"\nvalues = [0.9, 1.2, 1.4]\n'
+    )
+    head = text[: text.index("[[axis]]")]
+    result = sx.basin(sx.Case.from_text(head + sample), progress=False)
+    found = sx.measures_along(result, progress=False)["basin_stability"]
+    for number, ratio in enumerate((0.9, 1.2, 1.4)):
+        labels = result["attractor"].isel(drive_ratio=number).values
+        for basin in found["basin"].values:
+            share = found.isel(drive_ratio=number).sel(basin=basin).item()
+            counted = np.mean(labels == basin)
+            assert share == pytest.approx(counted) if counted else not share > 0, (ratio, basin)
+
+
 def test_a_tipping_matrix_of_two_maps(crank, case) -> None:
     same = sx.tipping(crank, crank)
     assert np.array_equal(same.shares[:, :-1], np.eye(2))

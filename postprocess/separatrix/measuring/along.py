@@ -15,6 +15,7 @@ from separatrix.cases import Case, as_case
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.maps import Values, basin
 from separatrix.measuring.api import NAMES, measures
+from separatrix.measuring.maps import place_of
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.variables import is_start
@@ -28,7 +29,7 @@ def measures_along(
     parameter: str | None = None,
     values: Values = None,
     *,
-    names: Sequence[str] | str | None = ("global_integrity",),
+    names: Sequence[str] | str | None = None,
     axes: Mapping[str, Values] | None = None,
     slice: Mapping[str, float] | None = None,
     output: str | Path | None = None,
@@ -48,7 +49,8 @@ def measures_along(
         Path of the parameter; of a case also its values, as those of an axis of `basin`. Of a map with one
         parameter it need not be given.
     names
-        Measures, as for `measures`; by default the share of the window (GIM).
+        Measures, as for `measures`; by default the share of the window (GIM), of starts drawn at random the
+        basin stability.
     axes
         Axes of the starts of a case: {"x0": 100, "v0": 100}.
     slice
@@ -65,11 +67,13 @@ def measures_along(
     whether an attractor is in the catalogue of a value, `limits` what limits the measures.
     """
     chosen = (names,) if isinstance(names, str) and names != "all" else names
-    chosen = ("global_integrity",) if chosen is None else NAMES if chosen == "all" else tuple(chosen)
+    chosen = chosen if chosen is None else NAMES if chosen == "all" else tuple(chosen)
     target = None if output is None else Path(output)
     if target is not None and target.exists() and not overwrite:
         raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", CANNOT_CREATE)
     result = _map_of(source, parameter, values, axes)
+    if chosen is None:
+        chosen = ("basin_stability",) if "sample" in result["attractor"].dims else ("global_integrity",)
     dim = _parameter(result, parameter, slice)
     done = _Done(target, _identity(result, dim, chosen, slice, options), resume)
     rows = []
@@ -77,8 +81,9 @@ def measures_along(
         for number, value in enumerate(result[dim].values.tolist()):
             row = done.row(number)
             if row is None:
+                place = {**(slice or {}), dim: value}
                 found = measures(
-                    result, chosen, slice={**(slice or {}), dim: value}, progress=False, **options
+                    result, chosen, slice=place, progress=False, **_there(result, place, options)
                 )
                 row = done.keep(number, [one.as_dict() for one in found])
             rows.append(row)
@@ -89,6 +94,24 @@ def measures_along(
     _write(data, target)
     done.remove()
     return open_result(target)
+
+
+def _there(result: xr.Dataset, place: Mapping[str, float], options: Mapping) -> dict:
+    """The options with those of the attractors asked for that have a basin at a value."""
+    wanted = options.get("attractors")
+    if wanted is None:
+        return dict(options)
+    asked = [wanted] if isinstance(wanted, int) else list(wanted)
+    known = {int(one) for one in result["catalogue_attractor"].values}
+    unknown = [one for one in asked if one not in known]
+    if unknown:
+        raise SeparatrixError(
+            f"attractors: found {unknown[0]}, allowed {', '.join(map(str, sorted(known)))}", USAGE
+        )
+    if "sample" in result["attractor"].dims:
+        return dict(options)
+    present = {int(one) for one in np.unique(result["attractor"].isel(place_of(result, dict(place))).values)}
+    return {**options, "attractors": [one for one in asked if one in present]}
 
 
 def _map_of(
@@ -128,6 +151,10 @@ def _parameter(result: xr.Dataset, parameter: str | None, chosen: Mapping[str, f
 def _identity(result: xr.Dataset, dim: str, *more: object) -> str:
     """What decides the numbers: the map, the parameter, the measures and their options."""
     labels = np.ascontiguousarray(result["attractor"].values)
+    # the number of threads decides nothing
+    more = tuple(
+        {k: v for k, v in one.items() if k != "threads"} if isinstance(one, dict) else one for one in more
+    )
     said = json.dumps([result.attrs.get("resolved_case"), dim, *more], default=str, sort_keys=True)
     return f"{zlib.crc32(said.encode()):08x}{zlib.crc32(labels.tobytes()):08x}"
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.measuring import boundaries, integrity, phases
-from separatrix.measuring.maps import Slice, slice_of
+from separatrix.measuring.maps import Slice, place_of, slice_of
 from separatrix.measuring.report import Measure, Measures
 from separatrix.measuring.sampling import share_interval
 from separatrix.measuring.tipping import Tipping, tipping_matrix
@@ -96,7 +96,12 @@ def measures(
         raise SeparatrixError(f"starts: found {starts}, allowed 100 or more", USAGE)
     result = open_result(result) if isinstance(result, str | Path) else result
     if result.separatrix.kind == "basin" and "sample" in result.get("attractor", xr.DataArray()).dims:
-        return _of_sample(result)
+        if "basin_stability" not in chosen and names is not None:
+            raise SeparatrixError(
+                f"measures: found {', '.join(chosen)}, allowed of starts drawn at random is basin_stability",
+                USAGE,
+            )
+        return _of_sample(result, slice, attractors)
     found = slice_of(result, slice, frequency, threads, new_starts)
     found.seed, found.starts, found.phases = seed, starts, phases or PHASES
     owns = _owns(found, attractors)
@@ -156,8 +161,12 @@ def _owns(found: Slice, wanted: Sequence[int] | int | None) -> list[int]:
     return given
 
 
-def _of_sample(result: xr.Dataset) -> Measures:
+def _of_sample(
+    result: xr.Dataset, chosen: Mapping[str, float] | None, wanted: Sequence[int] | int | None
+) -> Measures:
     """Of starts drawn at random: the shares, which are basin stability under the density of the case."""
+    place = place_of(result, dict(chosen or {})) if chosen else {}
+    asked = None if wanted is None else {wanted} if isinstance(wanted, int) else set(wanted)
     catalogue = table(result, "catalogue")
     told = (
         "basin stability: the probability that a start drawn from the density of the case ends in the basin"
@@ -169,13 +178,17 @@ def _of_sample(result: xr.Dataset) -> Measures:
     for row in range(catalogue.sizes.get("entry", 0)):
         hits = int(catalogue["count"].values[row])
         at = np.unravel_index(int(catalogue["slice"].values[row]), shape) if shape else ()
-        where = {name: float(result[name].values[i]) for name, i in zip(dims, at, strict=True)}
+        number = int(catalogue["attractor"].values[row])
+        at = dict(zip(dims, map(int, at), strict=True))
+        if any(at.get(name, i) != i for name, i in place.items()) or (asked and number not in asked):
+            continue
+        where = {name: float(result[name].values[i]) for name, i in at.items()}
         found.append(
             Measure(
                 "basin_stability",
                 told,
                 "1",
-                int(catalogue["attractor"].values[row]),
+                number,
                 hits / count,
                 *share_interval(hits, count),
                 "95 %, Clopper and Pearson",

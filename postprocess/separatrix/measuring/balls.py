@@ -92,6 +92,9 @@ def _nearer(
     direction = away / best
     inner, outer = _crossing(labels, centre, own, direction[None], best)
     inner, outer = inner[0], outer[0]
+    if not np.isfinite(outer):
+        # the foreign point itself is within rounding of the basin
+        return best, best, point
     if centre.size == 1:
         return inner, outer, centre + outer * direction
     width, random = 1.0, generator(7, centre.size)

@@ -155,7 +155,10 @@ def wada_merging(found: Slice) -> Measure:
             "wada_merging", told, limits=(*found.limits, f"{len(basins)} basins: Wada needs three")
         )
     distances, shares = wada.merging(found.grid, tuple(np.isfinite(found.region.turns)))
-    value = float(shares[2]) if len(shares) > 2 else 0.0
+    if not len(distances):
+        limits = (*found.limits, "no two basins of the map are neighbours")
+        return Measure("wada_merging", told, limits=limits)
+    value = float(shares[min(2, len(shares) - 1)])
     return Measure(
         "wada_merging",
         told,

@@ -168,8 +168,8 @@ def integrity_factor(found: Slice, own: int) -> Measure:
         )
     if math.isinf(ball.outer):
         limits.append("the ball ends at the edge of the window")
-    elif ball.label == -1:
-        limits.append("the ball ends where the machine has no starts")
+    elif ball.label == 0:
+        limits.append("the ball ends at a start that the machine does not have, or whose label is not known")
     limits.append("the upper end is that of the resolution of the map")
     details = {"centre": ball.centre * found.scale, "samples": ball.samples}
     return Measure(

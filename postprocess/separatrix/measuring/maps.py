@@ -72,7 +72,7 @@ def slice_of(
     """
     _require_map(result)
     case = result.separatrix.case
-    place = _place(result, dict(wanted or {}))
+    place = place_of(result, dict(wanted or {}))
     chosen = result.isel(place)
     names = tuple(str(name) for name in chosen["attractor"].dims)
     if not names:
@@ -119,7 +119,7 @@ def _require_map(result: xr.Dataset) -> None:
         raise SeparatrixError("measures: this map has no catalogue: none of its axes is a start", USAGE)
 
 
-def _place(result: xr.Dataset, wanted: dict[str, float]) -> dict[str, int]:
+def place_of(result: xr.Dataset, wanted: dict[str, float]) -> dict[str, int]:
     """Where on the axes that are not position or velocity."""
     place = {}
     for name in map(str, result["attractor"].dims):

@@ -262,7 +262,7 @@ def _apart(columns: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 def _by_record(m: Motion, make: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
     """Functions of the whole past: `make` gets even times of a record and its fitted position there."""
-    found = None
+    found = np.zeros((*m.x.shape, 1))
     segments = m.problem.segments
     for number, prepared in enumerate(m.problem.prepared):
         rows = np.flatnonzero(segments.record == number)
@@ -273,7 +273,7 @@ def _by_record(m: Motion, make: Callable[[np.ndarray, np.ndarray], np.ndarray]) 
         t, first = np.unique(t, return_index=True)
         even = np.arange(0.0, prepared.samples.t[-1] - prepared.samples.t[0], 2 * np.pi / m.natural / _STEPS)
         values = make(even, np.interp(even, t, m.x[rows][usable][first]))
-        if found is None:
+        if found.shape[2] != values.shape[1]:
             found = np.zeros((*m.x.shape, values.shape[1]))
         for column in range(values.shape[1]):
             found[rows, :, column] = np.interp(m.t[rows], even, values[:, column])
