@@ -186,7 +186,7 @@ contains
     select case (label)
     case (label_pd)
       genuine = minval(abs(orbit%multipliers + 1)) < 1e-5_wp
-    case (label_bp)
+    case (label_sn, label_bp)
       genuine = minval(abs(orbit%multipliers - 1)) < 1e-5_wp
     case (label_ns)
       genuine = abs(aimag(orbit%multipliers(1))) > 0 .and. abs(abs(orbit%multipliers(1)) - 1) < 1e-5_wp

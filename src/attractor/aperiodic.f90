@@ -27,6 +27,8 @@ module aperiodic
   real(wp), parameter :: neighbour = 1e-8_wp, rounding = 1e-15_wp
   !> The mean drift counts as positive if it is so many of its standard errors.
   real(wp), parameter :: errors_apart = 3
+  !> Growth of the distance of neighbours a period (a logarithm) below which it may be that of a family, whose periods differ.
+  real(wp), parameter :: slowest_drift = 1e-3_wp
 
 contains
 
@@ -159,7 +161,7 @@ contains
     mean = sum(means)/batches
     error = sqrt(sum((means - mean)**2)/(batches*(batches - 1)))
     found%multiplier = exponential(mean)
-    found%kind = merge(kind_chaotic, kind_not_known, mean > errors_apart*error)
+    found%kind = merge(kind_chaotic, kind_not_known, mean > max(errors_apart*error, slowest_drift))
   end subroutine judge_drift
 
   !> Adds what `watch_long` found to a catalogue. One of the same regime whose box meets it is widened instead.

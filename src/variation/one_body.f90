@@ -36,13 +36,14 @@ module one_body
 
 contains
 
-  !> Whether the variations of a machine are known: one body whose motion from a section depends on x and v alone.
+  !> Whether the variations of a machine are known: one body whose motion from a section of its drive depends on x and v alone.
   pure logical function has_variation(moving)
     type(motion_t), intent(in) :: moving
     has_variation = .not. allocated(moving%pair) .and. .not. allocated(moving%jointed)
     if (.not. has_variation) return
-    has_variation = .not. moving%machine%effects%dahl_stiffness > 0 .and. .not. moving%machine%drive%interval > 0 .and. &
-                    .not. moving%machine%contact%by_impact
+    has_variation = moving%machine%drive%ratio > 0
+    has_variation = has_variation .and. .not. moving%machine%effects%dahl_stiffness > 0 .and. &
+                    .not. moving%machine%drive%interval > 0 .and. .not. moving%machine%contact%by_impact
     ! A Stribeck law that is vertical at rest has no derivative there.
     associate (law => moving%machine%friction)
       if (law%excess > 0) has_variation = has_variation .and. law%stribeck_exponent >= 1

@@ -129,6 +129,9 @@ class Machine:
         one = self.attractor(number)
         if self.names != ("x0", "v0") or one.numbers["any_place"] or one.numbers["two_bodies"]:
             return None
+        if one.points.shape[1] < 2:
+            # the section of a machine without a drive is where it turns round
+            return None
         turn = float(self.start[2]) if angle is None else angle
         if one.numbers["rests"]:
             points = one.points[:1]
