@@ -128,6 +128,8 @@ def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None
         "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],
         "regime": REGIMES[int(steady["regime"])],
     }  # fmt: skip
+    if cycle and cycle["cycle_time"] > 0:
+        about["cycle_time"] = cycle["cycle_time"]
     about |= {name: steady[name] for name in _STEADY}
     about |= {name: summary[name] for name in _BOOK if np.isfinite(summary[name])}
     for name in ("barrier_upper", "barrier_lower"):

@@ -35,7 +35,10 @@ def candidate(foretold, parameters, training):
         good=foretold.good,
         at_bound=np.zeros(parameters, bool),
     )
-    fitted = SimpleNamespace(fit=fit, added=tuple(range(parameters)))
+    free = [SimpleNamespace(record=None, positive=True) for _ in range(parameters)]
+    fitted = SimpleNamespace(fit=fit, added=tuple(range(parameters)), problem=SimpleNamespace(free=free))
+    # every segment tells as much
+    foretold.fit.reduced = SimpleNamespace(matrix=np.tile(np.eye(parameters), (count, 1, 1)))
     return Judged(fitted, foretold, training, 0.0, np.zeros(count), parameters)
 
 

@@ -75,7 +75,7 @@ def investigate(
     else:
         decision = decide(bench, fitted)
         decision.reasons += nearest(bench, decision)
-        options.progress("asking what the rest of the gap depends on", 0.97)
+        options.progress("asking what the rest of the gap depends on", 0.9)
         decision = characterised(bench, decision)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
