@@ -14,8 +14,8 @@ source scripts/environment.sh
 jobs=$(env -u OMP_NUM_THREADS nproc)
 status=0
 
-# Layers whose serial build differs from the MPI build, and what they stand on.
-serial_layers=(core csupport parallel io drivers)
+# Layers with suites whose serial build differs from the MPI build, and what they stand on.
+serial_layers=(core csupport parallel io)
 
 echo "test: building with MPI in build/"
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=ON
