@@ -3,6 +3,7 @@
 
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
+  use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
@@ -45,6 +46,7 @@ contains
     type(session_t) :: session
     type(search_t) :: search
     type(curves_t) :: curves
+    type(contacts_t) :: contacts
     type(schema_t) :: schema
     type(bounds_t) :: bounds
     type(error_t), allocatable :: error
@@ -71,8 +73,9 @@ contains
         call session%journal%progress(int(i, int64))
       end do
       call follow_seeds(search)
+      if (command%contacts) call look_for_contacts(session, search, contacts)
       if (curves%wanted) call follow_labels(search, curves)
-      call report(session, search, trim(bounds%unit))
+      call report(session, search, contacts, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
     if (size(search%branches) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
@@ -173,9 +176,10 @@ contains
   end subroutine set_starts
 
   !> Every labelled point, and what was found from how many seeds.
-  subroutine report(session, search, unit)
+  subroutine report(session, search, contacts, unit)
     type(session_t), intent(inout) :: session
     type(search_t), intent(in) :: search
+    type(contacts_t), intent(in) :: contacts
     character(len=*), intent(in) :: unit
     integer :: b, i, families
     do b = 1, size(search%branches)
@@ -184,7 +188,9 @@ contains
                                   to_text(size(line%points))//' points')
         do i = 1, size(line%points)
           if (line%points(i)%label /= no_label) call report_point(session, search, line%points(i), b, unit)
+          if (allocated(contacts%list)) call report_contacts(session, search, contacts, b, i, unit)
         end do
+        if (allocated(contacts%list)) call report_contacts(session, search, contacts, b, 0, unit)
       end associate
     end do
     families = sum(search%found%families)

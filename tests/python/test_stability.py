@@ -44,7 +44,7 @@ def test_what_makes_no_sense_is_refused(run):
     assert run("--periods", "3").returncode == 64
     ended = run("-o", "file.h5")
     assert ended.returncode == 64
-    assert "writes no file" in ended.stderr
+    assert "--output belongs to" in ended.stderr
 
 
 def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp_path: Path):
