@@ -37,7 +37,7 @@ contains
     type(contacts_t), intent(out) :: contacts
     type(contact_t), allocatable :: found(:)
     type(point_t) :: point
-    integer :: b, k, before
+    integer :: b, k, at, before
     logical :: ok
     allocate (contacts%list(0), contacts%branch(0), contacts%point(0))
     call session%journal%begin('branches', int(size(search%branches), int64), 0_int64)
@@ -45,11 +45,10 @@ contains
       call find_contacts(search%family, search%branches(b)%points, found)
       before = 0
       do k = 1, size(found)
-        associate (line => search%branches(b)%points, after => found(k)%after + before)
-          call point_at(search, line(after:after + 1), found(k), point, ok)
-          if (ok) search%branches(b)%points = [line(:after), point, line(after + 1:)]
-          contacts%point = [contacts%point, merge(after + 1, 0, ok)]
-        end associate
+        at = found(k)%after + before
+        call point_at(search, search%branches(b)%points(at:at + 1), found(k), point, ok)
+        contacts%point = [contacts%point, merge(at + 1, 0, ok)]
+        if (ok) call insert(point, at, search%branches(b)%points)
         if (ok) before = before + 1
         contacts%list = [contacts%list, found(k)]
         contacts%branch = [contacts%branch, b]
@@ -57,6 +56,19 @@ contains
       call session%journal%progress(int(b, int64))
     end do
   end subroutine look_for_contacts
+
+  !> Puts a point behind one of a line.
+  subroutine insert(point, after, line)
+    type(point_t), intent(in) :: point
+    integer, intent(in) :: after
+    type(point_t), allocatable, intent(inout) :: line(:)
+    type(point_t), allocatable :: longer(:)
+    allocate (longer(size(line) + 1))
+    longer(:after) = line(:after)
+    longer(after + 1) = point
+    longer(after + 2:) = line(after + 1:)
+    call move_alloc(longer, line)
+  end subroutine insert
 
   !> The point of a branch where a contact is, between two of its points.
   subroutine point_at(search, pair, contact, point, ok)
