@@ -38,7 +38,8 @@ module exponents
     !> Largest exponent of the first and of the second half.
     real(wp) :: halves(2) = 0
     integer(int64) :: impacts = 0
-    !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event tangentially.
+    !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event
+    !> tangentially.
     integer :: periods = 0
     real(wp) :: mean_period = 0
     logical :: known = .false.

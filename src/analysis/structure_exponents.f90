@@ -184,7 +184,8 @@ contains
     end associate
   end function damping_rate
 
-  !> Adds the logarithms by which the events of a section change volumes; what is neither an impact nor a turning point has no formula.
+  !> Adds the logarithms by which the events of a section change volumes; what is neither an impact nor a turning point has no
+  !> formula.
   subroutine note_events(structure, events, spectrum)
     type(structure_t), intent(in) :: structure
     type(event_t), intent(in) :: events(:)

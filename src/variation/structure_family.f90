@@ -330,8 +330,8 @@ contains
     end select
   end subroutine map_of_structure
 
-  !> Directions that a motion leaves of its start: a joint that sticks takes one, a closed contact two, a slider one, an event section
-  !> one.
+  !> Directions that a motion leaves of its start: a joint that sticks takes one, a closed contact two, a slider one, an event
+  !> section one.
   pure integer function least_dimension(structure, mode, events) result(least)
     type(structure_t), intent(in) :: structure
     integer, intent(in) :: mode
