@@ -33,7 +33,7 @@ def amplitude(frequency: float) -> float:
 
 
 def test_two_masses_with_a_stop(follow):
-    """Fold and Neimark-Sacker point of the orbit with one impact in closed form; the graze by its amplitude."""
+    """Fold and Neimark-Sacker point with one impact a period in closed form; the graze by its amplitude."""
     points, out = follow("structure_two_masses.toml", "drive.force.frequency", 0.9, 1.2, "--searches", "4")
     found = {point["label"]: point for point in points}
     assert found["NS"]["parameter"] == pytest.approx(0.909658534285, abs=1e-11)
