@@ -35,6 +35,8 @@ module exponents
     !> machine has such a formula.
     real(wp) :: sum_found = 0, sum_exact = 0
     logical :: has_sum = .false.
+    !> The motion comes back to its section points, over and over.
+    logical :: returns = .false.
     !> Largest exponent of the first and of the second half.
     real(wp) :: halves(2) = 0
     integer(int64) :: impacts = 0
@@ -241,7 +243,8 @@ contains
       else if (largest < -3*error .and. largest < 0 .and. k < 0.2_wp) then
         motion = motion_contracting
       else if (abs(largest) <= 3*error .and. k < 0.2_wp) then
-        motion = motion_neutral
+        ! One of a family of cycles is a cycle.
+        motion = merge(motion_contracting, motion_neutral, spectrum%returns)
       end if
     end associate
   end function type_of_motion

@@ -4,7 +4,7 @@
 !> Lyapunov spectrum of a motion of a structure, by orthogonal directions carried from section to section (Benettin et al. 1980).
 module structure_exponents
   use elementary, only: logarithm
-  use exponents, only: batches, error_of, lyapunov_exponents, spectrum_t
+  use exponents, only: batches, error_of, lyapunov_exponents, period_of_section, spectrum_t
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
@@ -21,8 +21,8 @@ module structure_exponents
 
   public :: exponents_of_structure, exponents_of_machine
 
-  !> Section points within this share of the natural size are one.
-  real(wp), parameter :: fixed = 1e-9_wp
+  !> Section points within this share of the natural size are one; they come back within this share of their range.
+  real(wp), parameter :: fixed = 1e-9_wp, same = 1e-7_wp
 
 contains
 
@@ -108,6 +108,7 @@ contains
     end do
     ! Of a fixed point only the rounding moves.
     if (maxval(series) - minval(series) <= fixed*structure%size_of(1)) series = series(1)
+    spectrum%returns = period_of_section(series, same) > 0
     batch = batch*batches/duration
     do k = 1, n
       spectrum%exponents(k) = sum(batch(:, k))/batches

@@ -140,16 +140,20 @@ contains
     integer, intent(in) :: mode, k
     real(wp), intent(in) :: from, start(:), until
     type(margins_t), intent(inout) :: margins
-    type(mode_flow_t) :: flow
+    type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
     type(event_t) :: probe
     real(wp) :: y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(most_guards)
     real(wp) :: least_t, least
     type(jointed_state_t) :: state
-    integer :: i, g, count_guards, count_looks
+    integer :: i, g, at, count_guards, count_looks
     state = state_in(machine, mode, from, start)
-    call flow_of(machine%frame%moving, state%phase, flow)
-    call guards_of(machine%frame%moving%machine, flow, state, list, count_guards)
+    call flow_of(machine%frame%moving, state%phase, at, spare)
+    if (at > 0) then
+      call guards_of(machine%frame%moving%machine, machine%frame%moving%flows(at), state, list, count_guards)
+    else
+      call guards_of(machine%frame%moving%machine, spare, state, list, count_guards)
+    end if
     count_looks = max(6, ceiling(looks*(until - from)/machine%period))
     last_t = from
     last = start
