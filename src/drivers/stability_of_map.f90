@@ -3,6 +3,7 @@
 
 !> `separatrix stability MAP`: what the entries of a map's catalogue are that have no period.
 module stability_of_map
+  use attractors, only: kind_rest
   use body_family, only: family_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of
@@ -16,6 +17,7 @@ module stability_of_map
   use kinds, only: int64, wp
   use machine_family, only: machine_neighbourhood
   use map_reader, only: open_final, reader_t
+  use map_verify, only: probe_file, verify_file
   use status, only: exit_bad_case, exit_usage
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
@@ -29,8 +31,6 @@ module stability_of_map
   integer, parameter, public :: most_points = 5000
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
-  !> Code of a rest in the catalogue.
-  integer, parameter :: kind_rest = 2
 
   integer, parameter :: not_known = 0, chaotic = 1, quasi_periodic = 2, long_transient = 3, above_limit = 4
   character(len=*), parameter :: type_names(0:4) = [character(len=22) :: 'not_known', 'chaotic', 'quasi_periodic', &
@@ -62,12 +62,14 @@ contains
     type(grid_t) :: grid
     type(entry_t), allocatable :: entries(:)
     type(error_t), allocatable :: ignored
-    integer :: i, total
+    integer :: i, total, datasets
     if (size(command%overrides) > 0) call fail(error, exit_usage, '--set belongs to a case: stability takes that of its map')
     if (len(command%draw) > 0) call fail(error, exit_usage, '--draw belongs to a case: stability MAP draws none')
     if (allocated(error)) return
     call journal%open(.true., command%json, command%quiet)
     call journal%open_copy(command%log, error)
+    if (.not. allocated(error)) call probe_file(command%path, error)
+    if (.not. allocated(error)) call verify_file(command%path, error, datasets)
     if (.not. allocated(error)) call open_final(command%path, reader, error)
     if (allocated(error)) return
     call read_map(reader, the_case, grid, entries, total, error)
