@@ -9,7 +9,7 @@ from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.library import effects
 
 # share of the best evidence, or of what free forces explain, from which on a family is tried
@@ -63,7 +63,10 @@ def _best(bench: Bench, found: Round, member: Member) -> Iterator[Judged]:
                 break
             bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
             if not made.fit.converged:
-                # more knots than these records can tell apart
+                if best is not None and made.fit.total < best.fitted.fit.total + WORSE:
+                    # more knots than these records can tell apart
+                    best.fitted.finer = made
+                    break
                 continue
             known = made
             one = found.judge(made, bench.foretell(made, found.foretold))
