@@ -85,7 +85,7 @@ def read(text: str, points: int) -> Finish:
     return Finish(points, seconds_of(whole[1]), seconds_of(packed[1]), seconds_of(packed[2]))
 
 
-def measure(program: Program, sides: tuple[int, ...], repetitions: int) -> Packing:
+def time_files(program: Program, sides: tuple[int, ...], repetitions: int) -> Packing:
     """Run square maps of these sides, in turn."""
     runs: list[list[Finish]] = [[] for _ in sides]
     for _ in range(repetitions):

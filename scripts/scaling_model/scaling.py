@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import packing
 import plots
 import report
 from costs import stretched
 from memory import Memory, measure
 from model import Model, setting
+from packing import Packing, time_files
 from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
 from simulation import TRAJECTORIES_PER_TILE, Simulated, Simulation
 
@@ -71,7 +71,7 @@ class Results:
     checks: list[Check] = field(default_factory=list)
     simulated: Simulated | None = None
     memory: Memory | None = None
-    packing: packing.Packing | None = None
+    packing: Packing | None = None
     version: dict[str, str] = field(default_factory=dict)
     load: tuple[float, float] = (0.0, 0.0)
     seconds: float = 0.0
@@ -160,7 +160,7 @@ def main() -> None:
         model = Model(folder)
         check_model(program, model, results)
         say("the final file")
-        results.packing = packing.measure(program, results.sizes.packed, results.sizes.repetitions)
+        results.packing = time_files(program, results.sizes.packed, results.sizes.repetitions)
         say("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
