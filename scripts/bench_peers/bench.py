@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import limits
 import numpy as np
 import report
 import rows_report
@@ -168,6 +169,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="bench")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--machines", nargs="*", choices=[row.key for row in ROWS])
+    parser.add_argument("--limits", action="store_true")
     parser.add_argument("--build", type=Path, default=SOURCE / "build")
     parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "performance.md")
     options = parser.parse_args()
@@ -176,6 +178,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         program = Program(options.build / "bin" / "separatrix", Path(folder))
         results.version = program.version
+        if options.limits:
+            print(limits.report(program, options.build))
+            return
         if options.machines is not None:
             chosen = tuple(row for row in ROWS if not options.machines or row.key in options.machines)
             report_machines(chosen, program, options)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import memory
 import model
+import packing
 import simulation
 from costs import spread_of
 from markdown import table
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 BAR_TWO_RANKS = 1.9
 BAR_EFFICIENCY = 0.9
+BAR_FINISH = 0.1
+"""Of the run on two ranks: what the final file takes."""
 BAR_MEMORY = 1.1
 """Largest over smallest peak that counts as constant."""
 MIB = 2**20
@@ -149,6 +152,7 @@ def ranks_table(results: Results) -> str:
     """Efficiency against ranks."""
     found = results.simulated
     rows = [[f"{spread}:1", *map(percent, line)] for spread, line in found.by_ranks.items()]
+    rows.append([f"{simulation.BAR_SPREAD}:1, with the final file", *map(percent, found.with_file)])
     rows.append([f"{simulation.BAR_SPREAD}:1, blocks of neighbours", *map(percent, found.neighbours)])
     return table(["cost spread", *(f"{number(ranks)} ranks" for ranks in simulation.RANKS)], rows)
 
@@ -164,6 +168,21 @@ def looks_table(results: Results) -> str:
     rows = [[str(looks), *map(percent, line)] for looks, line in results.simulated.by_looks.items()]
     header = ["looks of rank 0 per tile", *(f"{seconds:g} s a tile" for seconds in simulation.TILE_SECONDS)]
     return table(header, rows)
+
+
+def packing_table(found: packing.Packing) -> str:
+    """The final file of small and large maps."""
+    rows = [
+        [
+            number(runs[0].points),
+            f"{found.middle(size, 'whole'):.2f} s",
+            f"{found.middle(size, 'packed'):.3f} s",
+            percent(found.middle(size, "share")),
+            f"{found.middle(size, 'alone'):.3f} s",
+        ]
+        for size, runs in enumerate(found.runs)
+    ]
+    return table(["points", "whole run", "final file", "share", "of it by rank 0 alone"], rows)
 
 
 def memory_table(peaks: list[memory.Peak], last: list[int] | None = None) -> str:
@@ -184,6 +203,7 @@ def bar_table(results: Results) -> str:
     simulated, found = results.simulated, results.memory
     two = gain(results, 2, lambda run: run.wall)
     place = simulation.RANKS.index(simulation.MANY_RANKS)
+    finish = results.packing.middle(-1, "share")
     many = simulated.by_ranks[simulation.BAR_SPREAD][place]
     groups = [
         f"{min(p.bytes for p in peaks) / MIB:.1f} to {max(p.bytes for p in peaks) / MIB:.1f} MiB from "
@@ -208,6 +228,13 @@ def bar_table(results: Results) -> str:
                 else "no number of tiles per rank"
             ),
             met[many >= BAR_EFFICIENCY],
+        ],
+        [
+            f"the final file, of a run on {packing.RANKS} ranks",
+            f"<= {100 * BAR_FINISH:.0f} %",
+            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points; "
+            f"simulated {number(simulation.MANY_RANKS)} ranks with it: {percent(simulated.with_file[place])}",
+            met[finish <= BAR_FINISH] if finish <= BAR_FINISH or not busy(results) else "machine busy",
         ],
         [
             "memory per rank",
@@ -262,6 +289,11 @@ def page(results: Results, quick: bool) -> str:
         by_ranks=ranks_table(results),
         by_tiles=tiles_table(results),
         by_looks=looks_table(results),
+        packing=packing_table(results.packing),
+        packing_ranks=packing.RANKS,
+        fixed=f"{1000 * results.packing.fixed:.0f}",
+        alone=f"{1e9 * results.packing.alone_per_point:.1f}",
+        shared=f"{1e9 * results.packing.shared_per_point:.0f}",
         usual=simulation.USUAL,
         many=number(simulation.MANY_RANKS),
         per_node=simulation.RANKS_PER_NODE,

@@ -15,6 +15,7 @@ import report
 from costs import stretched
 from memory import Memory, measure
 from model import Model, setting
+from packing import Packing, time_files
 from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
 from simulation import TRAJECTORIES_PER_TILE, Simulated, Simulation
 
@@ -39,9 +40,11 @@ class Sizes:
     tiles: tuple[int, ...] = (32, 8, 4, 2)
     """Sides, on the first of the maps stopped early."""
     slices: tuple[int, ...] = (128, 4096)
+    packed: tuple[int, ...] = (512, 2048)
+    """Sides of the maps whose final file is timed."""
 
 
-QUICK = Sizes(1, 21, 4.0, 8.0, (256, 512), (2048, 4096), (32, 4), (128, 1024))
+QUICK = Sizes(1, 21, 4.0, 8.0, (256, 512), (2048, 4096), (32, 4), (128, 1024), (256, 1024))
 
 
 @dataclass
@@ -68,6 +71,7 @@ class Results:
     checks: list[Check] = field(default_factory=list)
     simulated: Simulated | None = None
     memory: Memory | None = None
+    packing: Packing | None = None
     version: dict[str, str] = field(default_factory=dict)
     load: tuple[float, float] = (0.0, 0.0)
     seconds: float = 0.0
@@ -155,10 +159,12 @@ def main() -> None:
         measure_here(program, results)
         model = Model(folder)
         check_model(program, model, results)
+        say("the final file")
+        results.packing = time_files(program, results.sizes.packed, results.sizes.repetitions)
         say("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
-        results.simulated = Simulation(model, base.costs, mean).everything(BAR)
+        results.simulated = Simulation(model, base.costs, mean, results.packing).everything(BAR)
         say("memory")
         sizes = results.sizes
         results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)

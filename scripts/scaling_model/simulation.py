@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from costs import tiles_for
 from model import Model, setting
+from packing import Packing
 
 RANKS_PER_NODE = 128
 SPREADS = (1, 10, 100, 1000)
@@ -33,6 +34,8 @@ class Simulated:
     """spread: for each of RANKS"""
     neighbours: list[float]
     """With blocks of neighbouring tiles, spread BAR_SPREAD, for each of RANKS."""
+    with_file: list[float]
+    """With the final file, spread BAR_SPREAD, for each of RANKS."""
     by_tiles: dict[int, list[float]]
     """spread: for each of TILES_PER_RANK on MANY_RANKS"""
     by_looks: dict[int, list[float]]
@@ -48,13 +51,19 @@ class Simulated:
 class Simulation:
     """The model with the measured costs."""
 
-    def __init__(self, model: Model, costs: np.ndarray, mean: float) -> None:
-        self.model, self.costs, self.mean = model, costs, mean
+    def __init__(self, model: Model, costs: np.ndarray, mean: float, packing: Packing) -> None:
+        self.model, self.costs, self.mean, self.packing = model, costs, mean, packing
 
     def efficiency(self, ranks: int, per_rank: int, spread: float, *, mean: float = 0, **more) -> float:
         """Efficiency of a map with so many tiles per rank."""
         machine, tiles = self.problem(ranks, per_rank, spread, mean or self.mean, **more)
         return self.model.run(machine, tiles).efficiency
+
+    def with_file(self, ranks: int) -> float:
+        """Efficiency with the final file, of a map of the usual size and the bar's spread."""
+        found = self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, self.mean))
+        finish = self.packing.seconds(ranks * USUAL * TRAJECTORIES_PER_TILE, ranks)
+        return float(found.busy.sum() / (ranks * (found.makespan + finish)))
 
     def problem(self, ranks: int, per_rank: int, spread: float, mean: float, **more):
         """Return the machine and the tiles."""
@@ -82,6 +91,7 @@ class Simulation:
             mean=self.mean,
             by_ranks={s: [self.efficiency(ranks, USUAL, s) for ranks in RANKS] for s in SPREADS},
             neighbours=neighbours,
+            with_file=[self.with_file(ranks) for ranks in RANKS],
             by_tiles={s: [self.efficiency(MANY_RANKS, n, s) for n in TILES_PER_RANK] for s in SPREADS},
             by_looks={
                 looks: [

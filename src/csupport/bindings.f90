@@ -15,9 +15,61 @@ module bindings
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
     c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
-    c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment
+    c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment, &
+    c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_close_bytes
 
   interface
+    integer(c_int32_t) function c_crc32_combine(first, second, size) bind(c, name='separatrix_crc32_combine')
+      import :: c_int32_t, c_int64_t
+      integer(c_int32_t), value :: first, second
+      integer(c_int64_t), value :: size
+    end function c_crc32_combine
+
+    integer(c_int64_t) function c_compress_bound(size) bind(c, name='separatrix_compress_bound')
+      import :: c_int64_t
+      integer(c_int64_t), value :: size
+    end function c_compress_bound
+
+    integer(c_int64_t) function c_compress(bytes, size, level, out, room) bind(c, name='separatrix_compress')
+      import :: c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: bytes, out
+      integer(c_int64_t), value :: size, room
+      integer(c_int), value :: level
+    end function c_compress
+
+    subroutine c_shuffle(bytes, values, width, out) bind(c, name='separatrix_shuffle')
+      import :: c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: bytes, out
+      integer(c_int64_t), value :: values
+      integer(c_int), value :: width
+    end subroutine c_shuffle
+
+    integer(c_int) function c_open_bytes(path, writable, descriptor) bind(c, name='separatrix_open_bytes')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: writable
+      integer(c_int), intent(out) :: descriptor
+    end function c_open_bytes
+
+    integer(c_int) function c_read_bytes(descriptor, bytes, size, offset) bind(c, name='separatrix_read_bytes')
+      import :: c_int, c_int64_t, c_ptr
+      integer(c_int), value :: descriptor
+      type(c_ptr), value :: bytes
+      integer(c_int64_t), value :: size, offset
+    end function c_read_bytes
+
+    integer(c_int) function c_write_bytes(descriptor, bytes, size, offset) bind(c, name='separatrix_write_bytes')
+      import :: c_int, c_int64_t, c_ptr
+      integer(c_int), value :: descriptor
+      type(c_ptr), value :: bytes
+      integer(c_int64_t), value :: size, offset
+    end function c_write_bytes
+
+    integer(c_int) function c_close_bytes(descriptor, sync) bind(c, name='separatrix_close_bytes')
+      import :: c_int
+      integer(c_int), value :: descriptor, sync
+    end function c_close_bytes
+
     integer(c_int) function c_is_special(path) bind(c, name='separatrix_is_special')
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)

@@ -9,6 +9,11 @@ uint32_t separatrix_crc32(uint32_t previous, const void *bytes, int64_t size) {
   return (uint32_t)crc32_z(previous, bytes, (z_size_t)size);
 }
 
+/* CRC-32 of two pieces one after the other, from that of each and the bytes of the second. */
+uint32_t separatrix_crc32_combine(uint32_t first, uint32_t second, int64_t size) {
+  return (uint32_t)crc32_combine(first, second, (z_off_t)size);
+}
+
 /* 64-bit FNV-1a hash of `length` bytes. */
 uint64_t separatrix_fnv1a(const char *text, int64_t length) {
   uint64_t hash = 14695981039346656037ULL;

@@ -163,6 +163,53 @@ int separatrix_append(int descriptor, const char *text, int64_t length) {
   return 0;
 }
 
+/* Opens a file that exists, to read, or to write at places in it. */
+int separatrix_open_bytes(const char *path, int writable, int *descriptor) {
+  *descriptor = open(path, (writable ? O_RDWR : O_RDONLY) | O_CLOEXEC);
+  return *descriptor < 0 ? errno : 0;
+}
+
+/* Reads `size` bytes from the place `offset`; EIO if the file ends before. */
+int separatrix_read_bytes(int descriptor, void *bytes, int64_t size, int64_t offset) {
+  char *next = bytes;
+  while (size > 0) {
+    const ssize_t done = pread(descriptor, next, (size_t)size, (off_t)offset);
+    if (done == 0)
+      return EIO;
+    if (done < 0 && errno != EINTR)
+      return errno;
+    if (done > 0) {
+      next += done;
+      size -= done;
+      offset += done;
+    }
+  }
+  return 0;
+}
+
+int separatrix_write_bytes(int descriptor, const void *bytes, int64_t size, int64_t offset) {
+  const char *next = bytes;
+  while (size > 0) {
+    const ssize_t done = pwrite(descriptor, next, (size_t)size, (off_t)offset);
+    if (done < 0 && errno != EINTR)
+      return errno;
+    if (done > 0) {
+      next += done;
+      size -= done;
+      offset += done;
+    }
+  }
+  return 0;
+}
+
+/* `sync`: what was written is durable afterwards. */
+int separatrix_close_bytes(int descriptor, int sync) {
+  const int status = sync && fsync(descriptor) != 0 ? errno : 0;
+  if (close(descriptor) != 0 && status == 0)
+    return errno;
+  return status;
+}
+
 void separatrix_error_text(int number, char *text, int size) {
   snprintf(text, (size_t)size, "%s", strerror(number));
 }

@@ -14,7 +14,7 @@ module files
   private
 
   public :: file_exists, is_special, is_text, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
-    take_lock, give_lock, open_append, append_line
+    take_lock, give_lock, open_append, append_line, test_status
 
 contains
 
@@ -52,7 +52,7 @@ contains
   subroutine check_folder(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    call test(c_folder_status(path//c_null_char), exit_cannot_create, 'cannot create', path, error)
+    call test_status(c_folder_status(path//c_null_char), exit_cannot_create, 'cannot create', path, error)
   end subroutine check_folder
 
   !> Bytes free to this user where `path` lies; -1 if the system does not tell.
@@ -65,21 +65,21 @@ contains
   subroutine reserve_file(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    call test(c_reserve_file(path//c_null_char), exit_cannot_create, 'cannot reserve the space of', path, error)
+    call test_status(c_reserve_file(path//c_null_char), exit_cannot_create, 'cannot reserve the space of', path, error)
   end subroutine reserve_file
 
   !> Makes the content of `from` durable, then renames it to `to` (replacing that); code 74.
   subroutine publish_file(from, to, error)
     character(len=*), intent(in) :: from, to
     type(error_t), allocatable, intent(out) :: error
-    call test(c_publish_file(from//c_null_char, to//c_null_char), exit_io, 'cannot sync and rename to', to, error)
+    call test_status(c_publish_file(from//c_null_char, to//c_null_char), exit_io, 'cannot sync and rename to', to, error)
   end subroutine publish_file
 
   !> Removes a file; one that does not exist counts as removed; code 74.
   subroutine remove_file(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    call test(c_remove_file(path//c_null_char), exit_io, 'cannot remove', path, error)
+    call test_status(c_remove_file(path//c_null_char), exit_io, 'cannot remove', path, error)
   end subroutine remove_file
 
   !> Locks `path`, a file made for that, until `give_lock` or the end of the process; code 73 if another process has it.
@@ -95,7 +95,7 @@ contains
     if (number < 0) then
       call fail(error, exit_cannot_create, "another run is at work on this file; it has the lock '"//path//"'")
     else
-      call test(number, exit_cannot_create, 'cannot create', path, error)
+      call test_status(number, exit_cannot_create, 'cannot create', path, error)
     end if
   end subroutine take_lock
 
@@ -112,7 +112,7 @@ contains
     integer, intent(out) :: descriptor
     type(error_t), allocatable, intent(out) :: error
     integer(c_int) :: opened
-    call test(c_open_append(path//c_null_char, opened), exit_cannot_create, 'cannot write', path, error)
+    call test_status(c_open_append(path//c_null_char, opened), exit_cannot_create, 'cannot write', path, error)
     descriptor = opened
   end subroutine open_append
 
@@ -122,11 +122,13 @@ contains
     integer, intent(in) :: descriptor
     character(len=*), intent(in) :: name, line
     type(error_t), allocatable, intent(out) :: error
-    call test(c_append(int(descriptor, c_int), line//new_line(line), len(line, kind=int64) + 1), exit_io, 'cannot write', &
-              name, error)
+    integer(c_int) :: number
+    number = c_append(int(descriptor, c_int), line//new_line(line), len(line, kind=int64) + 1)
+    call test_status(number, exit_io, 'cannot write', name, error)
   end subroutine append_line
 
-  subroutine test(number, code, action, path, error)
+  !> An error with the system's reason unless its `number` is 0: `action` and `path` tell what could not be done.
+  subroutine test_status(number, code, action, path, error)
     integer(c_int), intent(in) :: number
     integer, intent(in) :: code
     character(len=*), intent(in) :: action, path
@@ -135,6 +137,6 @@ contains
     if (number == 0) return
     call c_error_text(number, reason, int(size(reason), c_int))
     call fail(error, code, action//' '''//path//''': '//from_c(reason))
-  end subroutine test
+  end subroutine test_status
 
 end module files

@@ -249,6 +249,7 @@ contains
     logical, intent(in) :: complete
     type(schema_t), intent(inout) :: extra
     type(error_t), allocatable :: error
+    real(wp) :: begun, alone
     if (.not. complete) then
       call file%close(session%team, error)
       call session%stop_if(error)
@@ -257,8 +258,11 @@ contains
       call session%end_with(exit_resumable)
     end if
     call session%provenance%finish(extra)
-    call finalise(file, session%team, extra, error)
+    begun = monotonic_seconds()
+    call finalise(file, session%team, extra, error, alone)
     call session%stop_if(error)
+    if (session%team%size() > 1) call session%journal%line('packed', 'checked and packed in '// &
+      duration_text(monotonic_seconds() - begun)//', '//duration_text(alone)//' of it by rank 0 alone')
     call check_written(session, file%path)
     call session%journal%line('written', 'wrote '//file%path//' in '// &
       duration_text(monotonic_seconds() - session%journal%started))

@@ -13,12 +13,13 @@ module h5
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
     h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
-    H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
-    h5fcreate_f, h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
+    H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, h5fclose_f, &
+    h5fcreate_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
     H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
     h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
     h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
+    h5pset_cache_f, h5pset_sieve_buf_size_f, size_t, &
     h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
     h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F32LE, &
@@ -33,9 +34,9 @@ module h5
   implicit none
   private
 
-  public :: h5_create, h5_open, h5_close, h5_flush, h5_exists, h5_create_group, h5_create_dataset, &
+  public :: h5_create, h5_open, h5_close, h5_exists, h5_create_group, h5_create_dataset, &
     h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
-    h5_version
+    h5_version, h5_shuffles
 
   !> An open file.
   type, public :: h5_file_t
@@ -58,6 +59,9 @@ module h5
     logical :: compressed = .false.
     logical :: fixed = .false.
   end type h5_storage_t
+
+  !> How hard zlib tries: more costs much and gains little here.
+  integer, parameter, public :: deflate_level = 1
 
   !> Space that is taken at once for what describes the data, and for small data, when a file is opened for writing.
   integer(hsize_t), parameter :: front_bytes = 2**18
@@ -125,6 +129,8 @@ contains
     call h5pcreate_f(H5P_FILE_CREATE_F, creation, status)
     ! Readers with HDF5 1.10 open the file.
     if (status >= 0) call h5pset_libver_bounds_f(access, oldest, H5F_LIBVER_V110_F, status)
+    ! Data gets its place at the end of the file, each piece by itself (module h5_chunks).
+    if (status >= 0) call h5pset_small_data_block_size_f(access, 0_hsize_t, status)
     if (status >= 0) call h5pset_link_creation_order_f(creation, ior(H5P_CRT_ORDER_TRACKED_F, H5P_CRT_ORDER_INDEXED_F), status)
     if (status >= 0) call h5fcreate_f(path, H5F_ACC_TRUNC_F, file%id, status, creation, access)
     if (h5_failed(status, 'create the file', '', path, error)) return
@@ -153,6 +159,9 @@ contains
     if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
     if (status >= 0) call h5pset_meta_block_size_f(access, front_bytes, status)
     if (status >= 0) call h5pset_small_data_block_size_f(access, front_bytes, status)
+    ! Without caches of its own for data HDF5 hands over at once what it is told to write: nothing has to be flushed.
+    if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_cache_f(access, 0, 0_size_t, 0_size_t, 0.0, status)
+    if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_sieve_buf_size_f(access, 0_size_t, status)
     if (present(team) .and. status >= 0) then
       if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
     end if
@@ -173,15 +182,6 @@ contains
     file%id = -1
     if (h5_failed(status, 'close', '', file%path, error)) return
   end subroutine h5_close
-
-  !> Hands all data to the operating system (a file that one process has open).
-  subroutine h5_flush(file, error)
-    type(h5_file_t), intent(in) :: file
-    type(error_t), allocatable, intent(out) :: error
-    integer :: status
-    call h5fflush_f(file%id, H5F_SCOPE_LOCAL_F, status)
-    if (h5_failed(status, 'flush', '', file%path, error)) return
-  end subroutine h5_flush
 
   !> Whether an object of this name is in the root or in a group of the root.
   logical function h5_exists(file, name)
@@ -255,6 +255,13 @@ contains
     call h5pclose_f(creation, ignored)
   end subroutine h5_create_dataset
 
+  !> Whether values of a type are shuffled before they are compressed: that helps numbers with an exponent and does nothing for
+  !> small integers.
+  pure logical function h5_shuffles(type)
+    integer, intent(in) :: type
+    h5_shuffles = is_float(type)
+  end function h5_shuffles
+
   subroutine storage_of(storage, type, creation, status)
     type(h5_storage_t), intent(in) :: storage
     integer, intent(in) :: type
@@ -263,9 +270,8 @@ contains
     call h5pcreate_f(H5P_DATASET_CREATE_F, creation, status)
     if (allocated(storage%chunk) .and. status >= 0) then
       call h5pset_chunk_f(creation, size(storage%chunk), reversed(storage%chunk), status)
-      ! Shuffling helps numbers with an exponent and does nothing for small integers.
-      if (storage%compressed .and. is_float(type) .and. status >= 0) call h5pset_shuffle_f(creation, status)
-      if (storage%compressed .and. status >= 0) call h5pset_deflate_f(creation, 1, status)
+      if (storage%compressed .and. h5_shuffles(type) .and. status >= 0) call h5pset_shuffle_f(creation, status)
+      if (storage%compressed .and. status >= 0) call h5pset_deflate_f(creation, deflate_level, status)
     end if
     if (storage%fixed .and. status >= 0) then
       call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, status)

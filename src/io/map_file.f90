@@ -7,7 +7,7 @@ module map_file
   use checksum, only: crc32
   use errors, only: error_t, fail
   use files, only: free_bytes, publish_file, remove_file, reserve_file
-  use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_flush, h5_open, &
+  use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, &
     h5_open_dataset, h5_read, h5_write
   use kinds, only: int64, int8, real64
   use map_compare, only: check_layout
@@ -17,6 +17,7 @@ module map_file
   use status, only: exit_cannot_create, exit_internal
   use team, only: team_t
   use text, only: to_text
+  use tile_store, only: tile_store_t
   use tiles, only: new_tiling, tiling_t
   use value_types, only: bytes_of, from_bytes, to_bytes, type_uint32
   implicit none
@@ -31,14 +32,14 @@ module map_file
     type(tiling_t) :: tiling
     type(h5_file_t) :: part
     !> Positions in the schema of the tiled variables, and their datasets.
-    integer, allocatable, private :: tiled(:)
+    integer, allocatable :: tiled(:)
     type(h5_dataset_t), allocatable, private :: datasets(:)
     type(h5_dataset_t), private :: states, checksums
     logical, private :: writable = .true.
+    !> Reads the data of the tiled variables, in their order.
+    type(tile_store_t) :: store
     !> Per tile.
     logical, allocatable :: done(:)
-    !> Opened by one process: data must be flushed to be safe.
-    logical :: alone = .true.
   contains
     procedure :: tile_count
     procedure :: tile_done
@@ -205,7 +206,6 @@ contains
     class(team_t), intent(in) :: team
     type(error_t), allocatable, intent(out) :: error
     integer :: i
-    self%alone = team%size() == 1
     call h5_open(working_path(self%path), self%part, error, writable=self%writable, team=team)
     if (allocated(self%datasets)) deallocate (self%datasets)
     allocate (self%datasets(size(self%tiled)))
@@ -217,6 +217,8 @@ contains
     end do
     if (.not. allocated(error)) call h5_open_dataset(self%part, '/tiles/state', self%states, error)
     if (.not. allocated(error)) call h5_open_dataset(self%part, '/tiles/checksum', self%checksums, error)
+    if (.not. allocated(error)) call self%store%locate(self%datasets, self%tiling, error)
+    if (.not. allocated(error)) call self%store%open(working_path(self%path), error)
     call team%agree(error)
   end subroutine open_part
 
@@ -227,6 +229,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: later
     integer :: i
+    call self%store%close()
     if (allocated(self%datasets)) then
       do i = 1, size(self%datasets)
         call h5_close_dataset(self%datasets(i), later)
@@ -292,9 +295,7 @@ contains
       if (allocated(error)) return
       value = crc32(bytes, value)
     end do
-    if (self%alone) call h5_flush(self%part, error)
-    if (.not. allocated(error)) call mark(self, tile, 1, value, error)
-    if (.not. allocated(error) .and. self%alone) call h5_flush(self%part, error)
+    call mark(self, tile, 1, value, error)
     if (.not. allocated(error)) self%done(tile) = .true.
   end subroutine write_tile
 
@@ -304,15 +305,11 @@ contains
     integer, intent(in) :: tile
     real(real64), allocatable, intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: lower(size(self%tiling%lengths)), extent(size(self%tiling%lengths))
     integer(int8), allocatable :: bytes(:)
     integer :: i
-    call self%tiling%block_of(tile, lower, extent)
-    allocate (values(product(extent), size(self%tiled)))
+    allocate (values(self%tiling%points(tile), size(self%tiled)))
     do i = 1, size(self%datasets)
-      if (allocated(bytes)) deallocate (bytes)
-      allocate (bytes(product(extent)*bytes_of(self%datasets(i)%type)))
-      call h5_read(self%datasets(i), bytes, error, lower, extent)
+      call self%store%read_tile(i, tile, bytes, error)
       if (allocated(error)) return
       call from_bytes(self%datasets(i)%type, bytes, values(:, i))
     end do
@@ -384,15 +381,11 @@ contains
     integer, intent(in) :: tile
     integer(int64), intent(out) :: value
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: lower(size(self%tiling%lengths)), extent(size(self%tiling%lengths))
     integer(int8), allocatable :: bytes(:)
     integer :: i
     value = 0
-    call self%tiling%block_of(tile, lower, extent)
     do i = 1, size(self%datasets)
-      if (allocated(bytes)) deallocate (bytes)
-      allocate (bytes(product(extent)*bytes_of(self%datasets(i)%type)))
-      call h5_read(self%datasets(i), bytes, error, lower, extent)
+      call self%store%read_tile(i, tile, bytes, error)
       if (allocated(error)) return
       value = crc32(bytes, value)
     end do

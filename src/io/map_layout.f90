@@ -16,7 +16,7 @@ module map_layout
   implicit none
   private
 
-  public :: create_objects, write_data, path_of
+  public :: create_objects, write_data, path_of, is_compressed
 
   !> Name with which netCDF marks a dimension without coordinates.
   character(len=*), parameter :: bare_dimension = 'This is a netCDF dimension but not a netCDF variable.'
@@ -109,7 +109,7 @@ contains
     if (present(tile_shape)) then
       storage%fixed = variable%type /= type_string
       if (variable%tiled) storage%chunk = tile_shape
-    else if (variable%type /= type_string .and. product(lengths) > small) then
+    else if (is_compressed(variable%type, lengths)) then
       storage%chunk = final_chunk(lengths)
       storage%compressed = .true.
     end if
@@ -118,6 +118,13 @@ contains
     if (allocated(error)) return
     call describe(file, path, variable, error)
   end subroutine create_variable
+
+  !> Whether a variable has compressed chunks in the final file.
+  pure logical function is_compressed(type, lengths)
+    integer, intent(in) :: type
+    integer(int64), intent(in) :: lengths(:)
+    is_compressed = type /= type_string .and. product(lengths) > small
+  end function is_compressed
 
   subroutine describe(file, path, variable, error)
     type(h5_file_t), intent(in) :: file

@@ -6,7 +6,7 @@
 module map_record
   use checksum, only: crc32
   use errors, only: error_t
-  use h5, only: h5_close_dataset, h5_dataset_t, h5_flush, h5_open_dataset, h5_read, h5_write
+  use h5, only: h5_close_dataset, h5_dataset_t, h5_open_dataset, h5_read, h5_write
   use kinds, only: int64, int8, real64
   use map_file, only: map_file_t
   use map_layout, only: path_of
@@ -92,7 +92,6 @@ contains
       call h5_write(dataset, bytes, error, lower, [1_int64, size(values, kind=int64) + 1])
     end if
     if (.not. allocated(error)) call h5_close_dataset(dataset, error)
-    if (.not. allocated(error) .and. file%alone) call h5_flush(file%part, error)
     call team%agree(error)
     if (.not. allocated(error)) call keep_row(file%schema, group, name, row, values)
   end subroutine write_row

@@ -8,7 +8,7 @@ module slabs
   implicit none
   private
 
-  public :: final_chunk, slab_count, slab
+  public :: final_chunk, slab_count, slab, chunk_count, chunk_corner
 
   !> Values of a chunk in the final file, the side of a square one, and most values of a slab.
   integer(int64), parameter :: chunk_values = 65536, chunk_side = 256, slab_values = 2_int64**20
@@ -62,6 +62,26 @@ contains
       rest = rest/lengths(i)
     end do
   end subroutine slab
+
+  !> The number of chunks of a block made of whole ones.
+  pure integer(int64) function chunk_count(chunk, extent)
+    integer(int64), intent(in) :: chunk(:), extent(:)
+    chunk_count = product((extent + chunk - 1)/chunk)
+  end function chunk_count
+
+  !> Corner (from 0) of chunk `index` (from 1, in C order) of such a block.
+  pure function chunk_corner(chunk, lower, extent, index) result(corner)
+    integer(int64), intent(in) :: chunk(:), lower(:), extent(:)
+    integer, intent(in) :: index
+    integer(int64) :: corner(size(chunk)), rest, along
+    integer :: k
+    rest = index - 1
+    do k = size(chunk), 1, -1
+      along = (extent(k) + chunk(k) - 1)/chunk(k)
+      corner(k) = lower(k) + mod(rest, along)*chunk(k)
+      rest = rest/along
+    end do
+  end function chunk_corner
 
   !> The first dimension in which a chunk is longer than 1 is the one that is cut.
   pure subroutine cut(lengths, k, step)

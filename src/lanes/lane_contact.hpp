@@ -73,6 +73,7 @@ LANE_LEAF vec power_of(int power, const vec *u, const vec *square, vec *cube, in
 
 // Expands the contacts of the lanes from where they are.
 inline void expand_contact(const lane_machine &m, const lane_group &g, contact_expansion &p) {
+  LANE_COUNT(evaluations, vec_size);
   const lane_contact &c = m.contact;
   const vec side = side_of(g), damping = damping_of(m, g);
   const int power = int(c.twice_exponent);
@@ -218,6 +219,7 @@ inline mask take_contact_events(const lane_machine &m, const contact_stride &t, 
                      (factor <= 0.0) | (t.leaves & (w <= 0.0)));
   due = due & ~rare;
   mask turns = due & t.turns, leaves = due & t.leaves;
+  LANE_COUNT(events, count(turns | leaves));
   if (m.law.dahl_stiffness > 0) {
     vec level = pick(g.direction > 0.0, m.law.dahl_level[0], m.law.dahl_level[1]);
     vec done = exponential((-m.law.dahl_stiffness / level) * (x - g.x));

@@ -239,6 +239,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
     a_jump -= 2 * m.decay * v_jump;
   vec j_jump = -m.natural * m.natural * v_jump - 2 * m.decay * a_jump;
   mask up = due & upward, down = due & ~upward, struck = due & hit;
+  LANE_COUNT(events, count(due));
   put(g.up_span, up, g.span);
   put(g.up_hits, up, g.hits);
   put(g.down_span, down, g.span);

@@ -93,6 +93,7 @@ inline mask take_mode_events(const lane_modes &f, mask due, lane_group &g) {
   put(g.down_span, down, g.span);
   put(g.down_hits, down, g.hits);
   mask struck = due & (impact | (passage & free));
+  LANE_COUNT(events, count(due));
   put(g.flights, due, g.flights + 1.0);
   put(g.impacts, struck, g.impacts + 1.0);
   put(g.speed_sum, struck, g.speed_sum + w);

@@ -37,6 +37,7 @@ struct kinematics {
 
 template <bool damping, class machine>
 inline kinematics evaluate(const machine &m, const lane_group &g, vec elapsed) {
+  LANE_COUNT(evaluations, vec_size);
   kinematics k;
   vec turn_s, turn_c, sine, cosine;
   sine_cosine(elapsed * m.damped, turn_s, turn_c);

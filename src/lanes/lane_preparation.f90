@@ -32,6 +32,9 @@ module lane_preparation
   real(wp), parameter :: edges(2) = [26.0_wp, 5.1_wp], levels(2) = [25.0_wp, 5.0_wp], lengths(2) = [4.0_wp, 2.0_wp]
   !> The nodes are enough up to this share of the excess friction in the acceleration.
   real(wp), parameter :: steepest = 0.35_wp
+  !> A layer is thin if its edge is below this share of the speeds that the drive gives: only what is faster flies in lanes
+  !> then. A thicker one is no layer but friction that depends on the speed, for series.
+  real(wp), parameter :: thickest = 0.25_wp
 
 contains
 
@@ -217,6 +220,8 @@ contains
       speeds = sum([(n*flow%machine%drive_frequency*sqrt(flow%machine%cosine(n)**2 + flow%machine%sine(n)**2), &
                      n=1, flow%machine%harmonics)])
       layer%precision = 16*epsilon(1.0_wp)*speeds
+      flow%available = layer%edge <= thickest*speeds
+      if (.not. flow%available) return
       ! The speed rises while q falls from 1 to its last.
       last = exponential(-edges(delta)/lengths(delta))
       q = 0.5_wp*(1 + last) - 0.5_wp*(1 - last)*node

@@ -152,6 +152,7 @@ struct force_series {
 
 // Expands the motion of every lane from where it is, in time.
 inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
+  LANE_COUNT(evaluations, vec_size);
   vec foot[order];
   force_series forces;
   expand_foot(m, g.time, order - 1, foot);
@@ -334,6 +335,7 @@ inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, 
                      (magnitude(x) >= m.domain) | (factor <= 0.0));
   due = due & ~rare;
   mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
+  LANE_COUNT(events, count(events));
   if (m.law.dahl_stiffness > 0) {
     vec level = pick(g.direction > 0.0, m.law.dahl_level[0], m.law.dahl_level[1]);
     vec done = exponential((-m.law.dahl_stiffness / level) * (x - g.x));

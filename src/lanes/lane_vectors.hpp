@@ -12,6 +12,11 @@
 // The compiler stops inlining by itself where there is much to inline.
 #define LANE_LEAF inline __attribute__((always_inline))
 
+// A build that counts what the kernel does defines this; see `scripts/bench_peers/counted_lanes.cpp`.
+#ifndef LANE_COUNT
+#define LANE_COUNT(what, number)
+#endif
+
 namespace {
 
 #if defined(__AVX512F__)

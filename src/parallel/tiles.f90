@@ -23,6 +23,7 @@ module tiles
     procedure :: count => count_tiles
     procedure :: block_of
     procedure :: points
+    procedure :: number_at
   end type tiling_t
 
 contains
@@ -87,6 +88,20 @@ contains
     call self%block_of(tile, lower, extent)
     points = int(product(extent))
   end function points
+
+  !> The number (from 1) of the tile that is so many tiles from the origin along each axis.
+  pure integer(int64) function number_at(self, place)
+    class(tiling_t), intent(in) :: self
+    integer(int64), intent(in) :: place(:)
+    integer(int64) :: counts(size(place))
+    integer :: k
+    counts = tiles_along(self)
+    number_at = 0
+    do k = 1, size(place)
+      number_at = number_at*counts(k) + place(k)
+    end do
+    number_at = number_at + 1
+  end function number_at
 
   pure function tiles_along(self) result(counts)
     class(tiling_t), intent(in) :: self

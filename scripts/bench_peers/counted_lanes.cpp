@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// The kernel of the lanes once more, with counts of what it does: linked in the place of the usual one into
+// the program `separatrix_counted`, which adds them as a line to the file $LANE_COUNTS when it ends.
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+
+namespace {
+
+// Over all lanes: evaluations of the motion, or expansions of it (also for lanes that wait meanwhile);
+// events; and lanes that were left to the event loop.
+struct lane_counts {
+  long long evaluations = 0, events = 0, left = 0;
+  ~lane_counts() {
+    const char *path = getenv("LANE_COUNTS");
+    FILE *file = path == nullptr ? nullptr : fopen(path, "a");
+    if (file == nullptr)
+      return;
+    fprintf(file, "%lld %lld %lld\n", evaluations, events, left);
+    fclose(file);
+  }
+} counts;
+
+} // namespace
+
+#define LANE_COUNT(what, number) counts.what += number
+
+#include "lane_kernel.hpp"
+
+SEPARATRIX_LANE_KERNEL(separatrix_fly_counted)
+
+extern "C" {
+
+int separatrix_lane_width(void) { return width; }
+
+void separatrix_lane_sizes(size_t *machine, size_t *batch) {
+  *machine = sizeof(lane_machine);
+  *batch = sizeof(lane_batch);
+}
+
+void separatrix_fly_lanes(int, const lane_machine *machine, lane_batch *batch) {
+  separatrix_fly_counted(machine, batch);
+  for (double status : batch->fields.status)
+    counts.left += status == lane_left;
+}
+}

@@ -1,0 +1,76 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Bytes at places of a file that exists. Errors have code 74.
+module byte_file
+  use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char
+  use bindings, only: c_close_bytes, c_open_bytes, c_read_bytes, c_write_bytes
+  use errors, only: error_t
+  use files, only: test_status
+  use kinds, only: int64, int8
+  use status, only: exit_io
+  implicit none
+  private
+
+  !> An open file.
+  type, public :: byte_file_t
+    character(len=:), allocatable :: path
+    integer(c_int), private :: descriptor = -1
+  contains
+    procedure :: open => open_bytes
+    procedure :: read => read_bytes
+    procedure :: write => write_bytes
+    procedure :: close => close_bytes
+  end type byte_file_t
+
+contains
+
+  !> Opens a file.
+  subroutine open_bytes(self, path, writable, error)
+    class(byte_file_t), intent(out) :: self
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: writable
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: number
+    self%path = path
+    number = c_open_bytes(path//c_null_char, merge(1_c_int, 0_c_int, writable), self%descriptor)
+    call test_status(number, exit_io, 'cannot open', path, error)
+  end subroutine open_bytes
+
+  !> Reads what lies at a place (from 0).
+  subroutine read_bytes(self, bytes, place, error)
+    class(byte_file_t), intent(in) :: self
+    integer(int8), intent(out), contiguous, target :: bytes(:)
+    integer(int64), intent(in) :: place
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: number
+    number = c_read_bytes(self%descriptor, c_loc(bytes), size(bytes, kind=int64), place)
+    call test_status(number, exit_io, 'cannot read', self%path, error)
+  end subroutine read_bytes
+
+  !> Writes at a place (from 0).
+  subroutine write_bytes(self, bytes, place, error)
+    class(byte_file_t), intent(in) :: self
+    integer(int8), intent(in), contiguous, target :: bytes(:)
+    integer(int64), intent(in) :: place
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: number
+    number = c_write_bytes(self%descriptor, c_loc(bytes), size(bytes, kind=int64), place)
+    call test_status(number, exit_io, 'cannot write', self%path, error)
+  end subroutine write_bytes
+
+  !> Closes the file; one that is not open stays so. `durable`: what was written is on the disk afterwards.
+  subroutine close_bytes(self, error, durable)
+    class(byte_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: durable
+    integer(c_int) :: number, sync
+    if (self%descriptor < 0) return
+    sync = 0
+    if (present(durable)) sync = merge(1_c_int, 0_c_int, durable)
+    number = c_close_bytes(self%descriptor, sync)
+    self%descriptor = -1
+    call test_status(number, exit_io, 'cannot close', self%path, error)
+  end subroutine close_bytes
+
+end module byte_file
