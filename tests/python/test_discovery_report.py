@@ -133,6 +133,8 @@ def verdict(outcome: str) -> dict:
             "held_out": {"before": 41234.5, "after": 1.0093 if found else 41234.5, "noise_floor": 1.0},
         },
         "character": CHARACTER if outcome == "characterised" else [],
+        "added": [],
+        "not_added": "nothing is added to the case: no law" if outcome == "characterised" else "",
         "gates": {"converged": True, "detect": True, "separate": outcome == "named"} if found else {},
         "p_value": 5.8e-74 if found else None,
         "reasons": [] if outcome in ("named", "none") else ["gate 'separate' was not passed"],

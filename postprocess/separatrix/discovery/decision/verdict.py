@@ -40,17 +40,20 @@ def verdict_of(findings: Findings) -> dict:
     """Return the content of verdict.json."""
     decision, bench = findings.decision, findings.bench
     first = decision.rounds[0]
-    best = decision.accepted[0] if decision.accepted else None
+    best = decision.corrected
     final = best.fitted if best else findings.base
     findings.maps = where_maps(findings.base, bench.scales.mass, bench.options)
+    named = list(final.names) if decision.accepted else []
     rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
     return {
         "outcome": decision.outcome,
         "complete": decision.complete,
-        "effects": list(final.names),
+        "effects": named,
+        "added": list(final.names) if decision.added else [],
+        "not_added": decision.not_added,
         "alternatives": ["+".join(names) for names in decision.alternatives],
         "equivalent": decision.equivalent,
-        "equivalences": equivalents([*final.names, *[names[-1] for names in decision.alternatives]]),
+        "equivalences": equivalents([*named, *[names[-1] for names in decision.alternatives]]),
         "parameters": _parameters(final),
         "base_parameters": _parameters(findings.base),
         "where": sentences(findings.maps),
@@ -60,7 +63,7 @@ def verdict_of(findings: Findings) -> dict:
         "function": _function(final),
         "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
-        "p_value": best.p if best else None,
+        "p_value": best.p if decision.accepted else None,
         "reasons": decision.reasons,
         "asked_for": None if bench.options.candidates is None else list(bench.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
@@ -86,10 +89,10 @@ def verdict_of(findings: Findings) -> dict:
 def _remaining(findings: Findings) -> list[Remains]:
     """What the accepted effect leaves of the gap."""
     decision = findings.decision
-    if not decision.accepted:
+    if decision.corrected is None:
         return []
     mass = findings.bench.scales.mass
-    return remains_of(findings.base, decision.foretold, decision.accepted[0], mass)
+    return remains_of(findings.base, decision.foretold, decision.corrected, mass)
 
 
 def _function(fitted: Fitted) -> dict | None:
@@ -164,6 +167,9 @@ def _warnings(findings: Findings) -> list[str]:
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")
+    added = findings.decision.added
+    if added is not None and not added.fitted.fit.converged:
+        notes.append(f"the fit of effect.{added.name} did not converge: its band may be too narrow")
     lost = int((~fit.good).sum())
     if lost:
         notes.append(
@@ -182,7 +188,7 @@ def _warnings(findings: Findings) -> list[str]:
 def _final(findings: Findings) -> list[tuple[str, Data, Fitted | Prediction]]:
     """Use of records, the records, and the machine of the verdict on them."""
     bench, decision = findings.bench, findings.decision
-    best = decision.accepted[0] if decision.accepted else None
+    best = decision.corrected
     fits = [("training", bench.training, best.fitted if best else findings.base)]
     if bench.held_out is not None:
         fits.append(("held out", bench.held_out, best.prediction if best else decision.foretold))
@@ -235,7 +241,7 @@ def _parameters(fitted: Fitted) -> dict:
 
 def _gap(findings: Findings) -> dict:
     decision = findings.decision
-    best = decision.accepted[0] if decision.accepted else None
+    best = decision.corrected
     gap = {"training": {"before": findings.base.fit.sample_chi2, "noise_floor": 1.0}}
     gap["training"]["after"] = best.fitted.fit.sample_chi2 if best else gap["training"]["before"]
     if decision.foretold is not None:
