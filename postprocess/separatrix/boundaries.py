@@ -12,7 +12,7 @@ from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.maps import kept_in_memory
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
-from separatrix.runner import StoppedError, run
+from separatrix.runner import run_at_once
 
 __all__ = ["boundary"]
 
@@ -78,8 +78,5 @@ def _file(
 
 
 def _run(command: list[str], ranks: int | None, progress: bool | Report | None) -> None:
-    try:
-        with Progress(progress) as told:
-            run([command], told, ranks)
-    except StoppedError:
-        raise KeyboardInterrupt(f"{command[0]} was stopped; nothing of it is kept") from None
+    with Progress(progress) as told:
+        run_at_once(command, told, ranks)

@@ -15,7 +15,7 @@ from separatrix.errors import CANNOT_CREATE, INTERNAL, USAGE, SeparatrixError
 from separatrix.maps import kept_in_memory, with_axes
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
-from separatrix.runner import StoppedError, run
+from separatrix.runner import run_at_once
 
 __all__ = ["Stability", "branches", "stability"]
 
@@ -156,12 +156,9 @@ def _run(
 ) -> None:
     """Run a command that keeps nothing when it is stopped."""
     named = case.on_command_line(folder)
-    try:
-        with Progress(progress) as told:
-            rename = {named[0]: case.name, **_IN_PYTHON}
-            run([[command, *named, *options, "--json"]], told, rename=rename, take=take)
-    except StoppedError:
-        raise KeyboardInterrupt(f"{command} was stopped; nothing of it is kept") from None
+    with Progress(progress) as told:
+        rename = {named[0]: case.name, **_IN_PYTHON}
+        run_at_once([command, *named, *options, "--json"], told, rename=rename, take=take)
 
 
 def _stability(events: list[dict]) -> Stability:

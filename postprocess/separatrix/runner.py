@@ -40,12 +40,13 @@ _MPI_ENVIRONMENT = {
 
 
 class StoppedError(Exception):
-    """A run was stopped and can go on; `done` of it is done."""
+    """A run was stopped and can go on; `done` of it is done. `ended`: it was at its end before it heard."""
 
-    def __init__(self, done: float) -> None:
+    def __init__(self, done: float, ended: bool = False) -> None:
         """Keep how far it went."""
         super().__init__(f"stopped at {100 * done:.0f} %")
         self.done = done
+        self.ended = ended
 
 
 @dataclass
@@ -96,7 +97,23 @@ def run(
             _raise(code, _message(one, rename or {}))
     if interrupted or STOPPED in codes:
         total = sum(one.total for one in running)
-        raise StoppedError(sum(one.done for one in running) / total if total else 0.0)
+        ended = bool(codes) and not any(codes)
+        raise StoppedError(sum(one.done for one in running) / total if total else 0.0, ended)
+
+
+def run_at_once(
+    command: Sequence[str],
+    progress: Progress,
+    ranks: int | None = None,
+    rename: Mapping[str, str] | None = None,
+    take: Callable[[dict], object] | None = None,
+) -> None:
+    """`run` of one command that cannot go on later: Ctrl-C is a KeyboardInterrupt that says what is kept."""
+    try:
+        run([command], progress, ranks, rename=rename, take=take)
+    except StoppedError as stop:
+        kept = "after its end, its result is kept" if stop.ended else "nothing of it is kept"
+        raise KeyboardInterrupt(f"{command[0]} was stopped; {kept}") from None
 
 
 def cores() -> int:

@@ -11,9 +11,10 @@ module aperiodic
   use exact_return, only: returns_t, watch_returns
   use kinds, only: int64, wp
   use motion, only: motion_t
-  use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, features_over, scales_of, section_point, section_state, &
-    strobe_at, strobe_t
+  use motion_features, only: features_over
+  use motion_state, only: tally_t
+  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, scales_of, section_point, section_state, strobe_at, &
+    strobe_t
   implicit none
   private
 
@@ -48,7 +49,7 @@ contains
     integer :: i, reason
     known = .false.
     tally%wants_v_max = .true.
-    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    call begin_tally(moving, strobe, tally)
     found%coordinates = coordinates_of(moving)
     found%turn = moving%machine%turn
     call make_points(found, 2)
@@ -88,7 +89,7 @@ contains
     integer :: i, reason
     known = .false.
     ok = .true.
-    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    call begin_tally(moving, strobe, tally)
     do i = 1, merge(lasting_exact, lasting, moving%exact)
       slips = tally%slips
       call advance_strobe_period(moving, strobe, tally, reason)

@@ -6,11 +6,12 @@ module attractors
   use circle, only: nearest_turn, point_near
   use kinds, only: int64, wp
   use motion_state, only: tally_t
+  use section_size, only: most_coordinates
   implicit none
   private
 
-  public :: regime_of, wrap_range, make_points, find_capture, find_box, squared_distance, pack_attractor, packed_length, &
-    unpack_attractor
+  public :: most_coordinates, regime_of, wrap_range, make_points, find_capture, find_box, squared_distance, pack_attractor, &
+    packed_length, unpack_attractor
 
   !> Regimes of a motion; stuck are two bodies that move as one.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
@@ -28,8 +29,6 @@ module attractors
   !> Longest period in drive periods that is looked for near a return of the motion, and of one that returns to the bit.
   integer, parameter, public :: longest_period = 64, longest_exact_period = 1024
 
-  !> Most coordinates of a point on the section: x and v of one body, up to five of two, more of several.
-  integer, parameter, public :: most_coordinates = 16
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 

@@ -7,7 +7,7 @@ module capture
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: tally_t
-  use strobe, only: advance_to_section, rest_lasts, section_point, strobe_t, turn_point
+  use strobe, only: advance_to_section, copy_of, rest_lasts, section_point, strobe_t, turn_point
   implicit none
   private
 
@@ -27,8 +27,7 @@ contains
     integer :: reason
     found = find_capture(catalogue, section_point(moving, strobe), slipped .or. .not. rest_lasts(moving))
     if (found > 0 .or. .not. any(catalogue%by_event)) return
-    later%state = strobe%state
-    later%jointed = strobe%jointed
+    later = copy_of(strobe)
     call advance_to_section(moving, later, unused, reason)
     if (reason == 0) found = find_capture(catalogue, turn_point(moving, later), .true., by_event=.true.)
   end function captor_of

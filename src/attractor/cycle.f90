@@ -12,8 +12,9 @@ module cycle
   use kinds, only: wp
   use matrices, only: cholesky, eigenvalues, solve, spectral_radius
   use motion, only: motion_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus, reset_tally, tally_t
-  use strobe, only: advance_strobe_period, cycle_word, features_over, scales_of, section_point, strobe_at, strobe_t, turn_of
+  use motion_features, only: cycle_word, features_over
+  use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
+  use strobe, only: advance_strobe_period, begin_tally, scales_of, section_point, smallest_motion, strobe_at, strobe_t, turn_of
   use turn_section, only: has_no_clock
   implicit none
   private
@@ -46,7 +47,7 @@ contains
     integer :: i, reason
     strobe = strobe_at(moving, point)
     if (present(wants_v_max)) tally%wants_v_max = wants_v_max
-    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    call begin_tally(moving, strobe, tally)
     reason = 0
     if (present(duration)) duration = 0
     do i = 1, periods
@@ -113,15 +114,8 @@ contains
   pure function scale_of(moving, tally) result(scale)
     type(motion_t), intent(in) :: moving
     type(tally_t), intent(in) :: tally
-    real(wp) :: scale(most_coordinates), floor
-    floor = 1e-3_wp
-    if (moving%machine%restoring%stiffness > 0) then
-      floor = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
-    end if
-    if (allocated(moving%pair)) then
-      floor = 1e-3_wp*moving%pair%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
-    end if
-    scale = max(scales_of(moving, max((tally%x_max - tally%x_min)/2, floor)), tiny(floor))
+    real(wp) :: scale(most_coordinates)
+    scale = max(scales_of(moving, max((tally%x_max - tally%x_min)/2, smallest_motion(moving))), tiny(1.0_wp))
   end function scale_of
 
   !> Newton's method on P^period(z) - z, derivatives by central differences, steps no longer than a fifth of

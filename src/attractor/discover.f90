@@ -16,9 +16,10 @@ module discover
   use kinds, only: int64, wp
   use matrices, only: solve
   use motion, only: motion_t
-  use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, has_section, rest_lasts, scales_of, &
-    section_point, section_state, start_strobe, strobe_t, turn_of, without_stops
+  use motion_features, only: cycle_word, features_over
+  use motion_state, only: tally_t
+  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, rest_lasts, scales_of, section_point, &
+    section_state, start_strobe, strobe_t, turn_of, without_stops
   use trajectory, only: span_t
   use turn_section, only: has_no_clock
   implicit none
@@ -229,7 +230,7 @@ contains
     integer(int64) :: slips
     integer :: i, reason
     logical :: whole
-    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    call begin_tally(moving, strobe, tally)
     do i = 1, max(1, ceiling(patience/moving%machine%period))
       slips = tally%slips
       whole = .not. strobe%state%time > 0 .and. rest_lasts(moving)
@@ -260,7 +261,7 @@ contains
     type(motion_t) :: free
     integer :: i, p, reason, n, first
     later = strobe
-    call reset_tally(tally, later%state, allocated(moving%pair))
+    call begin_tally(moving, later, tally)
     points(:, 0) = section_point(moving, later)
     do i = 1, 2*max_period
       call advance_strobe_period(moving, later, tally, reason)

@@ -11,9 +11,9 @@ module exact_return
   use kinds, only: int64, wp
   use matrices, only: eigenvalues
   use motion, only: motion_t
-  use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, section_point, section_state, strobe_at, &
-    strobe_t
+  use motion_features, only: cycle_word, features_over
+  use motion_state, only: tally_t
+  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, section_point, section_state, strobe_at, strobe_t
   implicit none
   private
 
@@ -162,7 +162,7 @@ contains
     integer(int64) :: before
     integer :: i, reason
     later = strobe
-    call reset_tally(tally, later%state, allocated(moving%pair))
+    call begin_tally(moving, later, tally)
     points(:, 0) = section_point(moving, later)
     chattered = .false.
     do i = 1, periods
@@ -229,7 +229,7 @@ contains
     follows = .false.
     n = attractor%coordinates
     strobe = strobe_at(moving, point)
-    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    call begin_tally(moving, strobe, tally)
     do k = 1, attractor%period
       call advance_strobe_period(moving, strobe, tally, reason)
       if (reason /= 0) return

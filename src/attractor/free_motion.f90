@@ -17,7 +17,7 @@ contains
   !> one motion without impact, which attracts.
   pure logical function is_linear(moving)
     type(motion_t), intent(in) :: moving
-    is_linear = moving%exact .and. .not. allocated(moving%pair) .and. moving%layer <= 0 .and. moving%flow%decay > 0 .and. &
+    is_linear = moving%exact .and. moving%layer <= 0 .and. moving%flow%decay > 0 .and. &
                 .not. moving%machine%friction%kinetic > 0 .and. .not. moving%machine%friction%break_away > 0
   end function is_linear
 

@@ -6,8 +6,7 @@ module sampling
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: place_of, tally_t
-  use pair_modes, only: at_x1
-  use strobe, only: advance_strobe, advance_strobe_period, start_strobe, strobe_t
+  use strobe, only: advance_strobe, advance_strobe_period, driver_now, start_strobe, strobe_t
   implicit none
   private
 
@@ -38,7 +37,9 @@ contains
       end do
       if (reason == 0) call advance_strobe(moving, strobe, times(i) - section, tally, reason)
       x(i) = place_of(strobe%state)
-      if (allocated(moving%pair)) driver(i) = strobe%pair%y(at_x1)
+      associate (now => driver_now(moving, strobe))
+        driver(i) = now(1)
+      end associate
     end do
   end subroutine sample_positions
 

@@ -8,9 +8,10 @@ module trajectory
   use capture, only: captor_of
   use kinds, only: int64, wp
   use motion, only: advance, motion_t
-  use motion_state, only: log_t, place_of, reset_tally, tally_t
-  use strobe, only: advance_strobe, advance_strobe_period, energy_now, features_over, record_end, section_point, &
-    start_strobe, strobe_t
+  use motion_features, only: features_over
+  use motion_state, only: log_t, place_of, tally_t
+  use strobe, only: advance_strobe, advance_strobe_period, begin_tally, energy_now, record_end, section_point, start_strobe, &
+    strobe_t
   use status, only: reason_settled, reason_time_over
   implicit none
   private
@@ -109,7 +110,7 @@ contains
     real(wp), intent(in) :: start(:)
     type(course_t), intent(out) :: course
     course%strobe_t = start_strobe(moving, start)
-    call reset_tally(course%tally, course%state, allocated(moving%pair))
+    call begin_tally(moving, course%strobe_t, course%tally)
     if (.not. span%duration - span%window > 0) call open_window(moving, course)
     call set_stop(moving, span, course)
   end subroutine begin_course
@@ -272,7 +273,7 @@ contains
     course%last_impact_speed = latest_impact_speed(course)
     course%grazing_margin = min(course%grazing_margin, course%tally%grazing_margin)
     course%tally%wants_v_max = .true.
-    call reset_tally(course%tally, course%state, allocated(moving%pair))
+    call begin_tally(moving, course%strobe_t, course%tally)
   end subroutine open_window
 
   pure real(wp) function latest_impact_speed(course) result(speed)

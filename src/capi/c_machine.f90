@@ -8,16 +8,14 @@ module c_machine
   use case_check, only: beyond
   use case_setup, only: grid_of
   use case_type, only: case_t
-  use contact_law, only: barrier_positions
   use errors, only: error_t
   use grid, only: grid_t, slice_motion
-  use jointed_section, only: start_of_jointed
-  use jointed_state, only: jointed_state_t
   use kinds, only: int64, wp
   use lane_preparation, only: prepare_lanes
   use model_type, only: check_values, model_t
   use parameter_list, only: put_values
   use span_check, only: check_periods
+  use strobe, only: start_is_allowed
   use trajectories, only: describe_all, describe_regime, journey_t
   use trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -78,45 +76,20 @@ contains
     real(wp), intent(in) :: start(3)
     character(len=:), allocatable :: problem
     type(axis_t) :: no_axes(0)
-    type(jointed_state_t) :: state
-    real(wp) :: barriers(2)
+    problem = 'found a number that is not finite'
+    if (.not. all(ieee_is_finite(start))) return
     problem = ''
-    if (all(ieee_is_finite(start)) .and. allocated(prepared%journey%moving%jointed)) then
-      state = start_of_jointed(prepared%journey%moving%jointed, start(1), start(2), start(3))
-      if (any(state%q /= state%q)) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
-    else if (all(ieee_is_finite(start))) then
-      ! The names of the barriers are looked up only where they may be needed.
-      associate (moving => prepared%journey%moving)
-        if (.not. allocated(moving%pair)) then
-          barriers = barrier_positions(moving%machine%contact)
-          if (start(1) <= barriers(1) .and. start(1) >= barriers(2)) return
-        end if
-      end associate
-      problem = beyond(prepared%the_case, no_axes, start(1))
-    else
-      problem = 'found a number that is not finite'
-    end if
+    if (start_is_allowed(prepared%journey%moving, start)) return
+    problem = beyond(prepared%the_case, no_axes, start(1))
+    if (len(problem) == 0) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
   end function start_problem
 
   !> Whether a start is one: finite, and not beyond a barrier. Of what is asked of many starts by many threads no text is made.
   pure logical function is_start(prepared, start)
     type(prepared_t), intent(in) :: prepared
     real(wp), intent(in) :: start(3)
-    type(jointed_state_t) :: state
-    real(wp) :: barriers(2)
     is_start = all(ieee_is_finite(start))
-    if (.not. is_start) return
-    associate (moving => prepared%journey%moving)
-      if (allocated(moving%jointed)) then
-        state = start_of_jointed(moving%jointed, start(1), start(2), start(3))
-        is_start = .not. any(state%q /= state%q)
-      else if (allocated(moving%pair)) then
-        is_start = len(start_problem(prepared, start)) == 0
-      else
-        barriers = barrier_positions(moving%machine%contact)
-        is_start = start(1) <= barriers(1) .and. start(1) >= barriers(2)
-      end if
-    end associate
+    if (is_start) is_start = start_is_allowed(prepared%journey%moving, start)
   end function is_start
 
 end module c_machine

@@ -13,6 +13,7 @@ module c_trajectory
   use kinds, only: wp
   use model_type, only: model_t
   use motion, only: motion_t
+  use motion_columns, only: has_driver
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: closing_error, log_t, open_log
   use settled_cycle, only: describe_cycle
@@ -151,7 +152,7 @@ contains
     real(wp), allocatable :: column(:)
     sample(:3, :kept) = log%sample_data(:, :kept)
     sample(4, :kept) = log%sample_mode(:kept)
-    if (allocated(moving%pair)) then
+    if (has_driver(moving)) then
       sample(5:6, :kept) = log%sample_driver(:, :kept)
     else
       column = foot_positions(moving, crank_angle, log)
@@ -178,7 +179,7 @@ contains
     event(1, :kept) = log%event_kind(:kept)
     event(2:5, :kept) = log%event_data(:, :kept)
     event(6:7, :kept) = ieee_value(1.0_wp, ieee_quiet_nan)
-    if (allocated(moving%pair)) event(6:7, :kept) = log%event_driver(:, :kept)
+    if (has_driver(moving)) event(6:7, :kept) = log%event_driver(:, :kept)
   end subroutine put_events
 
   !> The steady values, the machine and the book of energy.
@@ -194,7 +195,7 @@ contains
     associate (f => outcome%window, book => log%book)
       summary(7:12) = [f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed]
       summary(13:18) = [moving%machine%period, barriers, merge(1.0_wp, 0.0_wp, moving%machine%contact%soft), &
-                        merge(1.0_wp, 0.0_wp, allocated(moving%pair)), real(outcome%reason, wp)]
+                        merge(1.0_wp, 0.0_wp, has_driver(moving)), real(outcome%reason, wp)]
       summary(19:23) = [book%at_start, book%friction, book%damping, book%contact, book%work]
       if (outcome%reason == reason_time_over) summary(24:25) = [book%at_end, closing_error(book)]
     end associate

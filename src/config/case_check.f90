@@ -11,14 +11,13 @@ module case_check
   use case_type, only: case_t
   use errors, only: error_t, fail
   use grid, only: sample_axis
-  use jointed_section, only: start_of_jointed
-  use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use law_check, only: check_laws, is_good
   use law_table, only: effect_family, families, law_choice_t
   use motion, only: motion_t
   use motion_state, only: options_t
   use status, only: exit_bad_case
+  use strobe, only: start_is_allowed
   use text, only: to_text
   implicit none
   private
@@ -197,7 +196,6 @@ contains
     type(law_choice_t) :: laws(size(the_case%laws))
     type(axis_t), allocatable :: axes(:)
     type(motion_t) :: moving
-    type(jointed_state_t) :: state
     type(error_t), allocatable :: error
     character(len=:), allocatable :: at
     real(wp) :: start(3), value
@@ -225,8 +223,7 @@ contains
       end do
       call machine_of(laws, options_t(), moving, error)
       if (allocated(error)) return
-      state = start_of_jointed(moving%jointed, start(1), start(2), start(3))
-      if (.not. any(state%q /= state%q)) cycle
+      if (start_is_allowed(moving, start)) cycle
       if (len(at) > 0) at = ' (at'//at//')'
       call report(source, 'start.x0', 'found bodies beyond a stop of a [contact.NAME] at the start, allowed within all of '// &
                   'them'//at)

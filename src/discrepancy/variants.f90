@@ -13,6 +13,7 @@ module variants
   use kinds, only: wp
   use law_table, only: law_choice_t
   use motion, only: motion_t
+  use motion_columns, only: is_one_body
   use motion_state, only: flight_adaptive, options_t
   use natural_scale, only: natural_size, scales_of, scales_t
   use parameter_list, only: parameter_t, put_values
@@ -91,7 +92,7 @@ contains
     plan = plan_t(laws, options, chosen, values, directions)
     call build(plan, values, .false., family%moving, error)
     if (allocated(error)) return
-    if (allocated(family%moving%pair) .or. allocated(family%moving%jointed)) then
+    if (.not. is_one_body(family%moving)) then
       call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
       return
     end if

@@ -3,7 +3,8 @@
 
 !> What is allowed in a case and hardly meant.
 module case_warnings
-  use attractors, only: most_coordinates
+  use build_jointed, only: jointed_of
+  use case_parameters, only: parameter_value
   use case_setup, only: grid_of
   use case_type, only: case_t
   use contact_law, only: contact_at_speed, contact_kelvin_voigt, contact_t
@@ -13,14 +14,10 @@ module case_warnings
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
   use jointed, only: joint_contact, jointed_t
-  use jointed_motion, only: jointed_motion_t
-  use jointed_section, only: coordinates_of_jointed, fits_section
   use journal, only: journal_t
   use kinds, only: int64, wp
   use motion, only: motion_t
-  use pair, only: impact_mass
-  use pair_damper, only: is_damper
-  use strobe, only: has_section
+  use strobe, only: contact_sizes, section_obstacle
   use text, only: to_text
   implicit none
   private
@@ -40,51 +37,52 @@ contains
     type(grid_t) :: grid
     type(motion_t) :: moving
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: obstacle
     grid = grid_of(the_case, the_case%axes(:0))
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
     if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
-    if (allocated(moving%jointed)) call warn_about_bodies(command, the_case, moving%jointed, journal)
-    if (allocated(moving%pair)) then
-      associate (machine => moving%pair%machine)
-        if (abs(machine%blow) > 0 .and. machine%blow_time > the_case%run%duration) then
-          call journal%line('warning', 'warning: body.blow_time = '//to_text(machine%blow_time)//' s is after the end, run.'// &
-            'duration = '//to_text(the_case%run%duration)//' s: no blow falls')
-        end if
-        if ((command == 'basin' .or. command == 'sweep') .and. .not. has_section(moving)) then
-          call journal%line('warning', 'warning: no attractors are looked for: with '//trim(merge('drive.sample_time', &
-            'body.blow        ', machine%sample_time > 0))//' the state at crank angle 0 does not tell what follows. Points '// &
-            'get the regime at the end of their run')
-        end if
-      end associate
+    call warn_about_blow(the_case, journal)
+    obstacle = section_obstacle(moving)
+    if ((command == 'basin' .or. command == 'sweep') .and. len(obstacle) > 0) then
+      call journal%line('warning', 'warning: no attractors are looked for: '//obstacle//'. Points get the regime at the end of '// &
+        'their run')
     end if
+    if (any(index(the_case%laws%name, 'structure:') == 1)) call warn_about_modes(the_case, journal)
     if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
-  !> Says if several bodies are too many for a search of attractors, and where a restitution is one of a flexible structure: it
-  !> then depends on the number of modes.
-  subroutine warn_about_bodies(command, the_case, moving, journal)
-    character(len=*), intent(in) :: command
+  !> Says if a blow falls after the end.
+  subroutine warn_about_blow(the_case, journal)
     type(case_t), intent(in) :: the_case
-    type(jointed_motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
+    real(wp) :: time
+    if (.not. abs(parameter_value(the_case%laws, 'body.blow', 0.0_wp)) > 0) return
+    time = parameter_value(the_case%laws, 'body.blow_time', 0.0_wp)
+    if (time <= the_case%run%duration) return
+    call journal%line('warning', 'warning: body.blow_time = '//to_text(time)//' s is after the end, run.duration = '// &
+      to_text(the_case%run%duration)//' s: no blow falls')
+  end subroutine warn_about_blow
+
+  !> Says where a restitution is one of a flexible structure: it then depends on the number of modes.
+  subroutine warn_about_modes(the_case, journal)
+    type(case_t), intent(in) :: the_case
+    type(journal_t), intent(inout) :: journal
+    type(jointed_t) :: machine
+    type(error_t), allocatable :: error
     real(wp) :: share
     integer :: j
-    if ((command == 'basin' .or. command == 'sweep') .and. .not. fits_section(moving)) then
-      call journal%line('warning', 'warning: no attractors are looked for: the section has '// &
-        to_text(coordinates_of_jointed(moving))//' coordinates, more than '//to_text(most_coordinates)//'. Points get the '// &
-        'regime at the end of their run')
-    end if
-    if (.not. any(index(the_case%laws%name, 'structure:') == 1)) return
-    do j = 1, size(moving%machine%joints)
-      if (moving%machine%joints(j)%kind /= joint_contact) cycle
-      share = upper_share(moving%machine, moving%machine%joints(j)%row)
+    call jointed_of(the_case%laws, machine, error)
+    if (allocated(error)) return
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind /= joint_contact) cycle
+      share = upper_share(machine, machine%joints(j)%row)
       if (share <= converged_share) cycle
-      call journal%line('warning', 'warning: '//trim(moving%machine%joints(j)%name)//': the upper half of the modes makes '// &
+      call journal%line('warning', 'warning: '//trim(machine%joints(j)%name)//': the upper half of the modes makes '// &
         to_text(nint(100*share))//' % of what yields at an impact, and a restitution does not converge with their number. '// &
         'Compare with fewer and with more modes, or give the stop a stiffness (kelvin_voigt)')
     end do
-  end subroutine warn_about_bodies
+  end subroutine warn_about_modes
 
   !> Share of the upper half of the undamped modes in the mobility along a row.
   function upper_share(machine, row) result(share)
@@ -122,17 +120,11 @@ contains
     type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
     real(wp) :: force, mass, rate, lasts
-    mass = moving%machine%mass
-    force = moving%machine%force_scale
-    if (allocated(moving%pair)) then
-      mass = impact_mass(moving%pair%machine)
-      force = moving%pair%force_scale
-    end if
+    logical :: closed_form
+    call contact_sizes(moving, mass, force, closed_form)
     rate = steps_per_second(moving%machine%contact, mass, force)
-    if (allocated(moving%pair)) then
-      ! In closed form, one a radian of the fastest motion.
-      if (is_damper(moving%pair)) rate = max(sqrt(moving%machine%contact%stiffness/mass), moving%machine%contact%damping/mass)
-    end if
+    ! In closed form, one a radian of the fastest motion.
+    if (closed_form) rate = max(sqrt(moving%machine%contact%stiffness/mass), moving%machine%contact%damping/mass)
     lasts = the_case%integrator%step_budget/rate
     if (lasts >= the_case%run%duration) return
     call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &

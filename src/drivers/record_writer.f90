@@ -11,6 +11,7 @@ module record_writer
   use errors, only: error_t, fail
   use kinds, only: int64, real64, wp
   use motion, only: motion_t
+  use motion_columns, only: has_driver
   use oscillator, only: oscillator_t
   use random, only: uniform
   use sampling, only: sample_positions
@@ -50,7 +51,7 @@ contains
     call measure(the_case%record, 0_int64, x)
     call measure(the_case%record, int(count, int64), driver)
     allocate (second(0))
-    if (allocated(moving%pair)) second = driver
+    if (has_driver(moving)) second = driver
     if (moving%machine%drive%interval > 0) second = force_at(moving%machine, start(3), times)
     call table%create(path)
     associate (heading => heading_of(the_case, moving, start))
@@ -101,7 +102,7 @@ contains
     if (moving%machine%drive%interval > 0) then
       lines = [character(len=80) :: lines, 't,x,force']
     else
-      lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', allocated(moving%pair))]
+      lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', has_driver(moving))]
     end if
   end function heading_of
 

@@ -11,15 +11,15 @@ module trajectory_driver
   use command_line, only: command_t
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
-  use file_layout, only: add_events, axis_dimension
+  use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
-  use jointed, only: joint_section, jointed_t
   use journal, only: duration_text
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
   use motion, only: motion_t
-  use motion_history, only: contact_forces, foot_positions, kinetic_energies
+  use motion_columns, only: event_columns, motion_column_t, sample_columns
+  use motion_history, only: contact_forces, kinetic_energies
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
   use record_writer, only: write_record
   use restoring_law, only: position_is_angle
@@ -84,15 +84,14 @@ contains
     call describe_motion(moving, span, outcome, cycle, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
-    if (allocated(moving%pair)) call add_driver_events(log, schema)
-    if (allocated(moving%jointed)) call add_joint_events(moving%jointed%machine, log, schema)
+    call add_columns(event_columns(moving, log), 'event', 'event_', schema)
     call add_energy(moving, log, schema)
     call add_book(log%book, outcome%reason == reason_time_over, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
       if (.not. allocated(error) .and. len(command%csv) > 0) then
-        call write_events(command%csv, log, allocated(moving%pair), error)
+        call write_events(command%csv, log, event_columns(moving, log), error)
       end if
       if (.not. allocated(error) .and. len(command%record) > 0) then
         call write_record(command%record, session%the_case, moving, grid%start, error)
@@ -178,17 +177,7 @@ contains
                              data=log%sample_data(2, :log%samples))
     call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
                              data=log%sample_data(3, :log%samples))
-    if (allocated(moving%jointed)) then
-      call add_bodies(moving%jointed%machine, log, schema)
-    else if (allocated(moving%pair)) then
-      call schema%add_variable('driver_x', type_float64, ['time'], units='m', long_name='position of the driving body', &
-                               data=log%sample_driver(1, :log%samples))
-      call schema%add_variable('driver_v', type_float64, ['time'], units='m/s', long_name='velocity of the driving body', &
-                               data=log%sample_driver(2, :log%samples))
-    else
-      call schema%add_variable('drive', type_float64, ['time'], units='m', long_name='position of the foot of the spring', &
-                               data=foot_positions(moving, crank_angle, log))
-    end if
+    call add_columns(sample_columns(moving, crank_angle, log), 'time', '', schema)
     if (moving%machine%contact%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
         long_name='force of the barriers on the body', data=contact_forces(moving, log))
@@ -213,62 +202,31 @@ contains
     call schema%add_attribute('', 'energy_closing_error', closing_error(book))
   end subroutine add_book
 
-  !> Position and velocity of every body of several, and of the coordinates of structures, whose names end in a number.
-  subroutine add_bodies(machine, log, schema)
-    type(jointed_t), intent(in) :: machine
-    type(log_t), intent(in) :: log
+  !> The columns of the machine along a dimension; `prefix` comes before their names.
+  subroutine add_columns(columns, dimension, prefix, schema)
+    type(motion_column_t), intent(in) :: columns(:)
+    character(len=*), intent(in) :: dimension, prefix
     type(schema_t), intent(inout) :: schema
-    character(len=:), allocatable :: name, column
-    logical :: inner
+    integer :: i, k
+    do i = 1, size(columns)
+      associate (column => columns(i))
+        if (len(column%meanings) > 0) then
+          call schema%add_variable(prefix//column%name, type_int8, [dimension], units=column%units, long_name=column%text, &
+            flag_values=[(k, k=1, words_in(column%meanings))], flag_meanings=column%meanings, data=column%values)
+        else
+          call schema%add_variable(prefix//column%name, type_float64, [dimension], units=column%units, long_name=column%text, &
+                                   data=column%values)
+        end if
+      end associate
+    end do
+  end subroutine add_columns
+
+  !> Number of words parted by single spaces.
+  pure integer function words_in(text)
+    character(len=*), intent(in) :: text
     integer :: i
-    do i = 1, machine%n
-      name = trim(machine%names(i))
-      column = axis_dimension(name)
-      inner = index(name, '.') > 0 .and. verify(name(index(name, '.') + 1:), '0123456789') == 0
-      call schema%add_variable(column//'_x', type_float64, ['time'], units=trim(merge('1', 'm', inner)), &
-                               long_name=trim(merge('coordinate', 'position  ', inner))//' of '//name, &
-                               data=log%sample_coordinates(i, :log%samples))
-      call schema%add_variable(column//'_v', type_float64, ['time'], units=trim(merge('1/s', 'm/s', inner)), &
-                               long_name=trim(merge('rate    ', 'velocity', inner))//' of '//name, &
-                               data=log%sample_coordinates(machine%n + i, :log%samples))
-    end do
-  end subroutine add_bodies
-
-  !> The joint of each event.
-  subroutine add_joint_events(machine, log, schema)
-    type(jointed_t), intent(in) :: machine
-    type(log_t), intent(in) :: log
-    type(schema_t), intent(inout) :: schema
-    character(len=:), allocatable :: names
-    real(wp), allocatable :: joints(:, :)
-    integer :: i, count_joints
-    count_joints = count(machine%joints%kind /= joint_section)
-    if (count_joints == 0) return
-    names = ''
-    do i = 1, count_joints
-      names = names//trim(machine%joints(i)%name)//' '
-    end do
-    allocate (joints(4, log%events))
-    if (log%events > 0) joints = log%event_joint(:, :log%events)
-    call schema%add_variable('event_joint', type_int8, ['event'], units='1', long_name='joint', &
-                             flag_values=[(i, i=1, count_joints)], flag_meanings=trim(names), data=joints(1, :))
-    call schema%add_variable('event_joint_x', type_float64, ['event'], units='m', &
-                             long_name='joint coordinate: second body minus first', data=joints(2, :))
-    call schema%add_variable('event_joint_v_before', type_float64, ['event'], units='m/s', &
-                             long_name='its rate just before the event', data=joints(3, :))
-    call schema%add_variable('event_joint_v_after', type_float64, ['event'], units='m/s', &
-                             long_name='its rate just after the event', data=joints(4, :))
-  end subroutine add_joint_events
-
-  !> The driving body of two at the events.
-  subroutine add_driver_events(log, schema)
-    type(log_t), intent(in) :: log
-    type(schema_t), intent(inout) :: schema
-    call schema%add_variable('event_driver_x', type_float64, ['event'], units='m', &
-                             long_name='position of the driving body', data=log%event_driver(1, :log%events))
-    call schema%add_variable('event_driver_v', type_float64, ['event'], units='m/s', &
-                             long_name='velocity of the driving body', data=log%event_driver(2, :log%events))
-  end subroutine add_driver_events
+    words_in = 1 + count([(text(i:i) == ' ', i=1, len(text))])
+  end function words_in
 
   !> Where the energy went over time.
   subroutine add_energy(moving, log, schema)
@@ -297,24 +255,29 @@ contains
 
   end subroutine add_energy
 
-  !> The events as a table at full precision, of two bodies with the driving one.
-  subroutine write_events(path, log, pair, error)
+  !> The events as a table at full precision, with what the machine adds to them.
+  subroutine write_events(path, log, columns, error)
     character(len=*), intent(in) :: path
-    logical, intent(in) :: pair
     type(log_t), intent(in) :: log
+    type(motion_column_t), intent(in) :: columns(:)
     type(error_t), allocatable, intent(out) :: error
     type(table_t) :: table
-    character(len=:), allocatable :: driver
-    integer :: i
+    character(len=:), allocatable :: more
+    integer :: i, k
     call table%create(path)
-    driver = ''
-    if (pair) driver = ',driver_x,driver_v'
-    call table%line('kind,time,x,v_before,v_after'//driver)
+    more = ''
+    do k = 1, size(columns)
+      more = more//','//columns(k)%name
+    end do
+    call table%line('kind,time,x,v_before,v_after'//more)
     do i = 1, log%events
-      if (pair) driver = ','//to_text(log%event_driver(1, i))//','//to_text(log%event_driver(2, i))
+      more = ''
+      do k = 1, size(columns)
+        more = more//','//to_text(columns(k)%values(i))
+      end do
       call table%line(trim(event_names(log%event_kind(i)))//','//to_text(log%event_data(1, i))//','// &
                       to_text(log%event_data(2, i))//','//to_text(log%event_data(3, i))//','// &
-                      to_text(log%event_data(4, i))//driver)
+                      to_text(log%event_data(4, i))//more)
     end do
     call table%close(error)
   end subroutine write_events

@@ -11,6 +11,7 @@ module lane_preparation
   use lane_types, only: contact_series_t, lane_flow_t, layer_nodes, machine_t, mode_t, most_harmonics, restitution_curve_t
   use layer_transit, only: gauss
   use motion, only: motion_t
+  use motion_columns, only: is_one_body
   use motion_state, only: flight_adaptive
   use oscillator, only: oscillator_t
   use rest, only: chatter_speed
@@ -40,7 +41,7 @@ contains
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
-    if (flow%width <= 0 .or. allocated(moving%pair) .or. allocated(moving%jointed)) return
+    if (flow%width <= 0 .or. .not. is_one_body(moving)) return
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
     else

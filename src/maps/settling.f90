@@ -9,8 +9,9 @@ module settling
   use circle, only: point_near
   use kinds, only: wp
   use motion, only: motion_t
-  use motion_state, only: reset_tally, tally_t
-  use strobe, only: advance_strobe_period, coordinates_of, cycle_word, features_over, scales_of, section_point, strobe_t, turn_of
+  use motion_features, only: cycle_word, features_over
+  use motion_state, only: tally_t
+  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, rides_along, scales_of, section_point, strobe_t, turn_of
   use turn_section, only: has_no_clock
   implicit none
   private
@@ -116,12 +117,12 @@ contains
     settled%mark = mark_of(moving, settled%features)
   end subroutine settle_on_section
 
-  !> By what limits are told: the regime of two bodies, of one body whether there are impacts.
+  !> By what limits are told: the regime of bodies that may ride along, else whether there are impacts.
   pure integer function mark_of(moving, features) result(mark)
     type(motion_t), intent(in) :: moving
     type(features_t), intent(in) :: features
     mark = merge(regime_impact, regime_non_impact, features%impacts_per_period > 0)
-    if (allocated(moving%pair)) mark = features%regime
+    if (rides_along(moving)) mark = features%regime
   end function mark_of
 
   !> Drive periods whose section points are all kept.
@@ -131,7 +132,7 @@ contains
     type(tally_t), intent(out) :: tally
     type(settled_t), intent(inout) :: settled
     integer :: i
-    call reset_tally(tally, settled%state%state, allocated(moving%pair))
+    call begin_tally(moving, settled%state, tally)
     do i = 1, size(points, 2)
       call advance_strobe_period(moving, settled%state, tally, settled%reason)
       if (settled%reason /= 0) return
@@ -145,7 +146,7 @@ contains
     type(tally_t), intent(out) :: tally
     type(settled_t), intent(inout) :: settled
     integer :: i
-    call reset_tally(tally, settled%state%state, allocated(moving%pair))
+    call begin_tally(moving, settled%state, tally)
     settled%duration = 0
     do i = 1, periods
       call advance_strobe_period(moving, settled%state, tally, settled%reason)

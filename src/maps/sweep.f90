@@ -10,11 +10,12 @@ module sweep
   use grid, only: grid_t, machine_with
   use kinds, only: wp
   use motion, only: motion_t
-  use motion_state, only: reset_tally, tally_t
+  use motion_features, only: features_over
+  use motion_state, only: tally_t
   use settling, only: mark_of, settle, settled_t
   use span_check, only: check_periods
   use status, only: reason_time_over
-  use strobe, only: advance_strobe_period, advance_to_section, features_over, resume_strobe, strobe_t
+  use strobe, only: advance_strobe_period, advance_to_section, begin_tally, resume_strobe, strobe_t
   use trajectory, only: span_t
   use turn_section, only: has_no_clock
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -61,11 +62,11 @@ contains
     periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)
     allocate (held%samples(2, samples), source=ieee_value(1.0_wp, ieee_quiet_nan))
     held%state = resume_strobe(moving, state, crank_angle)
-    call reset_tally(tally, held%state%state, allocated(moving%pair))
+    call begin_tally(moving, held%state, tally)
     do i = 1, periods
       if (i == periods - in_window + 1) then
         tally%wants_v_max = .true.
-        call reset_tally(tally, held%state%state, allocated(moving%pair))
+        call begin_tally(moving, held%state, tally)
       end if
       call advance_strobe_period(moving, held%state, tally, held%reason)
       if (held%reason /= 0) then

@@ -10,6 +10,7 @@ module sweep_limits
   use grid, only: grid_t, machine_with
   use kinds, only: wp
   use motion, only: motion_t
+  use motion_columns, only: has_driver
   use settling, only: settle, settled_t
   use status, only: reason_time_over
   use strobe, only: coordinates_of, resume_strobe, strobe_at, strobe_t
@@ -211,7 +212,7 @@ contains
     call machine_with(grid, path, value, moving, error)
     if (allocated(error)) return
     start = resume_strobe(moving, from%state, 0.0_wp)
-    if (present(ahead) .and. .not. allocated(moving%pair) .and. coordinates_of(moving) == 2) then
+    if (present(ahead) .and. .not. has_driver(moving) .and. coordinates_of(moving) == 2) then
       if (before%period == from%period) then
         here = [from%state%state%x, from%state%state%v]
         behind = point_near([before%state%state%x, before%state%state%v], here, moving%machine%turn)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sx.branches` and `sx.stability` are the commands of these names, to the bit and to the word."""
 
+import time
 from pathlib import Path
 
 import pytest
@@ -65,10 +66,28 @@ def test_branches_end_at_an_interrupt(grazing: sx.Case, tmp_path: Path) -> None:
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="branches was stopped") as caught:
-        sx.branches(grazing, "drive.amplitude", 0.05, 1.2, progress=stop, output=tmp_path / "out.h5")
+    with pytest.raises(KeyboardInterrupt, match="branches was stopped; nothing of it is kept") as caught:
+        sx.branches(
+            grazing, "drive.amplitude", 0.05, 1.2, searches=900, progress=stop, output=tmp_path / "out.h5"
+        )
     assert not isinstance(caught.value, sx.Interrupted)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_that_comes_too_late_says_that_the_result_is_kept(
+    grazing: sx.Case, tmp_path: Path
+) -> None:
+    """The program may be at its end before it hears; what is said is then what is."""
+
+    def stop(*_: object) -> None:
+        time.sleep(1.5)
+        raise KeyboardInterrupt
+
+    output = tmp_path / "out.h5"
+    with pytest.raises(KeyboardInterrupt) as caught:
+        sx.branches(grazing, "drive.amplitude", 0.05, 1.2, progress=stop, output=output)
+    assert output.exists() == ("its result is kept" in str(caught.value))
+    assert output.exists() == ("nothing of it is kept" not in str(caught.value))
 
 
 def test_stability_is_that_of_the_program(source_dir: Path, separatrix: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.library import effects
 
 # share of the best evidence, or of what free forces explain, from which on a family is tried
@@ -69,7 +69,9 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
             bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
             if not made.fit.converged:
                 # more knots than these records can tell apart, no function, or one far from its shape yet
-                if count > KNOTS[0] and made.fit.excess > _SATURATED * known.fit.excess:
+                if best is not None and made.fit.total < best.fitted.fit.total + WORSE:
+                    best.fitted.finer = made
+                if count > KNOTS[0] and _saturated(known, made):
                     break
                 known = min(known, made, key=lambda one: one.fit.excess)
                 if strict:
@@ -79,7 +81,7 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
             one = found.judge(made, bench.foretell(made, found.foretold))
             if best is not None and one.evidence < best.evidence + margin(best, one, bench.options):
                 best.fitted.finer = made
-                if made.fit.excess > _SATURATED * best.fitted.fit.excess:
+                if _saturated(best.fitted, made):
                     break
                 # far from its shape yet: it follows the fitted records and foretells no others
                 continue
@@ -88,6 +90,12 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
             known = best.fitted
     if best is not None:
         yield best
+
+
+def _saturated(one: Fitted, more: Fitted) -> bool:
+    """Whether more knots leave nearly as much of a gap, or there is none left."""
+    before, after = (max(0.0, fitted.fit.excess) for fitted in (one, more))
+    return after >= _SATURATED * before
 
 
 def _begun(found: Round, family: str) -> Fitted:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
@@ -116,6 +116,7 @@ def fit_member(
         values[paths.index(member.anchor)] = begun[0][0]
     problem = Problem(extended, data.prepared, data.stages[data.last], [*free, *added])
     fit = minimise(problem, values, known.fit.starts, most=40, patient=True)
+    fit = polished(data, problem, fit, data.last, 40)
     return Fitted(names, extended, problem, fit, place)
 
 
@@ -180,11 +181,12 @@ def function_values(fitted: Fitted) -> tuple[Member, list[Part]] | None:
         parts.append(Part(name, knots, value, covariance))
     finer = None if fitted.finer is None else function_values(fitted.finer)
     if finer is not None and len(finer[1]) == len(parts):
-        # what more knots change beyond their own errors is an error of these
+        # few knots know too much: their errors are at least those of more, and what these change beyond them
         for one, other in zip(parts, finer[1], strict=True):
             chance = np.interp(one.at, other.at, other.error) ** 2
             changed = (_through(other, one.at) - one.value) ** 2
-            one.covariance = one.covariance + np.diag(np.maximum(0.0, changed - chance))
+            wanted = np.maximum(0.0, chance - one.error**2) + np.maximum(0.0, changed - chance)
+            one.covariance = one.covariance + np.diag(wanted)
     return member, parts
 
 

@@ -4,12 +4,12 @@
 !> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
 !> stretch of the springs of elastic friction.
 module jointed_section
-  use attractors, only: most_coordinates
   use eigen, only: symmetric_eigen
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_section, jointed_t, most_degrees
   use jointed_motion, only: jointed_motion_t, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
+  use section_size, only: most_coordinates
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private

@@ -1,42 +1,42 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A machine of one body, two or several as the stroboscopic map sees it: a state that moves from section to section, and the
-!> coordinates that fix it there. Those of one body are x and v, and what its laws remember: the force of Dahl's friction, the speed
-!> at which a contact that lasts began. Of two, what nothing depends on is left out: the driving
-!> body where its motion is given, the position of one that nothing ties and of the driven one where no stop bounds it, the
-!> velocity of both where nothing ties either to the ground. With `by_event` the section is where the motion of a machine without a
-!> clock turns round, see `turn_section`.
+!> The one interface to machines of one body, two (friction pairs) or several with joints: a state that moves from section to
+!> section, and the coordinates that fix it there. Which of the three a machine is, is asked here and in the modules of this
+!> folder; nowhere above it. With `by_event` the section is where the motion of a machine without a clock turns round, see
+!> `turn_section`.
 module strobe
-  use attractors, only: features_t, most_coordinates, regime_at_rest, regime_of, regime_stuck, wrap_range
-  use contact_law, only: contact_t
+  use body_section, only: body_at, body_point, coordinates_of_body, resumed_body, scales_of_body, start_of_body
+  use contact_law, only: barrier_positions, contact_t
   use energy, only: energy_of_body, record_with_book
-  use event_words, only: canonical_word
   use jointed_log, only: energy_of_jointed, log_sample, watched_state
   use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
   use jointed_section, only: coordinates_of_jointed, fits_section, jointed_at, jointed_point, scales_of_jointed, &
     start_of_jointed
   use jointed_state, only: jointed_state_t
-  use kinds, only: int64, wp
-  use motion, only: advance, advance_period, motion_t, start_state
+  use kinds, only: wp
+  use motion, only: advance, advance_period, motion_t
   use motion_state, only: log_t, record_sample, reset_tally, state_t, take_turns, tally_t
-  use pair, only: driven_by_controller, driven_by_force, driven_by_motion
+  use pair, only: driven_by_motion, impact_mass
+  use pair_damper, only: is_damper
   use pair_flight, only: body_state, driver_of, energy_of
-  use pair_modes, only: at_integral, at_ramp, at_v1, at_v2, at_x1, at_x2, pair_state_t
-  use pair_motion, only: advance_pair, advance_pair_period, start_pair
+  use pair_modes, only: pair_state_t
+  use pair_motion, only: advance_pair, advance_pair_period
+  use pair_section, only: coordinates_of_pair, free_pair, pair_at, pair_point, resumed_pair, scales_of_pair, start_of_pair, &
+    tells_what_follows
+  use section_size, only: most_coordinates
+  use text, only: to_text
   use turn_section, only: advance_body_to_turn, advance_jointed_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
     jointed_at_turn, jointed_turn_point, scales_of_turn
   implicit none
   private
 
-  public :: strobe_t, coordinates_of, has_section, start_strobe, resume_strobe, strobe_at, section_point, section_state, &
-    scales_of, without_stops, advance_strobe, advance_strobe_period, features_over, cycle_word, rest_lasts, energy_now, &
-    record_end, advance_to_section, turn_point, turn_of
+  public :: strobe_t, coordinates_of, has_section, section_obstacle, contact_sizes, start_strobe, start_is_allowed, &
+    resume_strobe, strobe_at, section_point, section_state, scales_of, smallest_motion, without_stops, advance_strobe, &
+    advance_strobe_period, begin_tally, driver_now, rides_along, rest_lasts, energy_now, record_end, advance_to_section, &
+    copy_of, turn_point, turn_of
 
-  !> Coordinates of two bodies.
-  integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5, of_two = 5
-
-  !> `state` is that of the body, or of the driven one of two.
+  !> `state` is that of the body, of the driven one of two, or of the watched one of several.
   type :: strobe_t
     type(state_t) :: state
     type(pair_state_t) :: pair
@@ -47,23 +47,7 @@ module strobe
 
 contains
 
-  !> Which coordinates of two bodies count.
-  pure function counts_of(moving) result(counts)
-    type(motion_t), intent(in) :: moving
-    logical :: counts(of_two)
-    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
-    associate (machine => moving%pair%machine)
-      counts = .false.
-      counts(of_place) = machine%upper < unreachable .or. machine%lower > -unreachable
-      counts(of_v2) = .true.
-      if (machine%drive == driven_by_motion) return
-      counts(of_x1) = machine%stiffness > 0 .or. machine%drive == driven_by_controller
-      counts(of_v1) = .not. floats(moving)
-      counts(of_integral) = abs(machine%integral) > 0
-    end associate
-  end function counts_of
-
-  !> The same two bodies without stops, if that takes away just the first coordinate, the place; else nothing.
+  !> The same machine without stops, if that takes away just the first coordinate, the place; else nothing.
   pure subroutine without_stops(moving, free, found)
     type(motion_t), intent(in) :: moving
     type(motion_t), intent(out) :: free
@@ -72,25 +56,8 @@ contains
     if (.not. allocated(moving%pair)) return
     free = moving
     free%machine%contact = contact_t()
-    associate (machine => free%pair%machine)
-      machine%contact = contact_t()
-      machine%upper = huge(1.0_wp)
-      machine%lower = -huge(1.0_wp)
-    end associate
-    associate (before => counts_of(moving), after => counts_of(free))
-      found = before(of_place) .and. .not. after(of_place) .and. all(before(of_v2:) .eqv. after(of_v2:))
-    end associate
+    call free_pair(moving%pair, free%pair, found)
   end subroutine without_stops
-
-  !> Whether two bodies may as well be looked at from a frame that moves along.
-  pure logical function floats(moving)
-    type(motion_t), intent(in) :: moving
-    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
-    associate (machine => moving%pair%machine)
-      floats = machine%drive == driven_by_force .and. .not. machine%stiffness > 0 .and. .not. machine%damping > 0 .and. &
-               (machine%carried .or. (machine%upper >= unreachable .and. machine%lower <= -unreachable))
-    end associate
-  end function floats
 
   !> Number of coordinates on the section.
   pure integer function coordinates_of(moving) result(n)
@@ -100,42 +67,11 @@ contains
     else if (allocated(moving%jointed)) then
       n = coordinates_of_jointed(moving%jointed)
     else if (allocated(moving%pair)) then
-      n = count(counts_of(moving))
+      n = coordinates_of_pair(moving%pair)
     else
-      n = 2 + count(remembers(moving))
+      n = coordinates_of_body(moving)
     end if
   end function coordinates_of
-
-  !> What the laws of one body remember: the force of Dahl's friction, the speed at which a contact began.
-  pure function remembers(moving)
-    type(motion_t), intent(in) :: moving
-    logical :: remembers(2)
-    associate (machine => moving%machine)
-      remembers = [machine%effects%dahl_stiffness > 0, machine%contact%soft .and. machine%contact%by_impact]
-    end associate
-  end function remembers
-
-  !> A body at a point of the section.
-  pure type(state_t) function body_at(moving, point) result(state)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: point(:)
-    real(wp) :: memory(2)
-    memory = unpack(point(3:), remembers(moving), [0.0_wp, abs(point(2))])
-    state = start_state(moving, point(1), point(2), 0.0_wp, z=memory(1), touch_speed=abs(memory(2)))
-    call take_turns(moving%machine%turn, state)
-  end function body_at
-
-  !> The coordinates of a body on the section; the speed of a contact that is over is zero.
-  pure function body_point(moving, state) result(point)
-    type(motion_t), intent(in) :: moving
-    type(state_t), intent(in) :: state
-    real(wp), allocatable :: point(:)
-    logical :: lasts
-    associate (contact => moving%machine%contact)
-      lasts = state%x > contact%soft_upper .or. state%x < contact%soft_lower
-    end associate
-    point = [state%x, state%v, pack([state%z, merge(state%touch_speed, 0.0_wp, lasts)], remembers(moving))]
-  end function body_point
 
   !> Whether the state on the section tells what follows: not with a controller that acts at times of its own, nor before
   !> a blow.
@@ -143,11 +79,35 @@ contains
     type(motion_t), intent(in) :: moving
     has_section = .true.
     if (allocated(moving%jointed)) has_section = fits_section(moving%jointed)
-    if (.not. allocated(moving%pair)) return
-    associate (machine => moving%pair%machine)
-      has_section = .not. machine%sample_time > 0 .and. .not. abs(machine%blow) > 0
-    end associate
+    if (allocated(moving%pair)) has_section = tells_what_follows(moving%pair)
   end function has_section
+
+  !> Why it does not, '' if it does.
+  pure function section_obstacle(moving) result(text)
+    type(motion_t), intent(in) :: moving
+    character(len=:), allocatable :: text
+    text = ''
+    if (has_section(moving)) return
+    if (allocated(moving%jointed)) text = 'the section has '//to_text(coordinates_of_jointed(moving%jointed))// &
+                                          ' coordinates, more than '//to_text(most_coordinates)
+    if (allocated(moving%pair)) text = 'with '//trim(merge('drive.sample_time', 'body.blow        ', &
+                                                           moving%pair%machine%sample_time > 0))// &
+                                       ' the state at crank angle 0 does not tell what follows'
+  end function section_obstacle
+
+  !> What presses a contact: the mass that an impact feels [kg], the size of the forces [N], and whether it is flown in closed form.
+  pure subroutine contact_sizes(moving, mass, force, closed_form)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(out) :: mass, force
+    logical, intent(out) :: closed_form
+    mass = moving%machine%mass
+    force = moving%machine%force_scale
+    closed_form = moving%pressed%available
+    if (.not. allocated(moving%pair)) return
+    mass = impact_mass(moving%pair%machine)
+    force = moving%pair%force_scale
+    closed_form = is_damper(moving%pair)
+  end subroutine contact_sizes
 
   !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
   !> are places and velocities of the coordinates of several bodies, in the place of those that the machine says.
@@ -159,15 +119,29 @@ contains
       strobe%jointed = start_of_jointed(moving%jointed, start(1), start(2), start(3), start(4:))
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
     else if (allocated(moving%pair)) then
-      associate (machine => moving%pair%machine)
-        strobe%pair = start_pair(moving%pair, start(1), start(2), [machine%driver_x0, machine%driver_v0], start(3))
-      end associate
+      strobe%pair = start_of_pair(moving%pair, start)
       strobe%state = body_state(strobe%pair)
     else
-      strobe%state = start_state(moving, start(1), start(2), start(3))
-      call take_turns(moving%machine%turn, strobe%state)
+      strobe%state = start_of_body(moving, start)
     end if
   end function start_strobe
+
+  !> Whether no body starts beyond a stop: x [m], v [m/s], crank angle [rad], and what may follow as in `start_strobe`.
+  pure logical function start_is_allowed(moving, start)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: start(:)
+    type(strobe_t) :: strobe
+    real(wp) :: x, barriers(2)
+    if (allocated(moving%jointed)) then
+      strobe = start_strobe(moving, start)
+      start_is_allowed = .not. any(strobe%jointed%q /= strobe%jointed%q)
+    else
+      x = start(1)
+      if (allocated(moving%pair)) x = x - merge(moving%pair%machine%driver_x0, 0.0_wp, moving%pair%machine%carried)
+      barriers = barrier_positions(moving%machine%contact)
+      start_is_allowed = x <= barriers(1) .and. x >= barriers(2)
+    end if
+  end function start_is_allowed
 
   !> The state of one machine given to another, on the section with the crank at an angle [rad]; a driving body whose motion
   !> is given has that of the new one. What was never moved starts as the new machine says.
@@ -183,16 +157,10 @@ contains
     if (.not. allocated(moving%pair) .or. before%pair%mode == 0) then
       strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
       if (allocated(moving%pair) .or. allocated(moving%jointed) .or. before%state%mode == 0) return
-      associate (state => before%state)
-        strobe%state = start_state(moving, state%x, state%v, angle, z=state%z, touch_speed=state%touch_speed)
-      end associate
-      call take_turns(moving%machine%turn, strobe%state)
+      strobe%state = resumed_body(moving, before%state, angle)
       return
     end if
-    associate (y => before%pair%y)
-      strobe%pair = start_pair(moving%pair, y(at_x2) - merge(y(at_ramp), 0.0_wp, moving%pair%machine%carried), y(at_v2), &
-                               [y(at_x1) - y(at_ramp), y(at_v1)], angle, y(at_integral))
-    end associate
+    strobe%pair = resumed_pair(moving%pair, before%pair, angle)
     strobe%state = body_state(strobe%pair)
   end function resume_strobe
 
@@ -216,8 +184,6 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(strobe_t) :: strobe
-    real(wp) :: all_of_them(of_two)
-    integer :: n
     if (allocated(moving%jointed)) then
       if (moving%by_event) then
         strobe%jointed = jointed_at_turn(moving%jointed, point)
@@ -225,52 +191,33 @@ contains
         strobe%jointed = jointed_at(moving%jointed, point)
       end if
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-      return
+    else if (allocated(moving%pair)) then
+      strobe%pair = pair_at(moving%pair, point)
+      strobe%state = body_state(strobe%pair)
     else if (moving%by_event) then
       strobe%state = body_at_turn(moving, point(1))
-      return
-    else if (.not. allocated(moving%pair)) then
+    else
       strobe%state = body_at(moving, point)
-      return
     end if
-    n = coordinates_of(moving)
-    all_of_them = unpack(point(:n), counts_of(moving), 0.0_wp)
-    associate (machine => moving%pair%machine)
-      if (machine%carried) then
-        if (machine%drive == driven_by_motion) all_of_them(of_x1) = machine%mean + machine%amplitude
-        all_of_them(of_place) = all_of_them(of_place) + all_of_them(of_x1)
-      end if
-      strobe%pair = start_pair(moving%pair, all_of_them(of_place), all_of_them(of_v2), all_of_them([of_x1, of_v1]), 0.0_wp, &
-                               all_of_them(of_integral))
-    end associate
-    strobe%state = body_state(strobe%pair)
   end function strobe_at
 
   !> Coordinates of a state on the section, zeros after the last.
   pure function section_point(moving, strobe) result(point)
     type(motion_t), intent(in) :: moving
     class(strobe_t), intent(in) :: strobe
-    real(wp) :: point(most_coordinates), all_of_them(of_two)
-    integer :: n
+    real(wp) :: point(most_coordinates)
     point = 0
     if (moving%by_event) then
       point = turn_point(moving, strobe)
-      return
     else if (allocated(moving%jointed)) then
       point = jointed_point(moving%jointed, strobe%jointed)
-      return
-    else if (.not. allocated(moving%pair)) then
-      n = coordinates_of(moving)
-      point(:n) = body_point(moving, strobe%state)
-      return
+    else if (allocated(moving%pair)) then
+      point = pair_point(moving%pair, strobe%pair)
+    else
+      associate (n => coordinates_of_body(moving))
+        point(:n) = body_point(moving, strobe%state)
+      end associate
     end if
-    all_of_them = strobe%pair%y([at_x2, at_v2, at_x1, at_v1, at_integral])
-    if (moving%pair%machine%carried) all_of_them(of_place) = all_of_them(of_place) - all_of_them(of_x1)
-    if (floats(moving)) all_of_them(of_v2) = all_of_them(of_v2) - all_of_them(of_v1)
-    ! A reference that runs away takes the driving body along.
-    all_of_them(of_x1) = all_of_them(of_x1) - strobe%pair%y(at_ramp)
-    n = coordinates_of(moving)
-    point(:n) = pack(all_of_them, counts_of(moving))
   end function section_point
 
   !> x, v at a point of the section, and those of the driving body of two (0 of one).
@@ -280,39 +227,37 @@ contains
     real(wp) :: state(4)
     type(strobe_t) :: strobe
     strobe = strobe_at(moving, point)
-    state = 0
-    if (allocated(moving%pair)) state(3:) = driver_of(strobe%pair)
-    state(:2) = [strobe%state%x, strobe%state%v]
+    state = [strobe%state%x, strobe%state%v, driver_now(moving, strobe)]
   end function section_state
 
-  !> Sizes of the coordinates in a motion over `half_range` [m] of the position. Two bodies may drift: then they are those of
-  !> what the stops or the forces allow.
+  !> Sizes of the coordinates in a motion over `half_range` [m] of the position.
   pure function scales_of(moving, half_range) result(scales)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
-    real(wp) :: scales(most_coordinates), w, length
-    logical :: counts(of_two)
-    integer :: n
-    w = moving%machine%drive_frequency
+    real(wp) :: scales(most_coordinates)
     scales = 1
     if (moving%by_event) then
       scales = scales_of_turn(moving, half_range)
     else if (allocated(moving%jointed)) then
       scales = scales_of_jointed(moving%jointed, half_range)
-    else if (.not. allocated(moving%pair)) then
-      length = half_range
-      if (moving%machine%turn > 0) length = min(length, moving%machine%turn/2)
-      n = coordinates_of(moving)
-      scales(:n) = [length*[1.0_wp, w], pack([moving%machine%effects%dahl_sliding, length*w], remembers(moving))]
+    else if (allocated(moving%pair)) then
+      scales(:coordinates_of_pair(moving%pair)) = scales_of_pair(moving%pair, half_range)
     else
-      counts = counts_of(moving)
-      n = count(counts)
-      length = half_range
-      if (moving%pair%machine%carried) length = min(length, (moving%pair%machine%upper - moving%pair%machine%lower)/2)
-      if (.not. counts(of_place)) length = min(length, moving%pair%force_scale/(moving%machine%mass*w**2))
-      scales(:n) = pack(length*[1.0_wp, w, 1.0_wp, w, 1/w], counts)
+      scales(:coordinates_of_body(moving)) = scales_of_body(moving, half_range)
     end if
   end function scales_of
+
+  !> Half range [m] of a motion below which it is one of the rounding: a thousandth of what the forces do.
+  pure real(wp) function smallest_motion(moving) result(smallest)
+    type(motion_t), intent(in) :: moving
+    smallest = 1e-3_wp
+    if (moving%machine%restoring%stiffness > 0) then
+      smallest = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
+    end if
+    if (allocated(moving%pair)) then
+      smallest = 1e-3_wp*moving%pair%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
+    end if
+  end function smallest_motion
 
   !> What the first coordinate repeats after on the section.
   pure real(wp) function turn_of(moving)
@@ -377,6 +322,15 @@ contains
     end if
   end subroutine advance_to_section
 
+  !> A copy of a state, to be moved on its own.
+  pure type(strobe_t) function copy_of(strobe) result(copy)
+    class(strobe_t), intent(in) :: strobe
+    copy%state = strobe%state
+    copy%pair = strobe%pair
+    copy%jointed = strobe%jointed
+    copy%lasted = strobe%lasted
+  end function copy_of
+
   !> Coordinates of a state there, zeros after the last.
   pure function turn_point(moving, strobe) result(point)
     type(motion_t), intent(in) :: moving
@@ -390,37 +344,28 @@ contains
     end if
   end function turn_point
 
-  !> Features of what was counted over `periods` drive periods. Two bodies that do not slip may well move.
-  pure function features_over(moving, tally, periods) result(features)
+  !> Begins the counts of a motion anew where it is now.
+  pure subroutine begin_tally(moving, strobe, tally)
     type(motion_t), intent(in) :: moving
-    type(tally_t), intent(in) :: tally
-    real(wp), intent(in) :: periods
-    type(features_t) :: features
-    features = regime_of(tally, periods)
-    features%rotation = real(tally%turns, wp)/periods
-    call wrap_range(features, moving%machine%turn)
-    if (allocated(moving%pair) .and. features%regime == regime_at_rest) features%regime = regime_stuck
-  end function features_over
+    class(strobe_t), intent(in) :: strobe
+    type(tally_t), intent(inout) :: tally
+    call reset_tally(tally, strobe%state, allocated(moving%pair))
+  end subroutine begin_tally
 
-  !> Event word of the cycle of `periods` drive periods that a state on the section has reached, wherever on it that is.
-  pure integer(int64) function cycle_word(moving, strobe, periods) result(word)
+  !> Position and velocity of the driving body of two [m, m/s], zeros without one.
+  pure function driver_now(moving, strobe) result(driver)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
-    integer, intent(in) :: periods
-    integer(int64) :: words(periods)
-    type(strobe_t) :: later
-    type(tally_t) :: tally
-    integer :: i, reason
-    later = strobe
-    words = 0
-    do i = 1, periods
-      call reset_tally(tally, later%state, allocated(moving%pair))
-      call advance_strobe_period(moving, later, tally, reason)
-      if (reason /= 0) exit
-      words(i) = tally%word
-    end do
-    word = canonical_word(words)
-  end function cycle_word
+    class(strobe_t), intent(in) :: strobe
+    real(wp) :: driver(2)
+    driver = 0
+    if (allocated(moving%pair)) driver = driver_of(strobe%pair)
+  end function driver_now
+
+  !> Whether bodies that do not slip may well move: they ride along.
+  pure logical function rides_along(moving)
+    type(motion_t), intent(in) :: moving
+    rides_along = allocated(moving%pair)
+  end function rides_along
 
   !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move
   !> as one in a way that is given.

@@ -7,13 +7,13 @@
 !>   s = x at a maximum, s = +-(turn/2 + |v|/w) at the half turn, upwards or downwards,
 !> which is continuous where the maximum comes to the half turn.
 module turn_section
-  use attractors, only: most_coordinates
   use jointed_motion, only: advance_to_turn, jointed_motion_t
   use jointed_section, only: coordinates_of_jointed, fits_section, jointed_at, jointed_point, scales_of_jointed, watched_speed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use motion, only: advance, motion_t, start_state
   use motion_state, only: append_word, mode_slip_minus, move_turn, state_t, tally_t, word_period
+  use section_size, only: most_coordinates
   use status, only: reason_time_over
   implicit none
   private

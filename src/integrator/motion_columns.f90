@@ -1,0 +1,137 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What is written down of a motion beside time, place and velocity of the body looked at, by the machine: the foot of the spring,
+!> the driving body, all coordinates of a structure and the joint of each event.
+module motion_columns
+  use jointed, only: joint_section, jointed_t
+  use kinds, only: wp
+  use motion, only: motion_t
+  use motion_history, only: foot_positions
+  use motion_state, only: log_t
+  use text, only: replace_all
+  implicit none
+  private
+
+  public :: sample_columns, event_columns, has_driver, is_one_body
+
+  !> A quantity at the samples, or at the events.
+  type, public :: motion_column_t
+    character(len=:), allocatable :: name, units, text
+    real(wp), allocatable :: values(:)
+    !> Meanings of the numbers 1, 2, ..., parted by spaces; '' of a quantity.
+    character(len=:), allocatable :: meanings
+  end type motion_column_t
+
+contains
+
+  !> Whether `moving%machine` says all of the machine.
+  pure logical function is_one_body(moving)
+    type(motion_t), intent(in) :: moving
+    is_one_body = .not. allocated(moving%pair) .and. .not. allocated(moving%jointed)
+  end function is_one_body
+
+  !> Whether there is a driving body beside the one that is looked at.
+  pure logical function has_driver(moving)
+    type(motion_t), intent(in) :: moving
+    has_driver = allocated(moving%pair)
+  end function has_driver
+
+  !> At the samples of a motion that began with the crank at `crank_angle` [rad].
+  pure function sample_columns(moving, crank_angle, log) result(columns)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: crank_angle
+    type(log_t), intent(in) :: log
+    type(motion_column_t), allocatable :: columns(:)
+    if (allocated(moving%jointed)) then
+      columns = coordinate_columns(moving%jointed%machine, log)
+    else if (allocated(moving%pair)) then
+      columns = driver_columns(log%sample_driver(:, :log%samples))
+    else
+      allocate (columns(1))
+      call set_column(columns(1), 'drive', 'm', 'position of the foot of the spring', foot_positions(moving, crank_angle, log))
+    end if
+  end function sample_columns
+
+  !> At the events.
+  pure function event_columns(moving, log) result(columns)
+    type(motion_t), intent(in) :: moving
+    type(log_t), intent(in) :: log
+    type(motion_column_t), allocatable :: columns(:)
+    if (allocated(moving%jointed)) then
+      columns = joint_columns(moving%jointed%machine, log)
+    else if (allocated(moving%pair)) then
+      columns = driver_columns(log%event_driver(:, :log%events))
+    else
+      allocate (columns(0))
+    end if
+  end function event_columns
+
+  !> Position and velocity of the driving body.
+  pure function driver_columns(driver) result(columns)
+    real(wp), intent(in) :: driver(:, :)
+    type(motion_column_t), allocatable :: columns(:)
+    allocate (columns(2))
+    call set_column(columns(1), 'driver_x', 'm', 'position of the driving body', driver(1, :))
+    call set_column(columns(2), 'driver_v', 'm/s', 'velocity of the driving body', driver(2, :))
+  end function driver_columns
+
+  !> Position and velocity of every coordinate of a structure; inner ones have a number in the place of a point's name.
+  pure function coordinate_columns(machine, log) result(columns)
+    type(jointed_t), intent(in) :: machine
+    type(log_t), intent(in) :: log
+    type(motion_column_t), allocatable :: columns(:)
+    character(len=:), allocatable :: name, column
+    logical :: inner
+    integer :: i
+    allocate (columns(2*machine%n))
+    do i = 1, machine%n
+      name = trim(machine%names(i))
+      column = replace_all(name, '.', '_')
+      inner = index(name, '.') > 0 .and. verify(name(index(name, '.') + 1:), '0123456789') == 0
+      call set_column(columns(2*i - 1), column//'_x', trim(merge('1', 'm', inner)), &
+                      trim(merge('coordinate', 'position  ', inner))//' of '//name, log%sample_coordinates(i, :log%samples))
+      call set_column(columns(2*i), column//'_v', trim(merge('1/s', 'm/s', inner)), &
+                      trim(merge('rate    ', 'velocity', inner))//' of '//name, &
+                      log%sample_coordinates(machine%n + i, :log%samples))
+    end do
+  end function coordinate_columns
+
+  !> The joint of each event, its coordinate and rates.
+  pure function joint_columns(machine, log) result(columns)
+    type(jointed_t), intent(in) :: machine
+    type(log_t), intent(in) :: log
+    type(motion_column_t), allocatable :: columns(:)
+    character(len=:), allocatable :: names
+    real(wp), allocatable :: joints(:, :)
+    integer :: i, count_joints
+    allocate (columns(0))
+    count_joints = count(machine%joints%kind /= joint_section)
+    if (count_joints == 0) return
+    names = ''
+    do i = 1, count_joints
+      names = names//trim(machine%joints(i)%name)//' '
+    end do
+    allocate (joints(4, log%events))
+    if (log%events > 0) joints = log%event_joint(:, :log%events)
+    deallocate (columns)
+    allocate (columns(4))
+    call set_column(columns(1), 'joint', '1', 'joint', joints(1, :))
+    columns(1)%meanings = trim(names)
+    call set_column(columns(2), 'joint_x', 'm', 'joint coordinate: second body minus first', joints(2, :))
+    call set_column(columns(3), 'joint_v_before', 'm/s', 'its rate just before the event', joints(3, :))
+    call set_column(columns(4), 'joint_v_after', 'm/s', 'its rate just after the event', joints(4, :))
+  end function joint_columns
+
+  pure subroutine set_column(column, name, units, text, values)
+    type(motion_column_t), intent(out) :: column
+    character(len=*), intent(in) :: name, units, text
+    real(wp), intent(in) :: values(:)
+    column%name = name
+    column%units = units
+    column%text = text
+    column%values = values
+    column%meanings = ''
+  end subroutine set_column
+
+end module motion_columns
