@@ -52,17 +52,21 @@ def base(upper: float = 3.0, amplitude: float = 0.1) -> Model:
     return Model.from_text(CASE.format(upper=upper, amplitude=amplitude))
 
 
-def records_of(true: Model, seconds: float = 6.0, rate: float = 100.0) -> list:
+def record_at(true: Model, ratio: float, scale: float, seed: int, seconds: float) -> object:
+    """A record at a drive ratio with so many times the drive."""
+    t = np.arange(int(seconds * 100)) / 100
+    start = np.array([(0.5, 0.6, 0.4)])
+    drive = np.array([ratio, scale * true.parameters["drive.amplitude"].value])
+    paths = ["drive.ratio", "drive.amplitude"]
+    motion = true.segments(paths, drive, start, [0, t.size], t, derivatives=False)
+    x = motion.x + SIGMA * np.random.default_rng(seed).standard_normal(t.size)
+    header = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "drive_scale": scale}
+    return make_record(f"r{seed}", {"t": t, "x": x}, header | {"sensor_noise_sigma_m": SIGMA})
+
+
+def records_of(true: Model, seconds: float = 6.0) -> list:
     """Three records at ratios of their own, the last to be held out."""
-    found = []
-    for seed, ratio in enumerate((0.75, 0.95, 0.85)):
-        t = np.arange(int(seconds * rate)) / rate
-        start = np.array([(0.5, 0.6, 0.4)])
-        motion = true.segments(["drive.ratio"], np.array([ratio]), start, [0, t.size], t, derivatives=False)
-        x = motion.x + SIGMA * np.random.default_rng(seed).standard_normal(t.size)
-        header = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "sensor_noise_sigma_m": SIGMA}
-        found.append(make_record(f"r{seed}", {"t": t, "x": x}, header))
-    return found
+    return [record_at(true, ratio, 1.0, seed, seconds) for seed, ratio in enumerate((0.75, 0.95, 0.85))]
 
 
 def table(knots: str, at: np.ndarray, key: str, values: np.ndarray) -> dict[str, float]:
@@ -180,3 +184,21 @@ def test_three_effects_are_found_one_by_one():
     for path, value in (("quadratic_drag.coefficient", 0.06), ("cubic_spring.stiffness", 12.0)):
         found = verdict["parameters"][f"effect.{path}"]
         assert abs(found["value"] - value) < 4 * found["standard_error"]
+
+
+def test_the_experiment_that_is_asked_for_settles_an_ambiguous_verdict():
+    """Drag too small to be foretold by the records there are; measured as asked, it is named."""
+    without = base()
+    true = without.with_effect("quadratic_drag", {"coefficient": 0.0007})
+    records = records_of(true)
+    options = Options(quick=True, candidates=("quadratic_drag", "stribeck", "coulomb", "cubic_spring"))
+    verdict = discover(without, records[:2], records[2:], options)
+    assert (verdict["outcome"], verdict["effects"]) == ("ambiguous", ["quadratic_drag"])
+    sizes = [one["d_prime"] for one in verdict["experiments"]]
+    assert sizes == sorted(sizes, reverse=True)
+    asked = verdict["experiments"][0]
+    assert asked["text"] in verdict["separating_experiment"]
+    # once to be fitted, once to be held out
+    further = [record_at(true, asked["drive_ratio"], asked["scale"], seed, 12.0) for seed in (5, 6)]
+    verdict = discover(without, [*records[:2], further[0]], [records[2], further[1]], options)
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["quadratic_drag"])

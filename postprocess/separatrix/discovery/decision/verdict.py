@@ -8,8 +8,9 @@ import numpy as np
 
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.decoys import decoys
+from separatrix.discovery.decision.experiments import experiments
 from separatrix.discovery.decision.judge import Judged
-from separatrix.discovery.decision.limits import detectable, equivalents, separating_experiment
+from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
@@ -23,6 +24,9 @@ from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.library import effects
 from separatrix.version import __version__
+
+# experiments that are told
+_EXPERIMENTS = 5
 
 
 @dataclass
@@ -69,7 +73,7 @@ def verdict_of(findings: Findings) -> dict:
         "units": asdict(units_of(findings.base.model.parameters)),
         "detectable": detectable(bench, first),
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
-        "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
+        **_next(findings, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
         "decoys": decoys(first, bench.options),
         "candidates": [_candidate(one) for one in first.judged],
@@ -83,6 +87,20 @@ def verdict_of(findings: Findings) -> dict:
         "held_out_chosen": findings.held_out_chosen,
         "seed": bench.options.seed,
         "version": __version__,
+    }
+
+
+def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
+    """What to measure next where the name is in doubt: known advice, experiments by what they would tell."""
+    if findings.decision.outcome != "ambiguous":
+        return {"separating_experiment": "", "experiments": []}
+    other = rivals[0] if rivals else findings.base
+    names = [" with ".join(one.names) or "the machine without it" for one in (final, other)]
+    found = [one for one in experiments(final, other) if one.d_prime > 1][:_EXPERIMENTS]
+    said = [one for one in (advice(final, rivals), *(one.text(*names) for one in found[:1])) if one]
+    return {
+        "separating_experiment": "; or ".join(said),
+        "experiments": [asdict(one) | {"text": one.text(*names)} for one in found],
     }
 
 

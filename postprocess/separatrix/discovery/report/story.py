@@ -332,7 +332,17 @@ def _detectable(verdict: dict) -> Section:
 
 def _experiment(verdict: dict) -> Section:
     if verdict["separating_experiment"]:
+        rows = [
+            [
+                number(one["drive_ratio"], 3) if one["drive_ratio"] is not None else "-",
+                number(one["scale"], 3),
+                number(one["d_prime"], 3),
+            ]
+            for one in verdict["experiments"]
+        ]
         said = f"To tell apart what remains: {verdict['separating_experiment']}."
+        header = ["drive ratio", "drive (or start) over that of the first record", "standard errors apart"]
+        return Section("next", "What to measure next", [said, *([Table(header, rows)] if rows else [])])
     elif verdict["outcome"] == "ambiguous":
         said = "No experiment with this machine was found that would tell the candidates apart."
     elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
