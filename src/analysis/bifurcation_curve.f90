@@ -10,7 +10,6 @@ module bifurcation_curve
     set_tangent, unknowns
   use kinds, only: wp
   use orbit_margins, only: margin_t, of_gap, of_impact
-  use periodic_orbit, only: states
   implicit none
   private
 
@@ -223,8 +222,8 @@ contains
     ok = sum(abs(value)) + sum(abs(weight)) < huge(1.0_wp)
     if (.not. ok) return
     there = node
-    there%now%orbit%y = matmul(all(:states, :), weight)
-    there%now%orbit%events%time = matmul(all(states + 1:n - 2, :), weight)
+    there%now%orbit%y = matmul(all(:2, :), weight)
+    there%now%orbit%events%time = matmul(all(3:n - 2, :), weight)
     there%now%orbit%parameter = sum(all(n - 1, :)*weight)
     there%now%free = sum(all(n, :)*weight)
     there%now%second = label_of(place%label, which, passed)

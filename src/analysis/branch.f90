@@ -5,18 +5,20 @@
 !> ends of sticking by changing the sequence of events. What happens on the way is located to rounding and labelled; an end has
 !> a name.
 module branch
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: family_t
   use branch_passage, only: change_all, enter_sequence, first_passed, label_of_margin, most_secants, no_passage, &
     note_bifurcations
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use errors, only: error_t
   use kinds, only: wp
+  use machine_family, only: machine_neighbourhood
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
-  use one_body, only: one_body_t, slips_in
+  use one_body, only: slips_in
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, rotate_to_section, &
-    same_sequence, scales_of_orbit, section_points, states
+  use orbit_sections, only: rotate_to_section, section_points
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, same_sequence, &
+    scales_of_orbit
   implicit none
   private
 
@@ -67,7 +69,7 @@ contains
     allocate (points(0))
     ending = label_not_known
     trace%now%orbit = seed
-    call body_neighbourhood(family, seed%parameter, trace%machines, error)
+    call machine_neighbourhood(family, seed%parameter, trace%machines, error)
     if (allocated(error)) return
     call set_point(family, trace, direct(seed, way), ok)
     points = [trace%now]
@@ -91,16 +93,12 @@ contains
     type(orbit_t), intent(in) :: first
     type(trace_t), intent(in) :: before, trace
     real(wp), intent(in) :: parameter_size
-    real(wp) :: points(states, first%periods), step(states + 1), way(states + 1), sizes(states), share
+    real(wp) :: points(size(first%y), first%periods), step(size(first%y) + 1), way(size(first%y) + 1), share
     integer :: k
     back = .false.
     if (.not. same_sequence(first, trace%now%orbit) .or. .not. same_sequence(first, before%now%orbit)) return
-    select type (machine => trace%machines%centre)
-    type is (one_body_t)
-      sizes = machine%size_of
-    end select
     points = section_points(trace%machines, first)
-    associate (now => trace%now%orbit, last => before%now%orbit)
+    associate (now => trace%now%orbit, last => before%now%orbit, sizes => trace%machines%centre%size_of)
       step = [(now%y - last%y)/sizes, (now%parameter - last%parameter)/parameter_size]
       if (.not. norm2(step) > 0) return
       do k = 1, first%periods
@@ -169,14 +167,11 @@ contains
   !> What the second half of an orbit of even period differs by from the first, in natural sizes.
   pure function halves_differ(trace) result(difference)
     type(trace_t), intent(in) :: trace
-    real(wp) :: difference(states)
-    real(wp) :: points(states, trace%now%orbit%periods)
+    real(wp) :: difference(size(trace%now%orbit%y))
+    real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
     points = section_points(trace%machines, trace%now%orbit)
     difference = points(:, 1 + trace%now%orbit%periods/2) - points(:, 1)
-    select type (machine => trace%machines%centre)
-    type is (one_body_t)
-      difference = difference/machine%size_of
-    end select
+    difference = difference/trace%machines%centre%size_of
   end function halves_differ
 
   !> Whether the halves of an orbit have changed places: in between it was one of half the period.
@@ -286,7 +281,7 @@ contains
     call move_along(next%now%orbit, share*trace%now%tangent* &
                     scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
     next%now%orbit%parameter = bound
-    call body_neighbourhood(family, bound, next%machines, error)
+    call machine_neighbourhood(family, bound, next%machines, error)
     if (allocated(error)) return
     call correct_orbit(family, next%machines, next%now%orbit, direct(next%now%orbit, 1), ok)
     if (.not. ok) return
@@ -298,16 +293,13 @@ contains
   !> Whether an orbit is one of a shorter period, run through several times: in the graze of that the branch ends.
   pure logical function is_repeated(trace)
     type(trace_t), intent(in) :: trace
-    real(wp) :: points(states, trace%now%orbit%periods)
+    real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
     integer :: i
     is_repeated = .false.
     points = section_points(trace%machines, trace%now%orbit)
-    select type (machine => trace%machines%centre)
-    type is (one_body_t)
-      do i = 2, trace%now%orbit%periods
-        is_repeated = is_repeated .or. norm2((points(:, i) - points(:, 1))/machine%size_of) < at_graze
-      end do
-    end select
+    do i = 2, trace%now%orbit%periods
+      is_repeated = is_repeated .or. norm2((points(:, i) - points(:, 1))/trace%machines%centre%size_of) < at_graze
+    end do
   end function is_repeated
 
   !> The orbit where a margin is zero: its label, and on with the sequence of events beyond, if there is one.
@@ -337,6 +329,8 @@ contains
       rise_after = beyond%now%orbit%parameter - at%now%orbit%parameter
       if (point%label == label_gr .and. rise_before*rise_after < 0) point%label = label_gr_fold
     end if
+    ! Two events that change places are none, if the motion goes on.
+    if (.not. known .and. point%label == no_label) point%label = label_not_known
     points = [points, point]
     if (.not. known) ending = point%label
     ! Impact after impact is put in as a chatter is approached.

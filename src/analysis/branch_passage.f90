@@ -8,10 +8,14 @@ module branch_passage
   use branch_point, only: label_bp, label_gr, label_gr_fold, label_not_known, label_ns, label_pd, label_sn, label_stick, &
     label_stiction, no_label, point_t, set_point, step_to, trace_t
   use kinds, only: wp
+  use multipliers, only: shifted_determinant
   use one_body, only: one_body_t
-  use orbit_margins, only: margin_t, margins_t, of_gap, of_impact, of_release, of_slip, of_stick, of_turning
+  use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_release, of_slip, of_stick, &
+    of_turning, same_meaning
   use other_sequence, only: change_sequence
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_t, states
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_t
+  use structure, only: structure_t
+  use structure_sequence, only: change_structure_sequence
   implicit none
   private
 
@@ -80,10 +84,7 @@ contains
     value = huge(value)
     do i = 1, size(margins%list)
       associate (one => margins%list(i))
-        if (one%kind /= margin%kind) cycle
-        if (margin%kind == of_gap .and. one%side /= margin%side) cycle
-        if (margin%kind /= of_gap .and. margin%kind /= of_slip .and. one%event /= margin%event) cycle
-        value = one%value
+        if (same_meaning(one, margin)) value = one%value
       end associate
     end do
   end function value_like
@@ -149,7 +150,8 @@ contains
     time = margin%time
     do i = 1, size(margins%list)
       associate (one => margins%list(i))
-        if (one%kind == margin%kind .and. one%side == margin%side .and. one%event == margin%event) time = one%time
+        if (one%kind == margin%kind .and. one%side == margin%side .and. one%event == margin%event .and. &
+            one%joint == margin%joint .and. one%guard == margin%guard) time = one%time
       end associate
     end do
   end function time_like
@@ -189,7 +191,7 @@ contains
     case (label_sn, label_bp)
       genuine = minval(abs(orbit%multipliers - 1)) < 1e-5_wp
     case (label_ns)
-      genuine = abs(aimag(orbit%multipliers(1))) > 0 .and. abs(abs(orbit%multipliers(1)) - 1) < 1e-5_wp
+      genuine = any(abs(aimag(orbit%multipliers)) > 0 .and. abs(abs(orbit%multipliers) - 1) < 1e-5_wp)
     case default
       genuine = .true.
     end select
@@ -200,6 +202,10 @@ contains
     integer, intent(in) :: label
     type(trace_t), intent(in) :: trace
     associate (m => trace%now%orbit%matrix)
+      if (size(m, 1) > 2) then
+        value = test_of_many(label, trace)
+        return
+      end if
       associate (trace_of => m(1, 1) + m(2, 2), determinant => m(1, 1)*m(2, 2) - m(1, 2)*m(2, 1))
         select case (label)
         case (label_sn)
@@ -215,16 +221,44 @@ contains
     end associate
   end function test_value
 
+  !> The same for more than two coordinates: NS where the product of two multipliers passes 1.
+  pure real(wp) function test_of_many(label, trace) result(value)
+    integer, intent(in) :: label
+    type(trace_t), intent(in) :: trace
+    complex(wp) :: all_pairs
+    integer :: i, k
+    associate (orbit => trace%now%orbit)
+      select case (label)
+      case (label_sn)
+        value = trace%now%tangent(size(trace%now%tangent))
+      case (label_pd)
+        value = shifted_determinant(orbit%matrix, 1.0_wp)
+      case (label_ns)
+        all_pairs = 1
+        do i = 2, size(orbit%multipliers)
+          do k = 1, i - 1
+            all_pairs = all_pairs*(orbit%multipliers(i)*orbit%multipliers(k) - 1)
+          end do
+        end do
+        value = real(all_pairs, wp)
+      case default
+        value = shifted_determinant(orbit%matrix, -1.0_wp)
+      end select
+    end associate
+  end function test_of_many
+
   !> Label of the place where a margin is zero.
   pure integer function label_of_margin(margin) result(label)
     type(margin_t), intent(in) :: margin
     select case (margin%kind)
     case (of_impact, of_gap)
       label = label_gr
-    case (of_turning, of_stick, of_slip)
+    case (of_turning, of_stick, of_slip, of_hold)
       label = label_stick
     case (of_release)
       label = label_stiction
+    case (of_order)
+      label = no_label
     case default
       label = label_not_known
     end select
@@ -248,7 +282,7 @@ contains
         place(i) = one%event
         ! After an event that comes with its number turned round.
         if (one%event < 0) place(i) = -one%event - 0.5_wp
-        if (one%kind == of_slip) place(i) = one%event + 0.5_wp
+        if (one%kind == of_slip .and. one%event >= 0) place(i) = one%event + 0.5_wp
       end associate
     end do
     if (all(place < 0)) known = .false.
@@ -260,6 +294,8 @@ contains
       select type (machine => at%machines%centre)
       type is (one_body_t)
         call change_sequence(machine, before, at%margins%list(i), changed, known)
+      type is (structure_t)
+        call change_structure_sequence(machine, before, at%margins%list(i), changed, known)
       end select
     end do
   end subroutine change_all
@@ -272,7 +308,7 @@ contains
     type(trace_t), intent(inout) :: beyond
     logical, intent(out) :: ok
     type(trace_t) :: start, there
-    real(wp) :: look, along(states + size(beyond%now%orbit%events) + 1)
+    real(wp) :: look, along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
     integer :: way, tries, steps
     start%machines = at%machines
     start%now%orbit = beyond%now%orbit

@@ -3,12 +3,15 @@
 
 !> Points of a branch of periodic orbits: their labels, what belongs to each, and the step from one to the next.
 module branch_point
-  use body_family, only: body_neighbourhood, body_of_family, family_t
+  use body_family, only: family_t
   use errors, only: error_t
+  use hybrid_machine, only: hybrid_t
   use kinds, only: wp
-  use one_body, only: one_body_t
+  use machine_family, only: machine_neighbourhood, machine_of_family, section_sizes
   use orbit_margins, only: margins_of, margins_t
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
+  use structure, only: structure_t
+  use structure_margins, only: margins_of_structure
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -59,7 +62,7 @@ module branch_point
 
 contains
 
-  !> Whether both multipliers are within the unit circle.
+  !> Whether all multipliers are within the unit circle.
   pure logical function is_stable(orbit)
     type(orbit_t), intent(in) :: orbit
     is_stable = maxval(abs(orbit%multipliers)) < 1
@@ -71,17 +74,17 @@ contains
     type(plan_t), intent(in) :: plan
     type(family_t), intent(inout) :: family
     type(error_t), allocatable, intent(out) :: error
-    type(one_body_t) :: body
+    class(hybrid_t), allocatable :: machine
     real(wp) :: sizes(2)
     family%parameter_size = plan%highest - plan%lowest
     family%sizes = 0
     sizes = 0
-    call body_of_family(family, plan%lowest, body, error)
+    call machine_of_family(family, plan%lowest, machine, error)
     if (allocated(error)) return
-    sizes = body%size_of
-    call body_of_family(family, plan%highest, body, error)
+    sizes = section_sizes(machine)
+    call machine_of_family(family, plan%highest, machine, error)
     if (allocated(error)) return
-    family%sizes = max(sizes, body%size_of)
+    family%sizes = max(sizes, section_sizes(machine))
   end subroutine set_sizes
 
   !> Tangent, margins and extremes of the orbit where the trace is.
@@ -93,7 +96,12 @@ contains
     if (allocated(trace%now%tangent)) deallocate (trace%now%tangent)
     allocate (trace%now%tangent(size(along)), source=0.0_wp)
     call tangent_of(trace%machines, trace%now%orbit, family%parameter_size, along, trace%now%tangent, ok)
-    trace%margins = margins_of(trace%machines%centre, trace%now%orbit)
+    select type (machine => trace%machines%centre)
+    type is (structure_t)
+      trace%margins = margins_of_structure(machine, trace%now%orbit)
+    class default
+      trace%margins = margins_of(trace%machines%centre, trace%now%orbit)
+    end select
     trace%now%x_max = trace%margins%x_max
     trace%now%x_min = trace%margins%x_min
   end subroutine set_point
@@ -113,7 +121,7 @@ contains
     way = length*trace%now%tangent
     if (allocated(trace%bend)) way = way + length**2/2*trace%bend
     call move_along(next%now%orbit, way*scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
-    call body_neighbourhood(family, next%now%orbit%parameter, next%machines, error)
+    call machine_neighbourhood(family, next%now%orbit%parameter, next%machines, error)
     ok = .not. allocated(error)
     if (ok) call correct_orbit(family, next%machines, next%now%orbit, trace%now%tangent, ok, steps)
     if (ok) call set_point(family, next, trace%now%tangent, ok)

@@ -5,15 +5,17 @@
 !> yet is followed, and so is what bifurcates where a period doubles. What is found depends on the seeds; nothing says that it is
 !> all.
 module branch_search
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: family_t
   use branch, only: trace_branch
   use branch_point, only: branch_t, label_pd, plan_t, point_t, set_sizes
   use errors, only: error_t
   use kinds, only: wp
-  use one_body, only: one_body_t
+  use hybrid_machine, only: hybrid_t
+  use machine_family, only: machine_neighbourhood, machine_of_family, watched_rows
+  use matrices, only: solve
   use orbit_search, only: find_orbits, found_t
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_sequence, &
-    section_points, states
+  use orbit_sections, only: section_points
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_sequence
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -39,6 +41,9 @@ module branch_search
     integer :: most_branches = 60
     integer :: seeds = 0
     type(branch_t), allocatable :: branches(:)
+    !> Rows that give place and speed of what is watched from a section point; whether the section is a time of the drive.
+    real(wp), allocatable :: watch(:, :)
+    logical :: has_clock = .true.
   end type search_t
 
 contains
@@ -49,8 +54,13 @@ contains
     integer, intent(in) :: values
     type(error_t), allocatable, intent(out) :: error
     integer :: i
+    class(hybrid_t), allocatable :: machine
     call set_sizes(search%plan, search%family, error)
     if (allocated(error)) return
+    call machine_of_family(search%family, (search%plan%lowest + search%plan%highest)/2, machine, error)
+    if (allocated(error)) return
+    search%watch = watched_rows(machine)
+    search%has_clock = machine%has_clock
     associate (low => search%plan%lowest, high => search%plan%highest)
       search%values = [(low + (high - low)*(i - 0.5_wp)/values, i=1, values)]
     end associate
@@ -64,7 +74,7 @@ contains
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
     allocate (search%found(i)%orbits(0))
-    call body_neighbourhood(search%family, search%values(i), machines, error)
+    call machine_neighbourhood(search%family, search%values(i), machines, error)
     if (allocated(error)) return
     call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i))
   end subroutine search_value
@@ -96,21 +106,18 @@ contains
     type(orbit_t), intent(in) :: orbit
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
-    real(wp) :: points(states, orbit%periods)
+    real(wp) :: points(size(orbit%y), orbit%periods)
     integer :: j, k
     known = .false.
-    call body_neighbourhood(search%family, search%values(i), machines, error)
+    call machine_neighbourhood(search%family, search%values(i), machines, error)
     if (allocated(error)) return
     points = section_points(machines, orbit)
-    select type (body => machines%centre)
-    type is (one_body_t)
-      do j = 1, size(search%found(i)%orbits)
-        if (search%found(i)%orbits(j)%periods /= orbit%periods) cycle
-        do k = 1, orbit%periods
-          known = known .or. norm2((points(:, k) - search%found(i)%orbits(j)%y)/body%size_of) < 1e-6_wp
-        end do
+    do j = 1, size(search%found(i)%orbits)
+      if (search%found(i)%orbits(j)%periods /= orbit%periods) cycle
+      do k = 1, orbit%periods
+        known = known .or. norm2((points(:, k) - search%found(i)%orbits(j)%y)/machines%centre%size_of) < 1e-6_wp
       end do
-    end select
+    end do
   end function is_known
 
   !> Follows one orbit, notes where its branch passes the values of the search, and follows what doubles.
@@ -186,7 +193,7 @@ contains
           orbit = one
           if (abs(next%parameter - value) < abs(one%parameter - value)) orbit = next
           orbit%parameter = value
-          call body_neighbourhood(search%family, value, machines, error)
+          call machine_neighbourhood(search%family, value, machines, error)
           if (allocated(error)) cycle
           call correct_orbit(search%family, machines, orbit, direct(orbit, 1), ok)
           if (ok) search%found(k)%orbits = [search%found(k)%orbits, orbit]
@@ -203,11 +210,11 @@ contains
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
     type(orbit_t) :: there
-    real(wp) :: points(states, orbit%periods)
+    real(wp) :: points(size(orbit%y), orbit%periods)
     integer :: b, i, k
     logical :: ok
     known = .false.
-    call body_neighbourhood(search%family, orbit%parameter, machines, error)
+    call machine_neighbourhood(search%family, orbit%parameter, machines, error)
     if (allocated(error)) return
     points = section_points(machines, orbit)
     do b = 1, size(search%branches)
@@ -220,12 +227,9 @@ contains
           there%parameter = orbit%parameter
           call correct_orbit(search%family, machines, there, direct(there, 1), ok)
           if (.not. ok) cycle
-          select type (body => machines%centre)
-          type is (one_body_t)
-            do k = 1, orbit%periods
-              known = known .or. norm2((points(:, k) - there%y)/body%size_of) < 1e-6_wp
-            end do
-          end select
+          do k = 1, orbit%periods
+            known = known .or. norm2((points(:, k) - there%y)/machines%centre%size_of) < 1e-6_wp
+          end do
           if (known) return
         end do
       end associate
@@ -240,28 +244,19 @@ contains
     logical, intent(out) :: ok
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
-    real(wp) :: along(states), sizes(states)
-    real(wp), allocatable :: direction(:)
+    real(wp), allocatable :: along(:), sizes(:), direction(:)
     integer :: side
     ok = .false.
-    call body_neighbourhood(search%family, orbit%parameter, machines, error)
+    call machine_neighbourhood(search%family, orbit%parameter, machines, error)
     if (allocated(error)) return
-    select type (body => machines%centre)
-    type is (one_body_t)
-      sizes = body%size_of
-    end select
-    ! (M + 1) e = 0: e is across the larger row of M + 1.
-    associate (m => orbit%matrix)
-      along = [-m(1, 2), m(1, 1) + 1]
-      if (abs(m(2, 2) + 1) + abs(m(2, 1)) > abs(m(1, 1) + 1) + abs(m(1, 2))) along = [m(2, 2) + 1, -m(2, 1)]
-    end associate
-    along = along/sizes
+    sizes = machines%centre%size_of
+    along = doubling_direction(orbit%matrix)/sizes
     along = along/norm2(along)
     do side = 1, -1, -2
       call orbit_of_motion(machines, orbit%parameter, orbit%y + side*doubled_at*along*sizes, 2*orbit%periods, doubled, ok)
       if (.not. ok) cycle
-      allocate (direction(states + size(doubled%events) + 1), source=0.0_wp)
-      direction(:states) = along
+      allocate (direction(size(along) + size(doubled%events) + 1), source=0.0_wp)
+      direction(:size(along)) = along
       call correct_orbit(search%family, machines, doubled, direction, ok)
       deallocate (direction)
       if (ok) ok = is_admissible(machines, doubled)
@@ -269,5 +264,28 @@ contains
       if (ok) return
     end do
   end subroutine double
+
+  !> The direction e of (M + 1) e = 0: of two coordinates across the larger row of M + 1, of more by inverse iteration.
+  pure function doubling_direction(m) result(along)
+    real(wp), intent(in) :: m(:, :)
+    real(wp) :: along(size(m, 1)), shifted(size(m, 1), size(m, 1)), next(size(m, 1))
+    logical :: ok
+    integer :: i
+    if (size(m, 1) == 2) then
+      along = [-m(1, 2), m(1, 1) + 1]
+      if (abs(m(2, 2) + 1) + abs(m(2, 1)) > abs(m(1, 1) + 1) + abs(m(1, 2))) along = [m(2, 2) + 1, -m(2, 1)]
+      return
+    end if
+    shifted = m
+    do i = 1, size(along)
+      shifted(i, i) = shifted(i, i) + 1
+      along(i) = 1/(1 + 0.3_wp*i)
+    end do
+    do i = 1, 3
+      call solve(shifted, along, next, ok)
+      if (.not. ok) return
+      along = next/norm2(next)
+    end do
+  end function doubling_direction
 
 end module branch_search

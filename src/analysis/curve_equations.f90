@@ -12,7 +12,7 @@ module curve_equations
   use matrices, only: eigenvalues, solve
   use one_body, only: one_body_t
   use orbit_margins, only: margin_t, margins_of, margins_t, of_gap, of_impact, of_order, of_release, of_slip
-  use periodic_orbit, only: move_along, orbit_t, shoot, states
+  use periodic_orbit, only: move_along, orbit_t, shoot
   use variations, only: neighbourhood_t, vary
   implicit none
   private
@@ -20,6 +20,8 @@ module curve_equations
   public :: choose_monitor, unknowns, correct, set_tangent, move, looked_at, beside_like
 
   integer, parameter :: most_newton = 15
+  !> Coordinates of one body.
+  integer, parameter :: states = 2
   !> Steps of the differences and of Newton's method at the end, in natural sizes.
   real(wp), parameter :: difference = 1e-5_wp, converged_step = 1e-10_wp
   !> A margin within this of zero at a labelled point is what is zero there.

@@ -9,17 +9,21 @@ module orbit_margins
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point
   use one_body, only: direction_in, one_body_t, rests_on_barrier, slips_in, turns_smoothly
-  use periodic_orbit, only: orbit_t, states
+  use periodic_orbit, only: orbit_t
   implicit none
   private
 
-  public :: margins_of, is_impact
+  public :: margins_of, is_impact, is_between, same_meaning
+
+  !> Coordinates of one body.
+  integer, parameter :: states = 2
 
   !> What a margin is of: the speed of an impact or of a touch; the distance to a barrier that is missed; the excess of the
   !> force at a turning point over what would hold the body; the reserve of friction at the beginning of a stick; the rate at
-  !> which the force reaches break-away; the speed in a slip; the time between two events.
+  !> which the force reaches break-away; the speed in a slip; the time between two events; the reserve of friction while a joint
+  !> sticks; the force while a contact is closed.
   integer, parameter, public :: of_impact = 1, of_gap = 2, of_turning = 3, of_stick = 4, of_release = 5, of_slip = 6, &
-    of_order = 7
+    of_order = 7, of_hold = 8, of_press = 9
   !> Looks along a flight, per period of the section.
   integer, parameter :: looks = 96
   integer, parameter :: most_secants = 60
@@ -31,6 +35,8 @@ module orbit_margins
     integer :: event = 0, side = 0
     !> Instant [s].
     real(wp) :: time = 0
+    !> Of a structure: the joint, and its guard.
+    integer :: joint = 0, guard = 0
   end type margin_t
 
   !> The margins of an orbit: one per event and kind, then the smallest gaps above and below and the slowest slip. Extremes of x.
@@ -45,6 +51,20 @@ contains
     integer, intent(in) :: kind
     is_impact = kind == event_impact_upper .or. kind == event_impact_lower
   end function is_impact
+
+  !> Whether a margin is of what does not happen, within a flight.
+  pure elemental logical function is_between(margin)
+    type(margin_t), intent(in) :: margin
+    is_between = any(margin%kind == [of_gap, of_slip, of_hold, of_press])
+  end function is_between
+
+  !> Whether a margin of one orbit means what that of another means.
+  pure logical function same_meaning(one, other) result(same)
+    type(margin_t), intent(in) :: one, other
+    same = one%kind == other%kind .and. one%joint == other%joint .and. one%guard == other%guard
+    if (one%kind == of_gap) same = same .and. one%side == other%side
+    if (.not. is_between(one)) same = same .and. one%event == other%event
+  end function same_meaning
 
   !> The margins of an orbit whose events have their states; all in natural units.
   pure function margins_of(machine, orbit) result(margins)

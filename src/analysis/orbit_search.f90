@@ -4,15 +4,15 @@
 !> Periodic orbits at one value of the parameter, stable and unstable: Newton's method on the map with its exact derivative, from
 !> starts as they are, and from where the motions from them have settled.
 module orbit_search
-  use body_family, only: family_t, fly_periods, map_with_variation
-  use circle, only: point_near
+  use body_family, only: family_t
   use hybrid_machine, only: event_t
   use kinds, only: wp
+  use machine_family, only: fly_sections, map_with_variation, nearest_copy, within_stops
   use matrices, only: solve
   use motion_state, only: tally_t
-  use one_body, only: one_body_t
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, &
-    section_points, states
+  use multipliers, only: shifted_determinant
+  use orbit_sections, only: section_points
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -45,7 +45,7 @@ contains
     real(wp), intent(in) :: value, starts(:, :)
     integer, intent(in) :: longest
     type(found_t), intent(inout) :: found
-    real(wp) :: settled(states)
+    real(wp) :: settled(size(starts, 1))
     integer :: i, n
     if (.not. allocated(found%orbits)) allocate (found%orbits(0))
     do i = 1, size(starts, 2)
@@ -63,7 +63,7 @@ contains
   !> Whether a section point is one of a known orbit.
   logical function is_found(machines, point, periods, found)
     type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: point(states)
+    real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
     type(found_t), intent(in) :: found
     real(wp), allocatable :: points(:, :)
@@ -81,11 +81,11 @@ contains
   !> Where a motion is after many periods, and after how many it is back there (0: it is not).
   subroutine settle(machines, start, longest, settled, periods)
     type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: start(states)
+    real(wp), intent(in) :: start(:)
     integer, intent(in) :: longest
-    real(wp), intent(out) :: settled(states)
+    real(wp), intent(out) :: settled(:)
     integer, intent(out) :: periods
-    real(wp) :: image(states), next(states), then(states)
+    real(wp), dimension(size(start)) :: image, next, then
     logical :: ok
     integer :: i
     periods = 0
@@ -113,61 +113,48 @@ contains
   !> Image of a section point.
   subroutine image_of(machines, point, image, ok)
     type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: point(states)
-    real(wp), intent(out) :: image(states)
+    real(wp), intent(in) :: point(:)
+    real(wp), intent(out) :: image(:)
     logical, intent(out) :: ok
     type(event_t), allocatable :: events(:)
     type(tally_t) :: tally
     integer :: mode
-    ok = .false.
-    select type (body => machines%centre)
-    type is (one_body_t)
-      call fly_periods(body, point, 1, .false., image, events, mode, tally, ok)
-      ok = ok .and. all(abs(image) < huge(1.0_wp))
-    end select
+    call fly_sections(machines%centre, point, 1, .false., image, events, mode, tally, ok)
+    ok = ok .and. all(abs(image) < huge(1.0_wp))
   end subroutine image_of
 
   !> Distance of two section points in natural sizes; an angle is on a circle.
   pure real(wp) function distance(machines, one, other)
     type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: one(states), other(states)
-    distance = huge(distance)
-    select type (body => machines%centre)
-    type is (one_body_t)
-      distance = norm2((point_near(one, other, body%moving%machine%turn) - other)/body%size_of)
-    end select
+    real(wp), intent(in) :: one(:), other(:)
+    distance = norm2((nearest_copy(machines%centre, one, other) - other)/machines%centre%size_of)
   end function distance
 
   !> Newton's method on the map over `periods`, each step with the events of the motion then; what it comes to is added.
   subroutine try_newton(family, machines, value, start, periods, found)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(inout) :: machines
-    real(wp), intent(in) :: value, start(states)
+    real(wp), intent(in) :: value, start(:)
     integer, intent(in) :: periods
     type(found_t), intent(inout) :: found
-    real(wp) :: point(states), image(states), slopes(states, states), step(states), sizes(states)
+    real(wp), dimension(size(start)) :: point, image, step, sizes
+    real(wp) :: slopes(size(start), size(start))
     type(tally_t) :: tally
     logical :: ok
     integer :: i, k
     point = start
-    select type (body => machines%centre)
-    type is (one_body_t)
-      sizes = body%size_of
-    end select
+    sizes = machines%centre%size_of
     do i = 1, most_newton
       call map_with_variation(machines, point, periods, image, slopes, tally, ok)
       if (.not. ok) return
-      do k = 1, states
+      do k = 1, size(start)
         slopes(k, k) = slopes(k, k) - 1
       end do
       call solve(slopes, point - image, step, ok)
       if (.not. ok) return
       if (norm2(step/sizes) > 0.3_wp) step = 0.3_wp*step/norm2(step/sizes)
       point = point + step
-      select type (body => machines%centre)
-      type is (one_body_t)
-        point(1) = max(min(point(1), body%moving%machine%contact%upper), body%moving%machine%contact%lower)
-      end select
+      point = within_stops(machines%centre, point)
       if (norm2(step/sizes) < 1e-8_wp) exit
     end do
     if (norm2(step/sizes) < 1e-6_wp) call add_orbit(family, machines, value, point, periods, found)
@@ -177,7 +164,7 @@ contains
   subroutine add_orbit(family, machines, value, point, periods, found, added)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(inout) :: machines
-    real(wp), intent(in) :: value, point(states)
+    real(wp), intent(in) :: value, point(:)
     integer, intent(in) :: periods
     type(found_t), intent(inout) :: found
     logical, intent(out), optional :: added
@@ -189,12 +176,10 @@ contains
     call orbit_of_motion(machines, value, point, periods, orbit, ok)
     if (ok) call correct_orbit(family, machines, orbit, direct(orbit, 1), ok)
     if (.not. ok) return
-    associate (m => orbit%matrix)
-      if (abs((m(1, 1) - 1)*(m(2, 2) - 1) - m(1, 2)*m(2, 1)) < neutral) then
-        found%families = found%families + 1
-        return
-      end if
-    end associate
+    if (abs(shifted_determinant(orbit%matrix, -1.0_wp)) < neutral) then
+      found%families = found%families + 1
+      return
+    end if
     if (.not. is_admissible(machines, orbit)) return
     points = section_points(machines, orbit)
     do i = 2, periods

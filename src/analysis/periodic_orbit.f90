@@ -1,26 +1,29 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Periodic orbits with a given sequence of events, stable or not, of one body over a parameter. Unknowns are the state on the
+!> Periodic orbits with a given sequence of events, stable or not, of a machine over a parameter. Unknowns are the state on the
 !> section, the instants of the events, and the parameter; equations are the guards at those instants, the return to the
 !> section, and one linear condition. All are smooth functions, also where an impact becomes a graze or an instant passes
 !> another, so that an orbit can be followed up to and beyond the end of its event sequence.
 module periodic_orbit
-  use body_family, only: body_neighbourhood, family_t, fly_periods
+  use body_family, only: family_t
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use matrices, only: eigenvalues, solve
+  use machine_family, only: fly_sections, machine_neighbourhood
+  use matrices, only: solve
+  use multipliers, only: multipliers_of
   use motion_state, only: tally_t
-  use one_body, only: one_body_t, rests_on_barrier
+  use one_body, only: rests_on_barrier
+  use structure, only: structure_t
+  use structure_family, only: vary_section
   use variations, only: by_difference, neighbourhood_t, vary
   implicit none
   private
 
-  public :: orbit_of_motion, correct_orbit, tangent_of, direct, same_sequence, is_admissible, rotate_to_section, scales_of_orbit, &
-    move_along, section_points, shoot
+  public :: orbit_of_motion, correct_orbit, tangent_of, direct, same_sequence, is_admissible, scales_of_orbit, move_along, shoot, &
+    closing_time
 
-  integer, parameter, public :: states = 2
   !> Orbits with more events are not followed.
   integer, parameter, public :: most_events = 60
   integer, parameter :: most_newton = 12
@@ -34,11 +37,12 @@ module periodic_orbit
     integer :: periods = 1
     !> Mode at the section.
     integer :: mode = 0
-    real(wp) :: parameter = 0, y(states) = 0
+    real(wp) :: parameter = 0
+    real(wp), allocatable :: y(:)
     type(event_t), allocatable :: events(:)
     !> Of the map over the period of the orbit.
-    complex(wp) :: multipliers(states) = 0
-    real(wp) :: matrix(states, states) = 0
+    complex(wp), allocatable :: multipliers(:)
+    real(wp), allocatable :: matrix(:, :)
   end type orbit_t
 
 contains
@@ -46,21 +50,20 @@ contains
   !> The orbit near which a motion that starts at `y` on the section is for `periods` drive periods, not yet corrected.
   subroutine orbit_of_motion(machines, parameter, y, periods, orbit, ok)
     type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: parameter, y(states)
+    real(wp), intent(in) :: parameter, y(:)
     integer, intent(in) :: periods
     type(orbit_t), intent(out) :: orbit
     logical, intent(out) :: ok
     type(tally_t) :: tally
-    real(wp) :: image(states)
+    integer :: i
+    real(wp) :: image(size(y))
     orbit%periods = periods
     orbit%parameter = parameter
     orbit%y = y
-    ok = .false.
-    select type (body => machines%centre)
-    type is (one_body_t)
-      call fly_periods(body, y, periods, .true., image, orbit%events, orbit%mode, tally, ok)
-      if (ok) ok = size(orbit%events) <= most_events
-    end select
+    orbit%multipliers = [(cmplx(0.0_wp, 0.0_wp, wp), i=1, size(y))]
+    allocate (orbit%matrix(size(y), size(y)), source=0.0_wp)
+    call fly_sections(machines%centre, y, periods, .true., image, orbit%events, orbit%mode, tally, ok)
+    if (ok) ok = size(orbit%events) <= most_events
   end subroutine orbit_of_motion
 
   !> Natural sizes of the unknowns: state, instants, parameter.
@@ -68,15 +71,19 @@ contains
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(in) :: orbit
     real(wp), intent(in) :: parameter_size
-    real(wp) :: scales(states + size(orbit%events) + 1)
-    scales = 1
-    select type (body => machines%centre)
-    type is (one_body_t)
-      scales(:states) = body%size_of
-      scales(states + 1:) = body%size_of(1)/body%size_of(2)
-    end select
+    real(wp) :: scales(size(orbit%y) + size(orbit%events) + 1)
+    scales(:size(orbit%y)) = machines%centre%size_of
+    scales(size(orbit%y) + 1:) = machines%centre%size_of_time()
     scales(size(scales)) = parameter_size
   end function scales_of_orbit
+
+  !> Time at which an orbit closes [s]: without a clock that of its last event, the section, which is unknown.
+  pure real(wp) function closing_time(machine, orbit) result(time)
+    class(hybrid_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    time = orbit%periods*machine%period
+    if (.not. machine%has_clock .and. size(orbit%events) > 0) time = orbit%events(size(orbit%events))%time
+  end function closing_time
 
   !> What does not fit in the guesses: guards at the instants, then the miss of the return; with the derivatives by state and
   !> instants. The events of `orbit` are given the states before and after them.
@@ -84,9 +91,11 @@ contains
     class(hybrid_t), intent(in) :: machine
     type(orbit_t), intent(inout) :: orbit
     real(wp), intent(out) :: miss(:), slopes(:, :)
-    real(wp), dimension(states) :: y, arrived, by_state, by_time
-    real(wp) :: change(states, states + size(orbit%events)), flight(states, states), jump(states, states), t, guard_rate
-    integer :: k, m, mode
+    real(wp), dimension(size(orbit%y)) :: y, arrived, by_state, by_time
+    real(wp), dimension(size(orbit%y), size(orbit%y)) :: flight, jump
+    real(wp) :: change(size(orbit%y), size(orbit%y) + size(orbit%events)), t, guard_rate
+    integer :: k, m, mode, states
+    states = size(orbit%y)
     m = size(orbit%events)
     y = orbit%y
     mode = orbit%mode
@@ -113,9 +122,9 @@ contains
         mode = event%after
       end associate
     end do
-    call machine%fly(mode, t, y, orbit%periods*machine%period, arrived, flight)
+    call machine%fly(mode, t, y, closing_time(machine, orbit), arrived, flight)
     change = matmul(flight, change)
-    if (m > 0) change(:, states + m) = change(:, states + m) - matmul(flight, machine%slope(mode, t, y))
+    if (m > 0 .and. machine%has_clock) change(:, states + m) = change(:, states + m) - matmul(flight, machine%slope(mode, t, y))
     miss(m + 1:) = arrived - orbit%y
     slopes(m + 1:, :) = change
     do k = 1, states
@@ -128,8 +137,8 @@ contains
     class(hybrid_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
     real(wp), intent(out) :: miss(:)
-    real(wp), dimension(states) :: y, arrived, by_state, by_time
-    real(wp) :: jump(states, states), t, guard_rate
+    real(wp), dimension(size(orbit%y)) :: y, arrived, by_state, by_time
+    real(wp) :: jump(size(orbit%y), size(orbit%y)), t, guard_rate
     integer :: k, m, mode
     m = size(orbit%events)
     mode = orbit%mode
@@ -144,7 +153,7 @@ contains
         mode = event%after
       end associate
     end do
-    call machine%fly(mode, t, y, orbit%periods*machine%period, arrived)
+    call machine%fly(mode, t, y, closing_time(machine, orbit), arrived)
     miss(m + 1:) = arrived - orbit%y
   end subroutine shoot_only
 
@@ -203,13 +212,13 @@ contains
       before = length
       length = norm2(step)
       call move_along(orbit, scales*step)
-      if (abs(step(n)) > 0) call body_neighbourhood(family, orbit%parameter, machines, error)
+      if (abs(step(n)) > 0) call machine_neighbourhood(family, orbit%parameter, machines, error)
       ok = .not. allocated(error)
       if (.not. ok) return
       ! It has come as near as rounding lets it.
       if (length < 1e-14_wp .or. (length < converged_step .and. length >= 0.1_wp*before)) exit
-      ! Or what the next step would be is nil, the steps shrinking with the square.
-      ok = length < 1e-7_wp .and. length*(length/before)**2 < 1e-17_wp
+      ! Or what the next step would be is nil, the steps shrinking with the square; of several bodies near a graze they do not yet.
+      ok = size(orbit%y) == 2 .and. length < 1e-7_wp .and. length*(length/before)**2 < 1e-17_wp
       if (ok) exit
     end do
     ok = ok .or. length < converged_step
@@ -222,7 +231,8 @@ contains
   pure subroutine move_along(orbit, change)
     type(orbit_t), intent(inout) :: orbit
     real(wp), intent(in) :: change(:)
-    integer :: m
+    integer :: m, states
+    states = size(orbit%y)
     m = size(orbit%events)
     orbit%y = orbit%y + change(:states)
     orbit%events%time = orbit%events%time + change(states + 1:states + m)
@@ -233,7 +243,7 @@ contains
   pure subroutine clean_rest(machines, orbit)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
-    real(wp) :: y(states)
+    real(wp) :: y(size(orbit%y))
     if (.not. rests_on_barrier(orbit%mode)) return
     call machines%centre%fly(orbit%mode, 0.0_wp, orbit%y, 0.0_wp, y)
     orbit%y = y
@@ -243,13 +253,20 @@ contains
   pure subroutine set_multipliers(machines, orbit)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
-    real(wp) :: miss(states + size(orbit%events)), slopes(states + size(orbit%events), states + size(orbit%events))
+    real(wp) :: miss(size(orbit%y) + size(orbit%events)), slopes(size(miss), size(miss))
+    real(wp), dimension(size(orbit%y)) :: unbounded, y
     logical :: ok
+    unbounded = huge(1.0_wp)
     call shoot(machines%centre, orbit, miss, slopes)
-    call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, [huge(1.0_wp), huge(1.0_wp)], &
-              orbit%matrix, ok)
+    select type (structure => machines%centre)
+    type is (structure_t)
+      y = orbit%y
+      call vary_section(machines, structure, orbit%mode, orbit%y, orbit%events, orbit%periods, y, orbit%matrix, ok)
+    class default
+      call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, unbounded, orbit%matrix, ok)
+    end select
     if (.not. ok) orbit%matrix = sqrt(huge(1.0_wp))
-    orbit%multipliers = eigenvalues(orbit%matrix)
+    orbit%multipliers = multipliers_of(orbit%matrix)
   end subroutine set_multipliers
 
   !> Direction in which the orbits go on, a unit vector in natural sizes, on the side of `along`.
@@ -274,7 +291,7 @@ contains
   pure function direct(orbit, way) result(along)
     type(orbit_t), intent(in) :: orbit
     integer, intent(in) :: way
-    real(wp) :: along(states + size(orbit%events) + 1)
+    real(wp) :: along(size(orbit%y) + size(orbit%events) + 1)
     along = 0
     along(size(along)) = way
   end function direct
@@ -283,7 +300,8 @@ contains
   pure logical function same_sequence(one, other) result(same)
     type(orbit_t), intent(in) :: one, other
     same = one%periods == other%periods .and. size(one%events) == size(other%events)
-    if (same) same = all(one%events%kind == other%events%kind) .and. all(one%events%side == other%events%side)
+    if (same) same = all(one%events%kind == other%events%kind) .and. all(one%events%side == other%events%side) .and. &
+      all(one%events%joint == other%events%joint) .and. all(one%events%guard == other%events%guard)
   end function same_sequence
 
   !> Whether the motion that starts at the orbit's section point really has its events at its instants.
@@ -298,65 +316,5 @@ contains
     allowed = likeness*machines%centre%period*max(1.0_wp, abs(orbit%multipliers(1))*1e-3_wp)
     is_admissible = all(abs(motion%events%time - orbit%events%time) <= allowed)
   end function is_admissible
-
-  !> Where an instant has passed the section, the orbit is begun anew so that all instants lie within its period. `turned` tells
-  !> whether it was.
-  pure subroutine rotate_to_section(machines, orbit, turned)
-    type(neighbourhood_t), intent(in) :: machines
-    type(orbit_t), intent(inout) :: orbit
-    logical, intent(out) :: turned
-    type(event_t) :: moved
-    real(wp) :: span, y(states), from(states)
-    integer :: m
-    turned = .false.
-    m = size(orbit%events)
-    if (m == 0) return
-    span = orbit%periods*machines%centre%period
-    if (orbit%events(1)%time < 0) then
-      moved = orbit%events(1)
-      call machines%centre%fly(moved%after, moved%time, moved%departure(:states), 0.0_wp, y)
-      orbit%mode = moved%after
-      moved%time = moved%time + span
-      orbit%events = [orbit%events(2:), moved]
-    else if (orbit%events(m)%time > span) then
-      moved = orbit%events(m)
-      from = orbit%y
-      if (m > 1) from = orbit%events(m - 1)%departure(:states)
-      if (m > 1) call machines%centre%fly(moved%before, orbit%events(m - 1)%time, from, span, y)
-      if (m == 1) call machines%centre%fly(moved%before, 0.0_wp, from, span, y)
-      orbit%mode = moved%before
-      moved%time = moved%time - span
-      orbit%events = [moved, orbit%events(:m - 1)]
-    else
-      return
-    end if
-    orbit%y = y
-    turned = .true.
-  end subroutine rotate_to_section
-
-  !> The section points of an orbit, period by period.
-  pure function section_points(machines, orbit) result(points)
-    type(neighbourhood_t), intent(in) :: machines
-    type(orbit_t), intent(in) :: orbit
-    real(wp) :: points(states, orbit%periods)
-    real(wp) :: y(states), t, section
-    integer :: i, k, mode
-    points(:, 1) = orbit%y
-    y = orbit%y
-    t = 0
-    mode = orbit%mode
-    k = 0
-    do i = 1, orbit%periods - 1
-      section = i*machines%centre%period
-      do while (k < size(orbit%events))
-        if (orbit%events(k + 1)%time > section) exit
-        k = k + 1
-        y = orbit%events(k)%departure(:states)
-        t = orbit%events(k)%time
-        mode = orbit%events(k)%after
-      end do
-      call machines%centre%fly(mode, t, y, section, points(:, i + 1))
-    end do
-  end function section_points
 
 end module periodic_orbit

@@ -3,6 +3,7 @@
 
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
+  use build_jointed, only: is_jointed
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
@@ -12,16 +13,15 @@ module branches_driver
   use case_values, only: allowed_range, bounds_t
   use command_line, only: command_t
   use errors, only: error_t, fail
-  use event_words, only: canonical_word, word_text
-  use hybrid_machine, only: event_t
+  use event_words, only: word_text
+  use hybrid_machine, only: hybrid_t
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
+  use machine_family, only: machine_of_family, starts_of_section
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
-  use motion_state, only: append_word, event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, &
-    event_stick, event_touch_lower, event_touch_upper, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
-    word_stick, word_upper
   use orbit_margins, only: is_impact
+  use orbit_words, only: word_of
   use periodic_orbit, only: orbit_t
   use session, only: describe_file, open_session, session_t
   use status, only: exit_bad_case, exit_done
@@ -56,7 +56,12 @@ contains
     if (.not. allocated(error)) call set_free(command, session%the_case, search, curves, error)
     if (.not. allocated(error)) call prepare_search(search, command%searches, error)
     call session%stop_if(error)
-    call set_starts(session%the_case, search)
+    if (curves%wanted .and. is_jointed(session%the_case%laws)) then
+      call fail(error, exit_bad_case, '--free: labels are followed over two parameters for machines of one body')
+    else
+      call set_starts(session%the_case, search, error)
+    end if
+    call session%stop_if(error)
     if (command%validate .or. command%dry_run) then
       call session%journal%line('valid', command%path//' is a valid case for branches over '//search%family%path//' from '// &
                                 to_text(search%plan%lowest)//' to '//to_text(search%plan%highest))
@@ -154,9 +159,11 @@ contains
   end subroutine set_range
 
   !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about.
-  subroutine set_starts(the_case, search)
+  subroutine set_starts(the_case, search, error)
     type(case_t), intent(in) :: the_case
     type(search_t), intent(inout) :: search
+    type(error_t), allocatable, intent(out) :: error
+    class(hybrid_t), allocatable :: machine
     real(wp) :: low(2), high(2)
     integer :: i, k
     character(len=2), parameter :: names(2) = ['x0', 'v0']
@@ -169,7 +176,10 @@ contains
         high(k) = maxval(the_case%axes(i)%values)
       end do
     end do
-    search%starts = reshape([(low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp), i=1, starts)], [2, starts])
+    call machine_of_family(search%family, (search%plan%lowest + search%plan%highest)/2, machine, error)
+    if (allocated(error)) return
+    search%starts = starts_of_section(machine, reshape([(low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp), i=1, starts)], &
+                                                       [2, starts]))
   end subroutine set_starts
 
   !> Every labelled point, and what was found from how many seeds.
@@ -201,17 +211,53 @@ contains
     integer, intent(in) :: number
     character(len=*), intent(in) :: unit
     character(len=:), allocatable :: shown
-    associate (orbit => point%orbit, m => point%orbit%multipliers)
+    real(wp) :: at(2)
+    at = matmul(search%watch, point%orbit%y)
+    associate (orbit => point%orbit)
       shown = to_text(orbit%parameter, 13)
       if (unit /= '1') shown = shown//' '//unit
       call session%journal%line('point', '  '//replace_all(trim(label_names(point%label)), '_', ' ')//' at '//search%family%path// &
-        ' = '//shown//', '//word_text(word_of(orbit, search))//', multipliers '//complex_text(m(1))//', '//complex_text(m(2)), &
+        ' = '//shown//', '//word_text(word_of(orbit, search))//multipliers_text(orbit, search%has_clock), &
         '"branch": '//to_text(number)//', "label": '//json_text(trim(label_names(point%label)))//', "parameter": '// &
-        json_number(orbit%parameter)//', "x": '//json_number(orbit%y(1))//', "v": '//json_number(orbit%y(2))//', "word": '// &
-        json_text(word_text(word_of(orbit, search)))//', "multipliers": ['//json_number(real(m(1), wp))//', '// &
-        json_number(aimag(m(1)))//', '//json_number(real(m(2), wp))//', '//json_number(aimag(m(2)))//']')
+        json_number(orbit%parameter)//', "x": '//json_number(at(1))//', "v": '//json_number(at(2))//', "word": '// &
+        json_text(word_text(word_of(orbit, search)))//', "multipliers": '//multipliers_json(orbit, search%has_clock))
     end associate
   end subroutine report_point
+
+  !> Number of multipliers that are shown: without a clock all but the trivial one along the motion.
+  pure integer function count_multipliers(orbit, has_clock)
+    type(orbit_t), intent(in) :: orbit
+    logical, intent(in) :: has_clock
+    count_multipliers = size(orbit%multipliers) - merge(0, 1, has_clock)
+  end function count_multipliers
+
+  pure function multipliers_text(orbit, has_clock) result(text)
+    type(orbit_t), intent(in) :: orbit
+    logical, intent(in) :: has_clock
+    character(len=:), allocatable :: text
+    integer :: i
+    text = ''
+    if (.not. has_clock) text = ', cycle of '//to_text(orbit%events(size(orbit%events))%time, 13)//' s'
+    text = text//', multipliers'
+    do i = 1, count_multipliers(orbit, has_clock)
+      text = text//merge(', ', '  ', i > 1)//complex_text(orbit%multipliers(i))
+    end do
+    if (.not. has_clock) text = text//' and the trivial 1'
+    text = replace_all(text, 'multipliers  ', 'multipliers ')
+  end function multipliers_text
+
+  pure function multipliers_json(orbit, has_clock) result(text)
+    type(orbit_t), intent(in) :: orbit
+    logical, intent(in) :: has_clock
+    character(len=:), allocatable :: text
+    integer :: i
+    text = '['
+    do i = 1, count_multipliers(orbit, has_clock)
+      if (i > 1) text = text//', '
+      text = text//json_number(real(orbit%multipliers(i), wp))//', '//json_number(aimag(orbit%multipliers(i)))
+    end do
+    text = text//']'
+  end function multipliers_json
 
   pure function complex_text(z) result(text)
     complex(wp), intent(in) :: z
@@ -219,60 +265,6 @@ contains
     text = to_text(real(z, wp), 9)
     if (abs(aimag(z)) > 0) text = text//merge('+', '-', aimag(z) > 0)//to_text(abs(aimag(z)), 9)//'i'
   end function complex_text
-
-  !> The event word of an orbit.
-  pure integer(int64) function word_of(orbit, search) result(word)
-    type(orbit_t), intent(in) :: orbit
-    type(search_t), intent(in) :: search
-    type(tally_t) :: tally
-    integer(int64) :: words(orbit%periods)
-    real(wp) :: period
-    integer :: i, k
-    period = period_at(orbit, search)
-    do i = 1, orbit%periods
-      tally = tally_t()
-      do k = 1, size(orbit%events)
-        associate (event => orbit%events(k))
-          if (event%time < (i - 1)*period .or. (event%time >= i*period .and. i < orbit%periods)) cycle
-          call append_event(event, tally)
-        end associate
-      end do
-      call append_word(tally, word_period)
-      words(i) = tally%word
-    end do
-    word = canonical_word(words)
-  end function word_of
-
-  pure subroutine append_event(event, tally)
-    type(event_t), intent(in) :: event
-    type(tally_t), intent(inout) :: tally
-    select case (event%kind)
-    case (event_impact_upper, event_touch_upper)
-      call append_word(tally, word_upper)
-    case (event_impact_lower, event_touch_lower)
-      call append_word(tally, word_lower)
-    case (event_stick)
-      call append_word(tally, word_stick)
-    case (event_chatter_upper)
-      call append_word(tally, word_chatter_upper)
-    case (event_chatter_lower)
-      call append_word(tally, word_chatter_lower)
-    end select
-  end subroutine append_event
-
-  !> Drive period of the machine of an orbit [s].
-  pure real(wp) function period_at(orbit, search) result(period)
-    use build_motion, only: period_of
-    use law_table, only: change_parameter, law_choice_t
-    type(orbit_t), intent(in) :: orbit
-    type(search_t), intent(in) :: search
-    type(law_choice_t), allocatable :: laws(:)
-    type(error_t), allocatable :: error
-    logical :: known
-    laws = search%family%laws
-    call change_parameter(laws, search%family%path, orbit%parameter, known)
-    call period_of(laws, period, error)
-  end function period_at
 
   !> The points of all branches, one after the other.
   subroutine describe_branches(search, unit, schema)
@@ -282,24 +274,30 @@ contains
     type(point_t), allocatable :: points(:)
     integer, allocatable :: number(:)
     character(len=name_length) :: along(1)
-    integer :: b, i, k
+    real(wp), allocatable :: watched(:, :)
+    integer :: b, i, k, shown
     allocate (points(0), number(0))
     do b = 1, size(search%branches)
       points = [points, search%branches(b)%points]
       number = [number, [(b, i=1, size(search%branches(b)%points))]]
     end do
+    watched = reshape([(matmul(search%watch, points(i)%orbit%y), i=1, size(points))], [2, size(points)])
+    shown = count_multipliers(points(1)%orbit, search%has_clock)
     along = 'point'
     call schema%add_attribute('', 'parameter', search%family%path)
     call schema%add_attribute('', 'seeds', search%seeds)
     call schema%add_dimension('point', size(points, kind=int64))
-    call schema%add_dimension('multiplier', 2_int64)
+    call schema%add_dimension('multiplier', int(shown, int64))
     call schema%add_variable('branch', type_int32, along, units='1', long_name='number of the branch', data=real(number, wp))
     call add('parameter', unit, search%family%path, [(points(i)%orbit%parameter, i=1, size(points))])
-    call add('x', 'm', 'position at crank angle 0', [(points(i)%orbit%y(1), i=1, size(points))])
-    call add('v', 'm/s', 'velocity at crank angle 0', [(points(i)%orbit%y(2), i=1, size(points))])
+    call add('x', 'm', 'position '//section_text(search%has_clock), watched(1, :))
+    call add('v', 'm/s', 'velocity '//section_text(search%has_clock), watched(2, :))
+    if (.not. search%has_clock) call add('cycle_time', 's', 'time in which the orbit closes', &
+                                         [(points(i)%orbit%events(size(points(i)%orbit%events))%time, i=1, size(points))])
     call add('x_max', 'm', 'largest position', points%x_max)
     call add('x_min', 'm', 'smallest position', points%x_min)
-    call schema%add_variable('period', type_int16, along, units='1', long_name='period in drive periods', &
+    call schema%add_variable('period', type_int16, along, units='1', long_name='period in '// &
+                             trim(merge('drive periods', 'returns      ', search%has_clock)), &
                              data=[(real(points(i)%orbit%periods, wp), i=1, size(points))])
     call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts in a period of the orbit', &
                              data=[(real(count(is_impact(points(i)%orbit%events%kind)), wp), i=1, size(points))])
@@ -313,10 +311,10 @@ contains
                              flag_values=[(i, i=0, last_label)], flag_meanings=join(label_names, ' '), &
                              data=real(points%label, wp))
     call schema%add_variable('multiplier_real', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, 2), &
+      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, shown), &
                                                                  i=1, size(points))])
     call schema%add_variable('multiplier_imag', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, 2), &
+      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, shown), &
                                                                       i=1, size(points))])
 
   contains
@@ -328,5 +326,13 @@ contains
     end subroutine add
 
   end subroutine describe_branches
+
+  !> Where the section points of orbits are.
+  pure function section_text(has_clock) result(text)
+    logical, intent(in) :: has_clock
+    character(len=:), allocatable :: text
+    text = 'where the watched coordinate turns round'
+    if (has_clock) text = 'at crank angle 0'
+  end function section_text
 
 end module branches_driver

@@ -36,7 +36,7 @@ module command_table
       'periodic orbits over a parameter, stable and unstable, with their bifurcations', &
       'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
       '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
-      '  One body. Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
+      '  Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
       '  --searches N       values at which orbits are searched (default 12)'//nl// &
       '  --free NAME        a second parameter, over which the labels found are followed as curves'//nl// &
       '  --free-from A, --free-to B   its range, without which it is that of the axis of this parameter'//nl, .true.), &

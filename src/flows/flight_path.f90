@@ -14,7 +14,8 @@ module flight_path
   implicit none
   private
 
-  public :: begin_path, begin_series, path_at, place_powers, force_powers, unknowns_of, series_step, constant_forces, guard_row
+  public :: begin_path, begin_change, begin_series, path_at, place_powers, force_powers, unknowns_of, series_step, &
+    constant_forces, guard_row
 
   !> Terms of the exponential series over a stretch no longer than 1/rate.
   integer, parameter, public :: terms = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)
@@ -49,11 +50,32 @@ contains
     path%turning = turning_at(machine%frequency, state%time, harmonics_of(machine))
     call constant_forces(machine, state, path%force(:n), path%force_rate(:n))
     if (flow%modal) then
-      call begin_modal(machine, flow, state, path)
+      call begin_modal(machine, flow, state, -machine%joints%offset%rate, path)
     else
       call begin_series(machine, flow, state, path)
     end if
   end subroutine begin_path
+
+  !> How far apart two motions of one mode are: nothing drives their difference, which starts as `q`, `v`, under the constant
+  !> `force` on the coordinates.
+  pure subroutine begin_change(machine, flow, q, v, force, path)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: q(:), v(:), force(:)
+    type(path_t), intent(out) :: path
+    type(jointed_state_t) :: change
+    real(wp) :: still(size(machine%joints))
+    change%q(:machine%n) = q
+    change%v(:machine%n) = v
+    allocate (path%turning(harmonics_of(machine)), source=(0.0_wp, 0.0_wp))
+    path%force(:machine%n) = force
+    still = 0
+    if (flow%modal) then
+      call begin_modal(machine, flow, change, still, path)
+    else
+      call begin_series(machine, flow, change, path)
+    end if
+  end subroutine begin_change
 
   !> Forces of the joints that do not depend on the state within the mode, and the load.
   pure subroutine constant_forces(machine, state, force, rate)
@@ -88,10 +110,12 @@ contains
     end do
   end subroutine constant_forces
 
-  pure subroutine begin_modal(machine, flow, state, path)
+  !> `surface` are the speeds at which constraints hold [m/s].
+  pure subroutine begin_modal(machine, flow, state, surface, path)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(jointed_state_t), intent(in) :: state
+    real(wp), intent(in) :: surface(:)
     type(path_t), intent(inout) :: path
     real(wp), dimension(most_degrees) :: q, v, place, speed, push, push_rate
     real(wp) :: held_at(most_joints), held_rate(most_joints), b0, b1, w
@@ -115,7 +139,7 @@ contains
     do i = 1, size(flow%independent)
       j = flow%held(flow%independent(i))
       held_at(i) = sum(machine%joints(j)%row*q(:n))
-      held_rate(i) = -machine%joints(j)%offset%rate
+      held_rate(i) = surface(j)
       path%powers(:n, 0) = path%powers(:n, 0) + flow%carried(:, i)*held_at(i)
       path%powers(:n, 1) = path%powers(:n, 1) + flow%carried(:, i)*held_rate(i)
     end do
@@ -268,7 +292,7 @@ contains
     integer :: stretches, i, n
     n = machine%n
     y = path%unknowns
-    stretches = max(1, ceiling(flow%rate*t))
+    stretches = max(1, ceiling(flow%rate*abs(t)))
     length = t/stretches
     do i = 1, stretches
       call series_step(path%matrix, y, length, powers)

@@ -4,11 +4,11 @@
 !> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
 !> stretch of the springs of elastic friction.
 module jointed_section
-  use eigen, only: symmetric_eigen
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_section, jointed_t, most_degrees
+  use jointed, only: joint_contact, joint_elastic, most_degrees
   use jointed_motion, only: jointed_motion_t, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
+  use section_directions, only: directions_of
   use section_size, only: most_coordinates
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
@@ -18,34 +18,6 @@ module jointed_section
     watched_speed
 
 contains
-
-  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count.
-  pure subroutine directions_of(machine, directions, count_directions)
-    type(jointed_t), intent(in) :: machine
-    real(wp), intent(out) :: directions(most_degrees, most_degrees)
-    integer, intent(out) :: count_directions
-    real(wp), dimension(machine%n, machine%n) :: depends, vectors
-    real(wp) :: values(machine%n)
-    integer :: i, j, n
-    n = machine%n
-    depends = machine%stiffness/max(maxval(abs(machine%stiffness)), tiny(1.0_wp))
-    do j = 1, size(machine%joints)
-      if (machine%joints(j)%kind == joint_friction .or. machine%joints(j)%kind == joint_section) cycle
-      do i = 1, n
-        depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
-      end do
-    end do
-    call symmetric_eigen(depends, values, vectors)
-    count_directions = count(abs(values) > 1e-12_wp*maxval(abs(values)))
-    directions = 0
-    if (count_directions == n) then
-      do i = 1, n
-        directions(i, i) = 1
-      end do
-    else
-      directions(:n, :count_directions) = vectors(:, pack([(i, i=1, n)], abs(values) > 1e-12_wp*maxval(abs(values))))
-    end if
-  end subroutine directions_of
 
   !> Number of coordinates on the section.
   pure integer function coordinates_of_jointed(moving) result(n)

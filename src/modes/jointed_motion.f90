@@ -20,6 +20,7 @@ module jointed_motion
     event_turning_point, log_t, tally_t, word_period
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
     reason_time_over
+  use transition_list, only: note_transition, transition_t, transitions_t
   implicit none
   private
 
@@ -79,13 +80,14 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
   !> up (codes of module `status`).
-  pure subroutine advance_jointed(moving, state, time_end, tally, reason, log)
+  pure subroutine advance_jointed(moving, state, time_end, tally, reason, log, transitions)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
+    type(transitions_t), intent(inout), optional :: transitions
     type(jointed_state_t) :: start
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
@@ -127,13 +129,17 @@ contains
           start = state
           call transition(moving, state, list, fallen, stalls >= most_stalls, burst, tally, ok)
           if (present(log) .and. ok) call log_transition(moving, start, state, list, fallen, log)
+          if (present(transitions)) call keep(start, state, list, fallen, stalls >= most_stalls, transitions)
           if (.not. ok) reason = reason_step_failed
           if (stalls >= most_stalls) then
             stalls = 0
             holds = holds + 1
           end if
         end if
+        if (present(transitions)) start = state
         if (moving%section > 0) call follow_section(moving, turned, state)
+        if (state%at_section .and. present(transitions)) call note_transition(transitions, transition_t(start, state, &
+                                                                       moving%section, turns_round, .not. any(fallen)))
         if (tally%steps > moving%options%step_budget) reason = reason_step_budget
         if (.not. all(abs(state%q(:machine%n)) <= moving%options%domain)) reason = reason_left_domain
         if (any(state%q /= state%q) .or. any(state%v /= state%v)) reason = reason_not_finite
@@ -143,6 +149,18 @@ contains
       tally%v_max = watch%top_speed
     end associate
   end subroutine advance_jointed
+
+  !> Notes a transition; what was `held` for an instant, or several at once, is not certain.
+  pure subroutine keep(before, after, list, fallen, held, transitions)
+    type(jointed_state_t), intent(in) :: before, after
+    type(joint_guard_t), intent(in) :: list(:)
+    logical, intent(in) :: fallen(:), held
+    type(transitions_t), intent(inout) :: transitions
+    integer :: g
+    g = findloc(fallen, .true., 1)
+    call note_transition(transitions, transition_t(before, after, list(g)%joint, list(g)%meaning, &
+                                                   count(fallen) == 1 .and. .not. held))
+  end subroutine keep
 
   !> The watched coordinate has `turned` round, or an impact may have turned it: the section is behind it then, not reached.
   pure subroutine follow_section(moving, turned, state)
@@ -217,14 +235,15 @@ contains
   end subroutine log_transition
 
   !> Moves to the next section and starts the clock anew.
-  pure subroutine advance_jointed_period(moving, state, tally, reason, log)
+  pure subroutine advance_jointed_period(moving, state, tally, reason, log, transitions)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
+    type(transitions_t), intent(inout), optional :: transitions
     integer :: j
-    call advance_jointed(moving, state, moving%machine%period, tally, reason, log)
+    call advance_jointed(moving, state, moving%machine%period, tally, reason, log, transitions)
     if (reason /= 0) return
     state%time = 0
     if (present(log)) then
@@ -241,13 +260,14 @@ contains
 
   !> Moves a machine without a clock to its next section, within `longest` [s], and starts the clock anew; `lasted` [s] is the time
   !> that it took. `reason` is `reason_time_over` where it does not come to the section.
-  pure subroutine advance_to_turn(moving, longest, state, lasted, tally, reason)
+  pure subroutine advance_to_turn(moving, longest, state, lasted, tally, reason, transitions)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: longest
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(out) :: lasted
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
+    type(transitions_t), intent(inout), optional :: transitions
     real(wp) :: start, u
     integer :: j
     start = state%time
@@ -258,7 +278,7 @@ contains
         state%left(moving%section) = 0
       end if
     end associate
-    call advance_jointed(moving, state, start + longest, tally, reason)
+    call advance_jointed(moving, state, start + longest, tally, reason, transitions=transitions)
     if (reason == 0 .and. .not. state%at_section) reason = reason_time_over
     lasted = state%time - start
     do j = 1, size(moving%machine%joints)

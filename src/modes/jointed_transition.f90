@@ -95,7 +95,9 @@ contains
         case (slides_up, slides_down)
           if (machine%joints(j)%kind == joint_elastic) then
             state%phase(j) = merge(1, -1, list(g)%meaning == slides_up)
-            state%left(j) = 1
+            ! The speed of the slide starts at zero where the spring has just been let go at rest, else it is what it is.
+            call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+            state%left(j) = merge(1, 0, abs(u) <= rounding_of_speed(machine, j, state))
           end if
         case (meets_upper, meets_lower)
           touching(j) = merge(1, -1, list(g)%meaning == meets_upper)

@@ -13,7 +13,7 @@ module body_family
   use motion_state, only: log_t, open_log, options_t, reset_tally, state_t, tally_t
   use one_body, only: has_variation, mode_of_body, one_body_of, one_body_t
   use status, only: exit_bad_case
-  use variations, only: by_difference, neighbourhood_t, stencil_offset, vary
+  use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
   implicit none
   private
 
@@ -221,17 +221,5 @@ contains
     mode_at_end = mode
     if (size(events) > 0) mode_at_end = events(size(events))%after
   end function mode_at_end
-
-  !> Derivative of the period by the parameter.
-  pure real(wp) function period_slope(machines) result(slope)
-    type(neighbourhood_t), intent(in) :: machines
-    real(wp) :: near(1, 4), value(1)
-    integer :: i
-    do i = 1, 4
-      near(1, i) = machines%near(i)%period
-    end do
-    value = by_difference(machines, [machines%centre%period], near)
-    slope = value(1)
-  end function period_slope
 
 end module body_family

@@ -10,7 +10,7 @@ module hybrid_machine
   private
 
   !> Largest number of coordinates of a state.
-  integer, parameter, public :: most_states = 16
+  integer, parameter, public :: most_states = 40
 
   !> One event of a motion.
   type, public :: event_t
@@ -18,6 +18,8 @@ module hybrid_machine
     integer :: kind = 0
     !> Direction of the motion or side of the contact, +1 or -1, and of several joints which one.
     integer :: side = 0, joint = 0
+    !> Of a structure: which guard of the joint has fallen.
+    integer :: guard = 0
     !> Mode of the flights before and after, as the machine numbers them.
     integer :: before = 0, after = 0
     !> Time since the section at which the motion began [s].
@@ -28,11 +30,15 @@ module hybrid_machine
 
   !> A machine at one value of its parameters.
   type, abstract, public :: hybrid_t
-    !> Number of coordinates of a state.
-    integer :: n = 0
-    !> Time from section to section [s].
+    !> Number of coordinates of a state, and of those of them that are places; velocities follow.
+    integer :: n = 0, places = 1
+    !> Time from section to section [s]; without a clock an event is the section, and this a size of times.
     real(wp) :: period = 0
+    logical :: has_clock = .true.
+    !> Natural sizes of the coordinates.
+    real(wp), allocatable :: size_of(:)
   contains
+    procedure :: size_of_time
     procedure(fly_interface), deferred :: fly
     procedure(slope_interface), deferred :: slope
     procedure(guard_interface), deferred :: guard
@@ -77,5 +83,13 @@ module hybrid_machine
       real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
     end subroutine jump_interface
   end interface
+
+contains
+
+  !> Natural size of times [s].
+  pure real(wp) function size_of_time(self)
+    class(hybrid_t), intent(in) :: self
+    size_of_time = self%size_of(1)/self%size_of(self%places + 1)
+  end function size_of_time
 
 end module hybrid_machine

@@ -25,8 +25,8 @@ module one_body
 
   type, extends(hybrid_t), public :: one_body_t
     type(motion_t) :: moving
-    !> Natural sizes of x and v, and the steps of the differences of laws.
-    real(wp) :: size_of(2) = 1, step_of(2) = 1
+    !> Steps of the differences of laws.
+    real(wp) :: step_of(2) = 1
   contains
     procedure :: fly => fly_body
     procedure :: slope => slope_of_body

@@ -11,7 +11,7 @@ module variations
   implicit none
   private
 
-  public :: vary, by_difference, stencil_offset
+  public :: vary, by_difference, period_slope, stencil_offset
 
   !> Where the machines next to one are, in steps of the parameter, and what their results weigh in the derivative, times the
   !> step: central, or one-sided where the parameter can go no further. Of fourth order.
@@ -154,5 +154,17 @@ contains
     end do
     change(:, n + 1) = change(:, n + 1) + by_parameter
   end subroutine salt
+
+  !> Derivative of the period by the parameter.
+  pure real(wp) function period_slope(machines) result(slope)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp) :: near(1, 4), value(1)
+    integer :: i
+    do i = 1, 4
+      near(1, i) = machines%near(i)%period
+    end do
+    value = by_difference(machines, [machines%centre%period], near)
+    slope = value(1)
+  end function period_slope
 
 end module variations

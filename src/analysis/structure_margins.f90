@@ -1,0 +1,262 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> How far a periodic orbit of a structure is from having another sequence of events: the guards of its flights that are not met,
+!> the speeds of its impacts, the reserve of what holds, the order of its events. See module `orbit_margins`.
+module structure_margins
+  use guards, only: force_ends, force_returns, guards_of, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, &
+    slide_ends, slides_down, slides_up, turns_round
+  use hybrid_machine, only: event_t
+  use jointed, only: most_joints
+  use jointed_state, only: jointed_state_t
+  use kinds, only: wp
+  use mode_flow, only: mode_flow_t
+  use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_press, of_release, of_slip, of_stick, &
+    of_turning
+  use periodic_orbit, only: closing_time, orbit_t
+  use structure, only: mode_number, phases_in, state_in, structure_t
+  use structure_flight, only: flow_of
+  implicit none
+  private
+
+  public :: margins_of_structure
+
+  !> Looks along a flight, per period of the section.
+  integer, parameter :: looks = 96
+  integer, parameter :: most_secants = 60
+
+contains
+
+  !> The margins of an orbit whose events have their states; all in natural units. Extremes of the watched coordinate.
+  pure function margins_of_structure(machine, orbit) result(margins)
+    type(structure_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    type(margins_t) :: margins
+    real(wp) :: y(machine%n), t, until
+    integer :: k, m, mode
+    m = size(orbit%events)
+    allocate (margins%list(0))
+    y = orbit%y
+    t = 0
+    mode = orbit%mode
+    do k = 0, m
+      if (k > 0) then
+        associate (event => orbit%events(k))
+          call add_event(machine, orbit, k, margins%list)
+          y = event%departure(:machine%n)
+          t = event%time
+          mode = event%after
+        end associate
+      end if
+      until = closing_time(machine, orbit)
+      if (k < m) until = orbit%events(k + 1)%time
+      if (until > t) call look_along(machine, orbit, mode, t, y, until, k, margins)
+    end do
+  end function margins_of_structure
+
+  !> Size of forces [N].
+  pure real(wp) function force_size(machine)
+    type(structure_t), intent(in) :: machine
+    force_size = max(machine%frame%moving%machine%force_scale, tiny(1.0_wp))
+  end function force_size
+
+  !> Value and rate of the guard of an event in the mode before it.
+  pure subroutine value_and_rate(machine, event, t, y, value, rate)
+    type(structure_t), intent(in) :: machine
+    type(event_t), intent(in) :: event
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(out) :: value, rate
+    real(wp) :: by_state(machine%n), by_time
+    call machine%guard(event, t, y, value, by_state, by_time)
+    rate = sum(by_state*machine%slope(event%before, t, y)) + by_time
+  end subroutine value_and_rate
+
+  !> The margins of the event `k`.
+  pure subroutine add_event(machine, orbit, k, list)
+    type(structure_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    integer, intent(in) :: k
+    type(margin_t), allocatable, intent(inout) :: list(:)
+    type(margin_t) :: margin
+    real(wp) :: value, rate
+    associate (event => orbit%events(k), y => orbit%events(k)%arrival(:machine%n), size_of => machine%size_of)
+      margin = margin_t(event=k, side=event%side, time=event%time, joint=event%joint, guard=event%guard)
+      call value_and_rate(machine, event, event%time, y, value, rate)
+      select case (event%guard)
+      case (meets_upper, meets_lower, leaves)
+        margin%kind = of_impact
+        margin%value = -rate/size_of(machine%places + 1)
+      case (slide_ends)
+        call note_stop(machine, event, margin)
+      case (slides_up, slides_down, lets_go)
+        margin%kind = of_release
+        margin%value = -rate*machine%size_of_time()/force_size(machine)
+      case default
+        margin%kind = 0
+      end select
+      if (margin%kind /= 0) list = [list, margin]
+      ! An event that comes to be after the section is one of the next turn.
+      if (k == 1 .or. (.not. machine%has_clock .and. k == size(orbit%events))) return
+      list = [list, margin_t(event=k, side=event%side, time=event%time, kind=of_order, joint=event%joint, &
+                             value=(event%time - orbit%events(k - 1)%time)/machine%period)]
+    end associate
+  end subroutine add_event
+
+  !> Where a slide ends: what is left of the friction that holds, or what the forces are beyond it where the joint slides back.
+  pure subroutine note_stop(machine, event, margin)
+    type(structure_t), intent(in) :: machine
+    type(event_t), intent(in) :: event
+    type(margin_t), intent(inout) :: margin
+    type(event_t) :: probe
+    real(wp) :: up, down, rate
+    integer :: phase(most_joints), after
+    phase = phases_in(machine%frame%moving%machine, event%after)
+    after = phase(event%joint)
+    phase(event%joint) = 0
+    probe = event
+    probe%before = mode_number(machine%frame%moving%machine, phase)
+    probe%guard = slides_up
+    associate (y => event%departure(:machine%n))
+      call value_and_rate(machine, probe, event%time, y, up, rate)
+      probe%guard = slides_down
+      call value_and_rate(machine, probe, event%time, y, down, rate)
+    end associate
+    ! Elastic friction stops with its spring at its limit on one side.
+    if (any(machine%frame%elastic == event%joint)) then
+      margin%kind = 0
+    else if (after == 0) then
+      margin%kind = of_stick
+      margin%value = min(up, down)/force_size(machine)
+    else
+      margin%kind = of_turning
+      margin%value = -merge(up, down, after > 0)/force_size(machine)
+    end if
+  end subroutine note_stop
+
+  !> The least values of the guards within a flight, those at its end that is an event excepted.
+  pure subroutine look_along(machine, orbit, mode, from, start, until, k, margins)
+    type(structure_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    integer, intent(in) :: mode, k
+    real(wp), intent(in) :: from, start(:), until
+    type(margins_t), intent(inout) :: margins
+    type(mode_flow_t) :: flow
+    type(joint_guard_t) :: list(most_guards)
+    type(event_t) :: probe
+    real(wp) :: y(machine%n), t, last_t, value, rate, last_rate(most_guards)
+    real(wp) :: least_t, least
+    type(jointed_state_t) :: state
+    integer :: i, g, count_guards, count_looks
+    state = state_in(machine, mode, from, start)
+    call flow_of(machine%frame%moving, state%phase, flow)
+    call guards_of(machine%frame%moving%machine, flow, state, list, count_guards)
+    count_looks = max(6, ceiling(looks*(until - from)/machine%period))
+    last_t = from
+    probe%before = mode
+    do i = 0, count_looks
+      t = from + (until - from)*i/count_looks
+      y = start
+      if (i > 0) call machine%fly(mode, from, start, t, y)
+      call note_place(machine, y, margins)
+      do g = 1, count_guards
+        if (list(g)%meaning == turns_round) cycle
+        probe%joint = list(g)%joint
+        probe%guard = list(g)%meaning
+        call value_and_rate(machine, probe, t, y, value, rate)
+        if (i == 0) then
+          ! A jump elsewhere may have turned it round.
+          if (k > 0 .and. rate >= 0) then
+            if (orbit%events(k)%joint /= probe%joint) call note(machine, probe, k, t, value, margins)
+          end if
+        else if (last_rate(g) < 0 .and. rate > 0) then
+          call find_least(machine, probe, from, start, last_t, t, last_rate(g), rate, least_t, least)
+          call note(machine, probe, k, least_t, least, margins)
+        end if
+        last_rate(g) = rate
+      end do
+      last_t = t
+    end do
+  end subroutine look_along
+
+  pure subroutine note_place(machine, y, margins)
+    type(structure_t), intent(in) :: machine
+    real(wp), intent(in) :: y(:)
+    type(margins_t), intent(inout) :: margins
+    real(wp) :: x
+    x = sum(machine%frame%directions(machine%frame%moving%machine%watched, :)*y(:machine%places))
+    margins%x_max = max(margins%x_max, x)
+    margins%x_min = min(margins%x_min, x)
+  end subroutine note_place
+
+  !> Where the rate of a guard changes its sign, by the Illinois form of the secant rule, and its value there.
+  pure subroutine find_least(machine, probe, from, start, low, high, rate_low, rate_high, t, value)
+    type(structure_t), intent(in) :: machine
+    type(event_t), intent(in) :: probe
+    real(wp), intent(in) :: from, start(:), low, high, rate_low, rate_high
+    real(wp), intent(out) :: t, value
+    real(wp) :: a, b, f_a, f_b, f, y(machine%n)
+    integer :: i, side
+    a = low
+    b = high
+    f_a = rate_low
+    f_b = rate_high
+    side = 0
+    do i = 1, most_secants
+      t = b - f_b*((b - a)/(f_b - f_a))
+      if (.not. (t > a .and. t < b)) t = a + (b - a)/2
+      call machine%fly(probe%before, from, start, t, y)
+      call value_and_rate(machine, probe, t, y, value, f)
+      if (f*f_b > 0) then
+        b = t
+        f_b = f
+        if (side < 0) f_a = f_a/2
+        side = -1
+      else
+        a = t
+        f_a = f
+        if (side > 0) f_b = f_b/2
+        side = 1
+      end if
+      if (.not. abs(f) > 0 .or. b - a <= 4*spacing(b)) exit
+    end do
+  end subroutine find_least
+
+  !> Notes a value of the guard of `probe` after the event `k`, if it is the least of its joint and meaning.
+  pure subroutine note(machine, probe, k, t, value, margins)
+    type(structure_t), intent(in) :: machine
+    type(event_t), intent(in) :: probe
+    integer, intent(in) :: k
+    real(wp), intent(in) :: t, value
+    type(margins_t), intent(inout) :: margins
+    type(margin_t) :: margin
+    integer :: i
+    margin = margin_t(joint=probe%joint, guard=probe%guard, event=-k - 1, time=t)
+    select case (probe%guard)
+    case (meets_upper, meets_lower)
+      margin%kind = of_gap
+      margin%side = merge(1, -1, probe%guard == meets_upper)
+      margin%value = value/machine%size_of(1)
+    case (slide_ends)
+      margin%kind = of_slip
+      margin%value = value/machine%size_of(machine%places + 1)
+    case (slides_up, slides_down)
+      margin%kind = of_hold
+      margin%side = merge(1, -1, probe%guard == slides_up)
+      margin%value = value/force_size(machine)
+    case (lets_go, force_ends, force_returns)
+      margin%kind = of_press
+      margin%value = value/force_size(machine)
+    case default
+      return
+    end select
+    do i = 1, size(margins%list)
+      associate (one => margins%list(i))
+        if (one%kind /= margin%kind .or. one%joint /= margin%joint .or. one%guard /= margin%guard .or. one%event >= 0) cycle
+        if (margin%value < one%value) one = margin
+        return
+      end associate
+    end do
+    margins%list = [margins%list, margin]
+  end subroutine note
+
+end module structure_margins

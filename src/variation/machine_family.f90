@@ -1,0 +1,182 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Machines over a parameter of their laws, whatever they are made of: one body or a structure.
+module machine_family
+  use body_family, only: body_neighbourhood, body_of_family, family_t, fly_periods, map_of_body => map_with_variation
+  use build_jointed, only: is_jointed
+  use circle, only: point_near
+  use errors, only: error_t
+  use hybrid_machine, only: event_t, hybrid_t
+  use jointed_motion, only: start_jointed
+  use jointed_state, only: jointed_state_t
+  use kinds, only: wp
+  use motion_state, only: tally_t
+  use one_body, only: one_body_t
+  use structure, only: coordinates_of, structure_t
+  use structure_family, only: fly_structure, map_of_structure, structure_neighbourhood, structure_of_family
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: machine_of_family, machine_neighbourhood, fly_sections, map_with_variation, section_sizes, nearest_copy, within_stops, &
+    watched_rows, starts_of_section
+
+contains
+
+  !> The machine with the parameter at `value`. Code 65 if it cannot be built or its variations are not known.
+  subroutine machine_of_family(family, value, machine, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    class(hybrid_t), allocatable, intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(one_body_t) :: body
+    type(structure_t) :: structure
+    if (is_jointed(family%laws)) then
+      call structure_of_family(family, value, structure, error)
+      allocate (machine, source=structure)
+    else
+      call body_of_family(family, value, body, error)
+      allocate (machine, source=body)
+    end if
+  end subroutine machine_of_family
+
+  !> The machine and its neighbours in the parameter.
+  pure subroutine machine_neighbourhood(family, value, machines, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    type(neighbourhood_t), intent(out) :: machines
+    type(error_t), allocatable, intent(out) :: error
+    if (is_jointed(family%laws)) then
+      call structure_neighbourhood(family, value, machines, error)
+    else
+      call body_neighbourhood(family, value, machines, error)
+    end if
+  end subroutine machine_neighbourhood
+
+  !> Flies a machine from a section point over so many sections: where it then is, the mode in which it began, and the events on
+  !> the way, with `collapsed` a completed chatter as one. `ok` is false if the trajectory had to be given up.
+  pure subroutine fly_sections(machine, point, sections, collapsed, image, events, mode, tally, ok)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: point(:)
+    integer, intent(in) :: sections
+    logical, intent(in) :: collapsed
+    real(wp), intent(out) :: image(:)
+    type(event_t), allocatable, intent(out) :: events(:)
+    integer, intent(out) :: mode
+    type(tally_t), intent(out) :: tally
+    logical, intent(out) :: ok
+    ok = .false.
+    image = point
+    mode = 0
+    select type (machine)
+    type is (one_body_t)
+      call fly_periods(machine, point, sections, collapsed, image, events, mode, tally, ok)
+    type is (structure_t)
+      call fly_structure(machine, point, sections, image, events, mode, tally, ok)
+    end select
+  end subroutine fly_sections
+
+  !> Image of a section point after so many sections, its derivatives by the point (and by the parameter), and what happened on
+  !> the way. `ok` is false if the trajectory had to be given up or the derivatives are not known.
+  pure subroutine map_with_variation(machines, point, sections, image, by_start, tally, ok, by_parameter)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:)
+    integer, intent(in) :: sections
+    real(wp), intent(out) :: image(:), by_start(:, :)
+    type(tally_t), intent(out) :: tally
+    logical, intent(out) :: ok
+    real(wp), intent(out), optional :: by_parameter(:)
+    ok = .false.
+    image = point
+    by_start = 0
+    select type (machine => machines%centre)
+    type is (one_body_t)
+      call map_of_body(machines, point, sections, image, by_start, tally, ok, by_parameter)
+    type is (structure_t)
+      call map_of_structure(machines, point, sections, image, by_start, tally, ok, by_parameter)
+    end select
+  end subroutine map_with_variation
+
+  !> Natural sizes of a place and of a speed.
+  pure function section_sizes(machine) result(sizes)
+    class(hybrid_t), intent(in) :: machine
+    real(wp) :: sizes(2)
+    sizes = machine%size_of([1, machine%places + 1])
+  end function section_sizes
+
+  !> The copy of a point nearest to another: an angle is on a circle.
+  pure function nearest_copy(machine, point, other) result(nearest)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: point(:), other(:)
+    real(wp) :: nearest(size(point))
+    nearest = point
+    select type (machine)
+    type is (one_body_t)
+      nearest = point_near(point, other, machine%moving%machine%turn)
+    end select
+  end function nearest_copy
+
+  !> Rows that give place [m] and speed [m/s] of what is watched from a section point.
+  pure function watched_rows(machine) result(rows)
+    class(hybrid_t), intent(in) :: machine
+    real(wp) :: rows(2, machine%n)
+    rows = 0
+    select type (machine)
+    type is (structure_t)
+      associate (watched => machine%frame%moving%machine%watched)
+        rows(1, :machine%places) = machine%frame%directions(watched, :)
+        rows(2, machine%places + watched) = 1
+      end associate
+    class default
+      rows(1, 1) = 1
+      rows(2, 2) = 1
+    end select
+  end function watched_rows
+
+  !> Section points (columns) for searches: `watched` (columns) are places and speeds of what is watched. Of a structure the other
+  !> coordinates of every second one are as the machine says, those of the rest spread evenly over twice their sizes.
+  pure function starts_of_section(machine, watched) result(points)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: watched(:, :)
+    real(wp) :: points(machine%n, size(watched, 2))
+    type(jointed_state_t) :: state
+    real(wp) :: share
+    integer :: i, k
+    logical :: ok
+    points(:2, :) = watched
+    select type (machine)
+    type is (structure_t)
+      share = 2
+      do i = 1, 60
+        share = (1 + share)**(1/real(machine%n + 1, wp))
+      end do
+      associate (moving => machine%frame%moving, w => machine%frame%moving%machine%watched)
+        do i = 1, size(watched, 2)
+          points(:, i) = 2*machine%size_of*(2*modulo(0.5_wp + i*[(share**(-k), k=1, machine%n)], 1.0_wp) - 1)
+          if (modulo(i, 2) == 1) then
+            associate (start => moving%machine%start, shape => moving%machine%start_shape)
+              call start_jointed(moving, start(1, :) + shape(:, 1)*(watched(1, i) - start(1, w)), &
+                                 start(2, :) + shape(:, 2)*(watched(2, i) - start(2, w)), 0.0_wp, state, ok)
+            end associate
+            if (ok) points(:, i) = coordinates_of(machine, state)
+          end if
+          if (.not. machine%has_clock) points(machine%places + w, i) = 0
+        end do
+      end associate
+    end select
+  end function starts_of_section
+
+  !> A section point, moved to the barrier that it lies beyond.
+  pure function within_stops(machine, point) result(within)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: point(:)
+    real(wp) :: within(size(point))
+    within = point
+    select type (machine)
+    type is (one_body_t)
+      within(1) = max(min(point(1), machine%moving%machine%contact%upper), machine%moving%machine%contact%lower)
+    end select
+  end function within_stops
+
+end module machine_family

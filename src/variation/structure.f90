@@ -1,0 +1,325 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A jointed structure as a hybrid machine. Its state has the positions on which anything depends (see `section_directions`), the
+!> velocities of all coordinates, and the stretches of the springs of elastic friction, which are constant while those slide.
+module structure
+  use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
+  use hybrid_machine, only: event_t, hybrid_t
+  use jointed, only: joint_contact, joint_elastic, joint_section, jointed_t, most_degrees, most_joints
+  use jointed_flows, only: jointed_motion_t
+  use jointed_state, only: free_force, joint_motion, jointed_state_t, turning_at
+  use kinds, only: wp
+  use mode_flow, only: mode_flow_t
+  use section_directions, only: directions_of
+  use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
+  use structure_impact, only: carried_by, strike_with_slopes
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  public :: structure_of, mode_number, phases_in, state_in, coordinates_of, settle, count_joints
+
+  type, extends(hybrid_t), public :: structure_t
+    type(frame_t) :: frame
+  contains
+    procedure :: fly => fly_structure
+    procedure :: slope => slope_of_structure
+    procedure :: guard => guard_of_structure
+    procedure :: jump => jump_of_structure
+  end type structure_t
+
+  !> Phases run from -2 to 2: digits of the number of a mode.
+  integer, parameter :: digits_of_phase = 5
+
+contains
+
+  !> The hybrid machine of a structure; `sizes` are those of a place [m] and of a speed [m/s].
+  pure function structure_of(moving, sizes) result(structure)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: sizes(2)
+    type(structure_t) :: structure
+    real(wp) :: directions(most_degrees, most_degrees)
+    integer :: places, j
+    associate (machine => moving%machine)
+      structure%frame%moving = moving
+      call directions_of(machine, directions, places)
+      structure%frame%directions = directions(:machine%n, :places)
+      structure%frame%elastic = pack([(j, j=1, size(machine%joints))], machine%joints%kind == joint_elastic)
+      structure%frame%places = places
+      structure%places = places
+      structure%n = places + machine%n + size(structure%frame%elastic)
+      structure%has_clock = moving%section == 0
+      structure%period = machine%period
+      allocate (structure%size_of(structure%n))
+      structure%size_of = sizes(1)
+      structure%size_of(places + 1:places + machine%n) = sizes(2)
+    end associate
+  end function structure_of
+
+  !> Number of joints without the section.
+  pure integer function count_joints(machine) result(joints)
+    type(jointed_t), intent(in) :: machine
+    joints = count(machine%joints%kind /= joint_section)
+  end function count_joints
+
+  !> The number of a mode by the phases of its joints.
+  pure integer function mode_number(machine, phase) result(mode)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: phase(:)
+    integer :: j
+    mode = 0
+    do j = count_joints(machine), 1, -1
+      mode = digits_of_phase*mode + phase(j) + 2
+    end do
+  end function mode_number
+
+  !> The phases of the joints in a mode.
+  pure function phases_in(machine, mode) result(phase)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: mode
+    integer :: phase(most_joints), rest, j
+    phase = 0
+    rest = mode
+    do j = 1, count_joints(machine)
+      phase(j) = modulo(rest, digits_of_phase) - 2
+      rest = rest/digits_of_phase
+    end do
+  end function phases_in
+
+  !> The state of the event loop at `t` [s].
+  pure type(jointed_state_t) function state_in(self, mode, t, y) result(state)
+    class(structure_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t, y(:)
+    type(jointed_state_t) :: like
+    like%phase = phases_in(self%frame%moving%machine, mode)
+    call put_state(self%frame, like, t, y, state)
+  end function state_in
+
+  !> The coordinates of a state of the event loop.
+  pure function coordinates_of(self, state) result(y)
+    class(structure_t), intent(in) :: self
+    type(jointed_state_t), intent(in) :: state
+    real(wp) :: y(self%n), s, u
+    complex(wp) :: turning(self%frame%moving%harmonics)
+    integer :: j, k
+    associate (machine => self%frame%moving%machine, n => self%frame%moving%machine%n)
+      y(:self%places) = matmul(state%q(:n), self%frame%directions)
+      y(self%places + 1:self%places + n) = state%v(:n)
+      turning = turning_at(machine%frequency, state%time, self%frame%moving%harmonics)
+      do k = 1, size(self%frame%elastic)
+        j = self%frame%elastic(k)
+        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+        y(self%places + n + k) = s - state%slider(j)
+        if (state%phase(j) /= 0) y(self%places + n + k) = sliding_stretch(machine, j, state%phase(j))
+      end do
+    end associate
+  end function coordinates_of
+
+  !> Stretch of the spring of elastic friction that slides [m].
+  pure real(wp) function sliding_stretch(machine, j, phase)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j, phase
+    sliding_stretch = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
+  end function sliding_stretch
+
+  pure subroutine fly_structure(self, mode, t0, y0, t1, y1, flight)
+    class(structure_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t0, y0(:), t1
+    real(wp), intent(out) :: y1(:)
+    real(wp), intent(out), optional :: flight(:, :)
+    real(wp) :: change(size(y0), size(y0)), still(size(y0))
+    if (abs(t1 - t0) > 0) then
+      call fly_mode(self%frame, self%size_of, state_in(self, mode, t0, y0), y0, t1, y1, flight)
+    else
+      y1 = y0
+      call settle(self, mode, t0, y1, change, still)
+      if (present(flight)) flight = change
+    end if
+  end subroutine fly_structure
+
+  !> Moves a state onto what the joints of the mode hold, least in the metric of the masses: no sliding speed, a closed gap, the
+  !> stretch of a spring that slides; with the derivatives by the state and by the time at which this is done.
+  pure subroutine settle(self, mode, t, y, by_state, by_time)
+    class(structure_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t
+    real(wp), intent(inout) :: y(:)
+    real(wp), intent(out) :: by_state(:, :), by_time(:)
+    complex(wp) :: turning(self%frame%moving%harmonics)
+    real(wp), allocatable :: carried(:, :)
+    real(wp), dimension(self%frame%moving%machine%n) :: q, v
+    real(wp) :: s, u, given, stop
+    integer, allocatable :: held(:)
+    integer :: phase(most_joints), i, j, k
+    by_time = 0
+    by_state = 0
+    do k = 1, self%n
+      by_state(k, k) = 1
+    end do
+    associate (machine => self%frame%moving%machine, d => self%frame%directions, p => self%places, &
+               n => self%frame%moving%machine%n)
+      phase = phases_in(machine, mode)
+      turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
+      call carried_by(machine, phase, .true., held, carried)
+      q = matmul(d, y(:p))
+      v = y(p + 1:p + n)
+      do i = 1, size(held)
+        j = held(i)
+        associate (joint => machine%joints(j))
+          call joint_motion(machine, j, q, v, t, turning, s, u)
+          stop = merge(joint%upper, joint%lower, phase(j) > 0)
+          y(:p) = y(:p) - matmul(carried(:, i), d)*(s - stop)
+          by_time(:p) = by_time(:p) - matmul(carried(:, i), d)*(u - sum(joint%row*v))
+          do k = 1, p
+            by_state(:p, k) = by_state(:p, k) - matmul(carried(:, i), d)*sum(joint%row*d(:, k))
+          end do
+        end associate
+      end do
+      call carried_by(machine, phase, .false., held, carried)
+      do i = 1, size(held)
+        j = held(i)
+        associate (joint => machine%joints(j))
+          call joint_motion(machine, j, q, v, t, turning, s, u, given)
+          y(p + 1:p + n) = y(p + 1:p + n) - carried(:, i)*u
+          by_time(p + 1:p + n) = by_time(p + 1:p + n) - carried(:, i)*given
+          do k = 1, n
+            by_state(p + 1:p + n, p + k) = by_state(p + 1:p + n, p + k) - carried(:, i)*joint%row(k)
+          end do
+        end associate
+      end do
+      do k = 1, size(self%frame%elastic)
+        j = self%frame%elastic(k)
+        if (phase(j) == 0) cycle
+        y(p + n + k) = sliding_stretch(machine, j, phase(j))
+        by_state(p + n + k, :) = 0
+      end do
+    end associate
+  end subroutine settle
+
+  pure function slope_of_structure(self, mode, t, y) result(slope)
+    class(structure_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t, y(:)
+    real(wp) :: slope(size(y))
+    type(jointed_state_t) :: state
+    type(mode_flow_t) :: flow
+    state = state_in(self, mode, t, y)
+    call flow_of(self%frame%moving, state%phase, flow)
+    slope = rates(self%frame, flow, state)
+  end function slope_of_structure
+
+  !> The guard number `event%guard` of the joint, in the mode before the event.
+  pure subroutine guard_of_structure(self, event, t, y, value, by_state, by_time)
+    class(structure_t), intent(in) :: self
+    type(event_t), intent(in) :: event
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(out) :: value, by_state(:), by_time
+    type(jointed_state_t) :: state
+    type(mode_flow_t) :: flow
+    type(joint_guard_t) :: list(most_guards)
+    complex(wp) :: turning(self%frame%moving%harmonics)
+    real(wp) :: s, u, given
+    integer :: g, count_guards, i
+    state = state_in(self, event%before, t, y)
+    if (event%guard == turns_round) state%phase(event%joint) = event%side
+    call flow_of(self%frame%moving, state%phase, flow)
+    by_state = 0
+    by_time = 0
+    value = ieee_value(1.0_wp, ieee_quiet_nan)
+    associate (machine => self%frame%moving%machine, p => self%places, n => self%frame%moving%machine%n)
+      call guards_of(machine, flow, state, list, count_guards)
+      do g = 1, count_guards
+        if (list(g)%joint == event%joint .and. list(g)%meaning == event%guard) exit
+      end do
+      if (g > count_guards) return
+      turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
+      associate (guard => list(g), joint => machine%joints(event%joint))
+        call joint_motion(machine, event%joint, state%q, state%v, t, turning, s, u, given)
+        value = guard%constant + guard%place*s + guard%speed*u
+        by_state(p + 1:p + n) = guard%speed*joint%row
+        by_time = guard%speed*given
+        i = findloc(self%frame%elastic, event%joint, 1)
+        if (i > 0) then
+          by_state(p + n + i) = guard%place
+        else
+          by_state(:p) = guard%place*matmul(joint%row, self%frame%directions)
+          by_time = by_time + guard%place*(u - sum(joint%row*state%v(:n)))
+        end if
+        if (guard%held > 0) call add_force(self, flow, state, turning, guard%held, guard%force, value, by_state, by_time)
+      end associate
+    end associate
+  end subroutine guard_of_structure
+
+  !> Adds `share` of the force of constraint number `held`; those that depend on others have none of their own.
+  pure subroutine add_force(self, flow, state, turning, held, share, value, by_state, by_time)
+    class(structure_t), intent(in) :: self
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    integer, intent(in) :: held
+    real(wp), intent(in) :: share
+    real(wp), intent(inout) :: value, by_state(:), by_time
+    real(wp) :: force(self%frame%moving%machine%n), slopes(self%frame%moving%machine%n, self%n)
+    real(wp) :: rate(self%frame%moving%machine%n), s, u, given
+    integer :: i
+    if (size(flow%held) > size(flow%independent)) then
+      value = ieee_value(1.0_wp, ieee_quiet_nan)
+      return
+    end if
+    associate (machine => self%frame%moving%machine)
+      call free_force(machine, state, turning, force)
+      call force_slopes(self%frame, state, turning, slopes, rate)
+      value = value - share*sum(flow%reaction(held, :)*force)
+      by_state = by_state - share*matmul(flow%reaction(held, :), slopes)
+      by_time = by_time - share*sum(flow%reaction(held, :)*rate)
+      do i = 1, size(flow%held)
+        call joint_motion(machine, flow%held(i), state%q, state%v, state%time, turning, s, u, given)
+        value = value - share*flow%hold(held, i)*given
+        by_time = by_time - share*flow%hold(held, i)*surface_jerk(machine, flow%held(i), turning)
+      end do
+    end associate
+  end subroutine add_force
+
+  pure subroutine jump_of_structure(self, event, t, y, after, by_state, by_time)
+    class(structure_t), intent(in) :: self
+    type(event_t), intent(in) :: event
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
+    real(wp) :: struck(size(y), size(y)), at_time(size(y))
+    complex(wp) :: turning(self%frame%moving%harmonics)
+    integer :: side(most_joints), phase(most_joints), k
+    logical :: hits
+    after = y
+    at_time = 0
+    struck = 0
+    do k = 1, self%n
+      struck(k, k) = 1
+    end do
+    associate (machine => self%frame%moving%machine, p => self%places, n => self%frame%moving%machine%n)
+      hits = event%guard == meets_upper .or. event%guard == meets_lower
+      if (hits) hits = machine%joints(event%joint)%kind == joint_contact
+      if (hits) then
+        side = phases_in(machine, event%before)
+        where (machine%joints%kind /= joint_contact) side(:size(machine%joints)) = 0
+        side(event%joint) = event%side
+        phase = phases_in(machine, event%after)
+        turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
+        call strike_with_slopes(machine, state_in(self, event%before, t, y), turning, side, phase(event%joint) /= 0, &
+                                after(p + 1:p + n), struck(p + 1:p + n, p + 1:p + n), at_time(p + 1:p + n))
+      end if
+      ! A slider stops with its spring stretched by what friction was.
+      k = findloc(self%frame%elastic, event%joint, 1)
+      if (k > 0 .and. event%guard == slide_ends) then
+        after(p + n + k) = sliding_stretch(machine, event%joint, event%side)
+        struck(p + n + k, :) = 0
+      end if
+      call settle(self, event%after, t, after, by_state, by_time)
+      by_time = by_time + matmul(by_state, at_time)
+      by_state = matmul(by_state, struck)
+    end associate
+  end subroutine jump_of_structure
+
+end module structure
