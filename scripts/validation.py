@@ -19,7 +19,7 @@ import validation_rows as rows
 import validation_structures
 from markdown import table
 from validation_numbers import NOT_YET, THEIRS
-from validation_rows import SOURCE, Program, Row
+from validation_program import SOURCE, Program, Row
 
 sys.path.insert(0, str(SOURCE / "tests" / "referee"))
 import compare  # noqa: E402

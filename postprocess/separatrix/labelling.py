@@ -104,9 +104,9 @@ class Labelling:
             self.catalogues = future.result()
 
     def _label(self, stop: StopFlag, told: Progress) -> None:
-        todo = list(self.left)
+        pieces = list(self.left)
         with ThreadPoolExecutor(self.threads) as helpers:
-            futures = {helpers.submit(self._piece, *place, stop): place for place in todo}
+            futures = {helpers.submit(self._piece, *place, stop): place for place in pieces}
             try:
                 waiting = set(futures)
                 while waiting:

@@ -27,6 +27,23 @@ class Plane:
     counts: dict[int, int]
 
 
+class Strip:
+    """A dataset with one axis seen as one with a second axis of length 1."""
+
+    ndim = 2
+    chunks = None
+
+    def __init__(self, dataset: h5py.Dataset | np.ndarray) -> None:
+        """Keep the dataset."""
+        self._dataset = dataset
+        self.shape = (*dataset.shape, 1)
+        self.dtype = dataset.dtype
+
+    def __getitem__(self, selection: tuple) -> np.ndarray:
+        """Return a part of it."""
+        return self._dataset[selection[0]][:, np.newaxis][:, selection[1]]
+
+
 def majority_plane(
     dataset: h5py.Dataset, plane: tuple[int, int], index: Sequence[int], target: int = TARGET
 ) -> Plane:

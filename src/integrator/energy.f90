@@ -3,12 +3,12 @@
 
 !> Where the energy of one body goes. With the stretch s = l0 + x_A - x of a linear spring, E = m v^2/2 + c s^2/2 and
 !>   E' = -(dry friction)|v| - b v^2 + c s x_A' - (force of a soft barrier) p'.
-!> Effects add k3 s^4/4 - F x to E, k3 s^3 x_A' to the work of the drive, and their own losses; what Dahl's friction
-!> holds elastically counts as lost until it gives it back.
+!> Effects add k3 s^4/4 - F x and the like to E, k3 s^3 x_A' and the like to the work of the drive, and their own losses; what
+!> Dahl's friction holds elastically counts as lost until it gives it back.
 !> The powers are integrated by Gauss's rule over short pieces of a flight.
 module energy
   use drive_law, only: foot_motion, measured_force
-  use effect_law, only: effect_energy, effect_losses, slip_memory_t
+  use effect_law, only: effect_energy, effect_losses, slip_memory_t, stretch_force
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: stribeck_excess
   use kinds, only: wp
@@ -65,7 +65,7 @@ contains
       losses = effect_losses(machine%effects, machine%friction, slip, x, v)
       book%friction = book%friction + weight*losses(1)
       book%damping = book%damping + weight*losses(2)
-      book%work = book%work + weight*machine%effects%cubic*stretch**3*rate*machine%drive_frequency
+      book%work = book%work + weight*stretch_force(machine%effects, stretch)*rate*machine%drive_frequency
     end if
     if (machine%drive%interval > 0) then
       call measured_force(machine%drive, time, measured, rate)

@@ -7,7 +7,7 @@ module motion
   use adaptive_flight, only: fly_adaptive
   use constants, only: two_pi
   use contact_flight, only: contact_side
-  use contact_law, only: velocity_after_impact
+  use contact_law, only: contact_table, velocity_after_impact
   use effect_law, only: dahl_level
   use energy, only: book_exact, book_rest, record_with_book
   use errors, only: error_t, fail
@@ -73,7 +73,8 @@ contains
     moving%machine = machine
     moving%options = options
     ! Tables are left to single flights.
-    if (machine%effects%upwards%count > 0 .or. machine%effects%over_place%count > 0) moving%options%lane_width = 0
+    if (machine%effects%upwards%count > 0 .or. machine%effects%over_place%count > 0 .or. machine%effects%by_position .or. &
+        machine%contact%kind == contact_table) moving%options%lane_width = 0
     moving%layer = machine%friction%layer_speed
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive

@@ -3,11 +3,11 @@
 
 !> Barriers. A rigid one turns the velocity round at once, with a restitution that may depend on the speed. A
 !> soft one pushes back over the penetration p >= 0,
-!>   K p^n (1 + a p')  or  K p + D p',
+!>   K p^n (1 + a p')  or  K p + D p'  or  q(p) (1 + a p')  with a table q,
 !> and never pulls unless the law says so.
 module contact_law
   use contact_rows, only: restitution_formulas
-  use curve_law, only: curve_of, curve_t, value_at
+  use curve_law, only: continued_at, curve_of, curve_t, integral_of, slope_of, value_at
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
@@ -19,7 +19,7 @@ module contact_law
     restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
-    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6
+    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6, contact_table = 7
 
   type, public :: contact_t
     integer :: kind = contact_constant
@@ -30,7 +30,7 @@ module contact_law
     real(wp) :: lower = -huge(1.0_wp)
     !> Two coefficients of a restitution that depends on the speed.
     real(wp) :: coefficients(2) = 0
-    !> Change of the restitution over the speed.
+    !> Change of the restitution over the speed; q [N] over the penetration [m].
     type(curve_t) :: change
     !> A barrier with a force over penetration: positions of its surfaces [m], huge means none.
     logical :: soft = .false.
@@ -112,9 +112,21 @@ contains
   pure type(contact_t) function compliant_contact(rigid, choice) result(law)
     type(contact_t), intent(in) :: rigid
     type(law_choice_t), intent(in) :: choice
-    law = contact_t(kind=contact_hunt_crossley, soft=.true., soft_upper=rigid%upper, soft_lower=rigid%lower, &
-                    stiffness=value_of(choice, 'stiffness'), exponent=value_of(choice, 'exponent'), &
-                    damping=value_of(choice, 'damping'))
+    law = contact_t(soft=.true., soft_upper=rigid%upper, soft_lower=rigid%lower, damping=value_of(choice, 'damping'))
+    select case (choice%name)
+    case ('contact_curve')
+      law%kind = contact_table
+      law%change = curve_of([0.0_wp, list_of(choice, 'penetration')], [0.0_wp, list_of(choice, 'force')])
+      ! What it is on average tells its size.
+      law%stiffness = maxval(law%change%value)/law%change%at(law%change%count)
+    case ('kelvin_voigt_contact')
+      law%kind = contact_kelvin_voigt
+      law%stiffness = value_of(choice, 'stiffness')
+    case default
+      law%kind = contact_hunt_crossley
+      law%stiffness = value_of(choice, 'stiffness')
+      law%exponent = value_of(choice, 'exponent')
+    end select
   end function compliant_contact
 
   !> The part of a soft law that is not its position.
@@ -205,6 +217,8 @@ contains
     real(wp), intent(in) :: p, rate
     if (law%kind == contact_kelvin_voigt) then
       force = law%stiffness*p + law%damping*rate
+    else if (law%kind == contact_table) then
+      force = continued_at(law%change, p)*(1 + law%damping*rate)
     else
       force = law%stiffness*signed_power(p, law%exponent)*(1 + law%damping*rate)
     end if
@@ -217,6 +231,10 @@ contains
     real(wp) :: slopes(2)
     slopes = [law%stiffness, law%damping]
     if (law%kind == contact_kelvin_voigt) return
+    if (law%kind == contact_table) then
+      slopes = [slope_of(law%change, p)*(1 + law%damping*rate), continued_at(law%change, p)*law%damping]
+      return
+    end if
     slopes(1) = law%stiffness*(1 + law%damping*rate)
     if (law%exponent /= 1) slopes(1) = slopes(1)*law%exponent*abs(signed_power(p, law%exponent - 1))
     slopes(2) = law%stiffness*signed_power(p, law%exponent)*law%damping
@@ -228,6 +246,8 @@ contains
     real(wp), intent(in) :: p
     if (law%kind == contact_kelvin_voigt) then
       energy = 0.5_wp*law%stiffness*p**2
+    else if (law%kind == contact_table) then
+      energy = integral_of(law%change, p)
     else
       energy = law%stiffness*signed_power(p, law%exponent)*p/(law%exponent + 1)
     end if

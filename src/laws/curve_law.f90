@@ -10,7 +10,7 @@ module curve_law
   implicit none
   private
 
-  public :: curve_of, value_at, continued_at, steepest, knots_problem
+  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, knots_problem
 
   integer, parameter, public :: most_knots = 16
 
@@ -100,6 +100,63 @@ contains
       if (x > curve%at(last)) value = value + curve%slope(last)*(x - curve%at(last))
     end associate
   end function continued_at
+
+  !> Derivative at `x` of the curve that goes straight on beyond the knots.
+  pure real(wp) function slope_of(curve, x) result(slope)
+    type(curve_t), intent(in) :: curve
+    real(wp), intent(in) :: x
+    real(wp) :: width, s
+    integer :: i
+    slope = 0
+    if (curve%count == 0) return
+    slope = curve%slope(1)
+    if (x <= curve%at(1)) return
+    slope = curve%slope(curve%count)
+    if (x >= curve%at(curve%count)) return
+    i = count(curve%at(:curve%count) <= x)
+    width = curve%at(i + 1) - curve%at(i)
+    s = (x - curve%at(i))/width
+    slope = 6*s*(1 - s)*(curve%value(i + 1) - curve%value(i))/width + (1 - s)*(1 - 3*s)*curve%slope(i) &
+            - s*(2 - 3*s)*curve%slope(i + 1)
+  end function slope_of
+
+  !> Integral from the first knot to `x` of the curve that goes straight on beyond the knots.
+  pure real(wp) function integral_of(curve, x) result(total)
+    type(curve_t), intent(in) :: curve
+    real(wp), intent(in) :: x
+    real(wp) :: width, s, beyond
+    integer :: i
+    total = 0
+    if (curve%count == 0) return
+    do i = 1, curve%count - 1
+      width = curve%at(i + 1) - curve%at(i)
+      s = min(1.0_wp, (x - curve%at(i))/width)
+      if (s <= 0) exit
+      total = total + width*(curve%value(i)*s*(1 + s**2*(s/2 - 1)) + curve%value(i + 1)*s**3*(1 - s/2) + &
+                             width*s**2*(curve%slope(i)*(0.5_wp + s*(s/4 - 2/3.0_wp)) + &
+                                         curve%slope(i + 1)*s*(s/4 - 1/3.0_wp)))
+    end do
+    beyond = min(0.0_wp, x - curve%at(1))
+    total = total + beyond*(curve%value(1) + curve%slope(1)*beyond/2)
+    associate (last => curve%count)
+      beyond = max(0.0_wp, x - curve%at(last))
+      total = total + beyond*(curve%value(last) + curve%slope(last)*beyond/2)
+    end associate
+  end function integral_of
+
+  !> Largest second derivative in magnitude: that of a cubic is linear, so at a knot.
+  pure real(wp) function most_bent(curve)
+    type(curve_t), intent(in) :: curve
+    real(wp) :: width, mean
+    integer :: i
+    most_bent = 0
+    do i = 1, curve%count - 1
+      width = curve%at(i + 1) - curve%at(i)
+      mean = (curve%value(i + 1) - curve%value(i))/width
+      most_bent = max(most_bent, abs(6*mean - 4*curve%slope(i) - 2*curve%slope(i + 1))/width, &
+                      abs(6*mean - 2*curve%slope(i) - 4*curve%slope(i + 1))/width)
+    end do
+  end function most_bent
 
   !> A bound on the derivative: that of 6 s (1 - s) d + (1 - s)(1 - 3 s) m_i - s (2 - 3 s) m_{i+1}, d the mean slope.
   pure real(wp) function steepest(curve)

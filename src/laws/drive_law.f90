@@ -16,7 +16,7 @@ module drive_law
   !> Samples of a measured force closer than this share of the largest are the same.
   real(wp), parameter, public :: same_force = 1e-9_wp
 
-  public :: drive_of, add_ripple, foot_motion, measured_force, next_sample, lever_foot, lever_assembles
+  public :: drive_of, add_harmonics, add_ripple, foot_motion, measured_force, next_sample, lever_foot, lever_assembles
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
   integer, parameter :: max_harmonics = 1024
@@ -198,6 +198,21 @@ contains
       count = 2*count
     end do
   end subroutine add_ripple
+
+  !> Adds the harmonics of the effect `choice` to the motion of the foot, over the crank angle phi.
+  pure subroutine add_harmonics(law, choice)
+    type(drive_t), intent(inout) :: law
+    type(law_choice_t), intent(in) :: choice
+    real(wp), allocatable :: cosine(:), sine(:)
+    integer :: missing
+    cosine = list_of(choice, 'cosine')
+    sine = list_of(choice, 'sine')
+    missing = max(0, size(cosine) - size(law%cosine))
+    law%cosine = [law%cosine, spread(0.0_wp, 1, missing)]
+    law%sine = [law%sine, spread(0.0_wp, 1, missing)]
+    law%cosine(:size(cosine)) = law%cosine(:size(cosine)) + cosine
+    law%sine(:size(sine)) = law%sine(:size(sine)) + sine
+  end subroutine add_harmonics
 
   !> The series of a mechanism, with as many samples as it needs.
   pure subroutine expand_lever(lever, law)

@@ -3,13 +3,15 @@
 
 !> Effects added to a machine that are not one of its own laws with other numbers, and what a sensor shows. While
 !> sliding in direction s = +1 or -1 at the position x, the spring stretched by l, they add the force
-!>   F - c s v^2 - b s v + k3 l^3 - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
-!> K + E being the dry friction of the machine, g_+, g_- and p functions given by tables. Dahl's friction -h z takes the
+!>   F - c s v^2 - b s v + k3 l^3 + q(l) + r(x) - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
+!> K + E being the dry friction of the machine, g_+, g_-, p, q and r functions given by tables. Free play in series with
+!> the linear spring k l makes its force k d, with d = l - (sqrt((l + g/2)^2 + e^2) - sqrt((l - g/2)^2 + e^2))/2: nothing within
+!> the play g and l -+ g/2 beyond it, with corners of the width e. Dahl's friction -h z takes the
 !> place of all dry friction. As the velocity keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
 !>   z = s K + (z_0 - s K) exp(-sigma s (x - x_0)/K),  K the level in that direction.
 module effect_law
-  use curve_law, only: continued_at, curve_of, curve_t, steepest
-  use elementary, only: exponential
+  use curve_law, only: continued_at, curve_of, curve_t, integral_of, most_bent, slope_of, steepest
+  use elementary, only: exponential, logarithm
   use friction_law, only: friction_t, stribeck_excess
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
@@ -18,19 +20,26 @@ module effect_law
 
   public :: add_to_effects, add_to_sensor, replace_friction, finish_effects, effect_force, effect_energy, &
     effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed, &
-    friction_change, steepest_by_speed, steepest_by_place
+    friction_change, steepest_by_speed, steepest_by_place, slip_in_series, stretch_force, stretch_slope, stretch_bounds, &
+    place_force, steepest_force
 
   real(wp), parameter :: farthest_behind = 100
 
   type, public :: effects_t
     !> Any force at all, and one that leaves no closed form.
     logical :: present = .false., nonlinear = .false.
+    !> A force that only the position of body and foot sets, beside the cubic spring and the offset.
+    logical :: by_position = .false.
     !> c [N s^2/m^2], b [N s/m], a [N], slope [1/m], k3 [N/m^3], F [N].
     real(wp) :: quadratic_drag = 0, asymmetric_viscous = 0, asymmetric_coulomb = 0, friction_slope = 0, cubic = 0, offset = 0
     !> Dahl's friction: sigma [N/m], 0 = none, and mean sliding level [N].
     real(wp) :: dahl_stiffness = 0, dahl_sliding = 0
     !> g_+ and g_- [N] over the speed [m/s], p over the place [m]; without knots where there is none.
     type(curve_t) :: upwards, downwards, over_place
+    !> q [N] over the stretch [m], r [N] over the place [m].
+    type(curve_t) :: spring, force
+    !> Free play: g [m], 0 = none, e [m], and k [N/m] of the spring in series with it.
+    real(wp) :: play = 0, corner = 0, series_stiffness = 0
   end type effects_t
 
   !> A slip: its direction, and where it began with which z [N].
@@ -70,6 +79,15 @@ contains
     case ('friction_place_curve')
       if (.not. any(abs(list_of(choice, 'change')) > 0)) return
       effects%over_place = curve_of(list_of(choice, 'place'), list_of(choice, 'change'))
+    case ('spring_curve')
+      if (.not. any(abs(list_of(choice, 'force')) > 0)) return
+      effects%spring = curve_of(list_of(choice, 'stretch'), list_of(choice, 'force'))
+    case ('force_curve')
+      if (.not. any(abs(list_of(choice, 'force')) > 0)) return
+      effects%force = curve_of(list_of(choice, 'place'), list_of(choice, 'force'))
+    case ('backlash')
+      effects%play = value_of(choice, 'gap')
+      effects%corner = value_of(choice, 'rounding')*effects%play
     end select
   end subroutine add_to_effects
 
@@ -96,10 +114,19 @@ contains
     friction = friction_t(damping=friction%damping)
   end subroutine replace_friction
 
+  !> Free play, where it is, is in series with a linear spring of `stiffness` [N/m].
+  pure subroutine slip_in_series(effects, stiffness)
+    type(effects_t), intent(inout) :: effects
+    real(wp), intent(in) :: stiffness
+    if (effects%play > 0) effects%series_stiffness = stiffness
+  end subroutine slip_in_series
+
   !> What the effects together mean for the flights.
   pure subroutine finish_effects(effects)
     type(effects_t), intent(inout) :: effects
-    effects%nonlinear = effects%dahl_stiffness > 0 .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous, &
+    effects%by_position = effects%play > 0 .or. effects%spring%count > 0 .or. effects%force%count > 0
+    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_position .or. &
+                        any(abs([effects%quadratic_drag, effects%asymmetric_viscous, &
                                                                  effects%friction_slope, effects%cubic]) > 0) .or. &
                         effects%upwards%count > 0 .or. effects%over_place%count > 0
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
@@ -124,14 +151,88 @@ contains
       force = force - effects%asymmetric_coulomb
     end if
     if (effects%upwards%count > 0) force = force - slip%direction*friction_change(effects, slip%direction, slip%direction*v)
+    if (effects%by_position) force = force + play_and_table(effects, stretch) + place_force(effects, x)
   end function effect_force
 
-  !> Energy [J] of a body at `x` [m], the spring being stretched by `stretch` [m], in the cubic spring and the offset.
+  !> Force [N] by which cubic spring, table and free play change that of the spring at a `stretch` [m].
+  pure real(wp) function stretch_force(effects, stretch) result(force)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: stretch
+    force = effects%cubic*stretch**3
+    if (effects%by_position) force = force + play_and_table(effects, stretch)
+  end function stretch_force
+
+  pure real(wp) function play_and_table(effects, stretch) result(force)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: stretch
+    force = continued_at(effects%spring, stretch)
+    if (effects%play > 0) force = force - effects%series_stiffness*(corner_distance(effects, stretch, 1) &
+                                                                    - corner_distance(effects, stretch, -1))/2
+  end function play_and_table
+
+  !> Distance [m] from the corner of the play on `side` +1 (at -g/2) or -1, at least e.
+  pure real(wp) function corner_distance(effects, stretch, side) result(distance)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: stretch
+    integer, intent(in) :: side
+    distance = sqrt((stretch + side*effects%play/2)**2 + effects%corner**2)
+  end function corner_distance
+
+  !> Derivative of `stretch_force` by the stretch [N/m].
+  pure real(wp) function stretch_slope(effects, stretch) result(slope)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: stretch
+    integer :: side
+    slope = 3*effects%cubic*stretch**2
+    if (.not. effects%by_position) return
+    slope = slope + slope_of(effects%spring, stretch)
+    if (.not. effects%play > 0) return
+    do side = -1, 1, 2
+      slope = slope - effects%series_stiffness*side*(stretch + side*effects%play/2)/(2*corner_distance(effects, stretch, side))
+    end do
+  end function stretch_slope
+
+  !> Bounds on the first [N/m] and second [N/m^2] derivative of the table over the stretch and of the play.
+  pure function stretch_bounds(effects) result(bounds)
+    type(effects_t), intent(in) :: effects
+    real(wp) :: bounds(2)
+    bounds = [steepest(effects%spring), most_bent(effects%spring)]
+    if (effects%play > 0) bounds = bounds + effects%series_stiffness*[1.0_wp, 1/effects%corner]
+  end function stretch_bounds
+
+  !> r [N], a force over the place `x` [m], and a bound on its derivative [N/m].
+  pure real(wp) function place_force(effects, x) result(force)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: x
+    force = continued_at(effects%force, x)
+  end function place_force
+
+  pure real(wp) function steepest_force(effects) result(slope)
+    type(effects_t), intent(in) :: effects
+    slope = steepest(effects%force)
+  end function steepest_force
+
+  !> Energy [J] of a body at `x` [m], the spring being stretched by `stretch` [m], in what only the position sets.
   pure real(wp) function effect_energy(effects, x, stretch) result(energy)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x, stretch
     energy = effects%cubic*stretch**4/4 - effects%offset*x
+    if (.not. effects%by_position) return
+    energy = energy + integral_of(effects%spring, stretch) - integral_of(effects%force, x)
+    if (effects%play > 0) energy = energy - effects%series_stiffness*(corner_area(effects, stretch, 1) &
+                                                                      - corner_area(effects, stretch, -1))/2
   end function effect_energy
+
+  !> Integral of `corner_distance` over the stretch [m^2]: (u sqrt(u^2 + e^2) + e^2 asinh(u/e))/2, u from the corner on.
+  pure real(wp) function corner_area(effects, stretch, side) result(area)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: stretch
+    integer, intent(in) :: side
+    real(wp) :: u, distance
+    u = stretch + side*effects%play/2
+    distance = corner_distance(effects, stretch, side)
+    area = (u*distance + effects%corner**2*sign(logarithm((abs(u) + distance)/effects%corner), u))/2
+  end function corner_area
 
   !> Power [W] that dry friction and damping lose to the effects beyond what the law of friction loses without them.
   pure function effect_losses(effects, friction, slip, x, v) result(losses)

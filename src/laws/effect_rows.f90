@@ -13,7 +13,7 @@ module effect_rows
   character(len=*), parameter :: sum_of_laws = 'sum of two laws'
   character(len=*), parameter :: sensor = 'what a sensor shows; the motion is the same'
 
-  type(law_row_t), parameter, public :: effect_laws(20) = [ &
+  type(law_row_t), parameter, public :: effect_laws(26) = [ &
     law_row_t('effect', 'viscous', '-b v', sum_of_laws), &
     law_row_t('effect', 'coulomb', '-F sgn v; adds to sliding and to break-away friction', sum_of_laws), &
     law_row_t('effect', 'quadratic_drag', '-c v |v|', 'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
@@ -31,6 +31,11 @@ module effect_rows
     law_row_t('effect', 'friction_place_curve', 'dry friction times max(0, 1 + change(x)): a table over the place, C1', &
               'Armstrong-Helouvry, Control of Machines with Friction (1991)'), &
     law_row_t('effect', 'cubic_spring', 'k3 s^3, s = l0 + x_A - x', 'Duffing, Erzwungene Schwingungen (1918)'), &
+    law_row_t('effect', 'spring_curve', 'q(s), a force over the stretch s = l0 + x_A - x: a table, C1', &
+              'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
+    law_row_t('effect', 'backlash', 'free play in series with the spring: no force within the gap', &
+              'Kahraman, Singh, J. Sound Vib. 142 (1990) 49'), &
+    law_row_t('effect', 'force_curve', 'r(x), a force over the place: a table, C1', sum_of_laws), &
     law_row_t('effect', 'offset_force', 'constant force: preload or tilt', sum_of_laws), &
     law_row_t('effect', 'restitution_slope', 'k falls with the speed of impact: k - slope |v|, not below 0', &
               'Goldsmith, Impact (1960)'), &
@@ -38,14 +43,19 @@ module effect_rows
               'Goldsmith, Impact (1960)'), &
     law_row_t('effect', 'compliant_contact', 'rigid barriers become soft: K p^n (1 + a p''), never pulls', &
               'Hunt, Crossley, J. Appl. Mech. 42 (1975)'), &
+    law_row_t('effect', 'kelvin_voigt_contact', 'rigid barriers become soft: K p + D p'', never pulls', &
+              'Goldsmith, Impact (1960)'), &
+    law_row_t('effect', 'contact_curve', 'rigid barriers become soft: q(p) (1 + a p''), q a table from q(0) = 0 on, never pulls', &
+              'Hunt, Crossley, J. Appl. Mech. 42 (1975)'), &
     law_row_t('effect', 'second_barrier', 'a barrier on the free side, with the same law', sum_of_laws), &
     law_row_t('effect', 'drive_ripple', 'crank angle phi + sine sin(n phi) + cosine cos(n phi) in place of phi', &
               'Kononenko, Vibrating Systems with a Limited Power Supply (1969)'), &
+    law_row_t('effect', 'drive_harmonics', 'foot moves by sum a_n cos n phi + b_n sin n phi more', sum_of_laws), &
     law_row_t('effect', 'sensor_bias', 'a record shows x + bias', sensor), &
     law_row_t('effect', 'sensor_gain', 'a record shows (1 + gain) x', sensor), &
     law_row_t('effect', 'sensor_delay', 'a record shows x(t - delay)', sensor)]
 
-  type(parameter_row_t), parameter, public :: effect_parameters(31) = [ &
+  type(parameter_row_t), parameter, public :: effect_parameters(44) = [ &
     parameter_row_t('effect', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
                     'b'), &
     parameter_row_t('effect', 'coulomb', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
@@ -80,6 +90,18 @@ module effect_rows
                     'relative change of dry friction at these places'), &
     parameter_row_t('effect', 'cubic_spring', 'stiffness', 'N/m^3', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'k3'), &
+    parameter_row_t('effect', 'spring_curve', 'stretch', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'stretches, ascending; straight on beyond the first and the last'), &
+    parameter_row_t('effect', 'spring_curve', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'force beyond that of the spring at these stretches'), &
+    parameter_row_t('effect', 'backlash', 'gap', 'm', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'g, stretch from one end of the play to the other'), &
+    parameter_row_t('effect', 'backlash', 'rounding', '1', 0.0_wp, 1.0_wp, .true., .true., 0.05_wp, .false., &
+                    'e/g, width of the corners of the force over the gap'), &
+    parameter_row_t('effect', 'force_curve', 'place', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'places, ascending; straight on beyond the first and the last'), &
+    parameter_row_t('effect', 'force_curve', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'force upwards at these places'), &
     parameter_row_t('effect', 'offset_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'constant force upwards'), &
     parameter_row_t('effect', 'restitution_slope', 'slope', 's/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
@@ -94,6 +116,16 @@ module effect_rows
                     'a = lambda/K; 1/a bounds the speed of rebound'), &
     parameter_row_t('effect', 'compliant_contact', 'exponent', '1', 0.5_wp, 10.0_wp, .false., .true., 1.5_wp, .false., &
                     'n: 1 for flat surfaces, 1.5 for spheres (Hertz)'), &
+    parameter_row_t('effect', 'kelvin_voigt_contact', 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+                    'K'), &
+    parameter_row_t('effect', 'kelvin_voigt_contact', 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'D'), &
+    parameter_row_t('effect', 'contact_curve', 'penetration', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .true., &
+                    'penetrations above 0, ascending; straight on beyond the last'), &
+    parameter_row_t('effect', 'contact_curve', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
+                    'force at these penetrations'), &
+    parameter_row_t('effect', 'contact_curve', 'damping', 's/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'a; 1/a bounds the speed of rebound'), &
     parameter_row_t('effect', 'second_barrier', 'position', 'm', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'below an upper barrier, or above a lower one'), &
     parameter_row_t('effect', 'drive_ripple', 'sine', 'rad', none_below, none_above, .false., .false., 0.0_wp, .false., &
@@ -102,6 +134,10 @@ module effect_rows
                     'ripple of the crank angle in phase with cos(n phi)'), &
     parameter_row_t('effect', 'drive_ripple', 'harmonic', '1', 1.0_wp, 64.0_wp, .false., .true., 1.0_wp, .false., &
                     'n, a whole number'), &
+    parameter_row_t('effect', 'drive_harmonics', 'cosine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'a_1, a_2, ...'), &
+    parameter_row_t('effect', 'drive_harmonics', 'sine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
+                    'b_1, b_2, ..., as many as cosine has'), &
     parameter_row_t('effect', 'sensor_bias', 'bias', 'm', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'added to the position'), &
     parameter_row_t('effect', 'sensor_gain', 'gain', '1', none_below, none_above, .false., .false., 0.0_wp, .false., &
@@ -109,7 +145,8 @@ module effect_rows
     parameter_row_t('effect', 'sensor_delay', 'delay', 's', none_below, none_above, .false., .false., 0.0_wp, .false., &
                     'of the sensor behind the drive; negative if it is ahead')]
 
-  character(len=*), parameter :: over_speed = 'friction over speed', over_impacts = 'restitution over impact speed'
+  character(len=*), parameter :: over_speed = 'friction over speed', over_impacts = 'restitution over impact speed', &
+    over_stretch = 'spring over stretch', over_penetration = 'contact over penetration', over_phase = 'drive over phase'
 
   type(effect_trait_t), parameter, public :: effect_traits(size(effect_laws)) = [ &
     effect_trait_t('viscous', over_speed, 'flight', 'damping', '', ''), &
@@ -122,13 +159,19 @@ module effect_rows
     effect_trait_t('position_dependent_friction', 'friction over place', 'flight', 'slope', '', 'friction'), &
     effect_trait_t('friction_curve', over_speed, 'flight', 'upwards downwards', '', ''), &
     effect_trait_t('friction_place_curve', 'friction over place', 'flight', 'change', '', 'friction'), &
-    effect_trait_t('cubic_spring', 'spring over stretch', 'flight', 'stiffness', '', ''), &
+    effect_trait_t('cubic_spring', over_stretch, 'flight', 'stiffness', '', ''), &
+    effect_trait_t('spring_curve', over_stretch, 'flight', 'force', '', ''), &
+    effect_trait_t('backlash', over_stretch, 'flight', '', 'gap', 'restoring.stiffness'), &
+    effect_trait_t('force_curve', 'force over place', 'flight', 'force', '', ''), &
     effect_trait_t('offset_force', 'constant force', 'flight', 'force', '', ''), &
     effect_trait_t('restitution_slope', over_impacts, 'barrier', 'slope', '', 'contact.restitution'), &
     effect_trait_t('restitution_curve', over_impacts, 'barrier', 'change', '', 'contact.restitution'), &
-    effect_trait_t('compliant_contact', 'contact over penetration', 'barrier', '', 'stiffness damping', 'contact.restitution'), &
+    effect_trait_t('compliant_contact', over_penetration, 'barrier', '', 'stiffness damping', 'contact.restitution'), &
+    effect_trait_t('kelvin_voigt_contact', over_penetration, 'barrier', '', 'stiffness damping', 'contact.restitution'), &
+    effect_trait_t('contact_curve', over_penetration, 'barrier', 'force', '', 'contact.restitution'), &
     effect_trait_t('second_barrier', 'contact over place', 'barrier', '', '', 'contact.restitution'), &
-    effect_trait_t('drive_ripple', 'drive over phase', 'flight', 'sine cosine', '', 'drive.ratio'), &
+    effect_trait_t('drive_ripple', over_phase, 'flight', 'sine cosine', '', 'drive.ratio'), &
+    effect_trait_t('drive_harmonics', over_phase, 'flight', 'cosine sine', '', 'drive.ratio'), &
     effect_trait_t('sensor_bias', 'sensor', 'sensor', 'bias', '', ''), &
     effect_trait_t('sensor_gain', 'sensor', 'sensor', 'gain', '', ''), &
     effect_trait_t('sensor_delay', 'sensor', 'sensor', 'delay', '', '')]

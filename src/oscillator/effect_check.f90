@@ -3,7 +3,7 @@
 
 !> Which effects the laws of a machine have a place for.
 module effect_check
-  use curve_law, only: knots_problem
+  use curve_law, only: knots_problem, most_knots
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: real64, wp
@@ -26,7 +26,8 @@ contains
     do i = 1, size(choices)
       if (choices(i)%family /= effect_family) cycle
       select case (choices(i)%name)
-      case ('restitution_slope', 'restitution_curve', 'compliant_contact', 'second_barrier')
+      case ('restitution_slope', 'restitution_curve', 'compliant_contact', 'kelvin_voigt_contact', 'contact_curve', &
+            'second_barrier')
         problem = contact_problem(choices, choices(i))
       case ('drive_ripple')
         problem = ripple_problem(choices, choices(i))
@@ -38,6 +39,16 @@ contains
         if (has_effect(choices, 'dahl')) problem = ': found with effect.dahl, allowed one of them'
       case ('friction_place_curve')
         problem = table_problem(choices(i), 'place', 'change')
+      case ('force_curve')
+        problem = table_problem(choices(i), 'place', 'force')
+      case ('spring_curve')
+        problem = table_problem(choices(i), 'stretch', 'force')
+      case ('backlash')
+        problem = ''
+        if (name_of(choices, 'restoring') /= 'linear') problem = ': found with restoring.law = "'// &
+          name_of(choices, 'restoring')//'", allowed with "linear"'
+      case ('drive_harmonics')
+        problem = harmonics_problem(choices, choices(i))
       case ('asymmetric_friction')
         problem = asymmetry_problem(choices, choices(i))
       case default
@@ -63,8 +74,11 @@ contains
         if (has_effect(choices, 'restitution_slope')) problem = ': found with effect.restitution_slope, allowed one of them'
       end if
       if (law /= 'newton') problem = ': found with contact.law = "'//law//'", allowed with "newton"'
-      if (has_effect(choices, 'compliant_contact')) problem = ': found with effect.compliant_contact, allowed one of them'
-    case ('compliant_contact')
+      if (len(soft_effect(choices, '')) > 0) problem = ': found with effect.'//soft_effect(choices, '')//', allowed one of them'
+    case ('compliant_contact', 'kelvin_voigt_contact', 'contact_curve')
+      if (effect%name == 'contact_curve') problem = table_problem(effect, 'penetration', 'force', implied=1)
+      if (len(soft_effect(choices, effect%name)) > 0) problem = ': found with effect.'//soft_effect(choices, effect%name)// &
+                                                                ', allowed one of them'
       if (index(law, 'newton') /= 1) problem = ': found with contact.law = "'//law//'", allowed with the rigid ones: newton, '// &
                                                'newton_linear, newton_power, newton_viscoelastic'
     case default
@@ -85,24 +99,59 @@ contains
     end select
   end function contact_problem
 
-  !> What is wrong with a table of an effect, '' if nothing.
-  pure function table_problem(effect, knots, values) result(problem)
+  !> Another effect than `but` that makes the barriers soft, '' if there is none.
+  pure function soft_effect(choices, but) result(name)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: but
+    character(len=:), allocatable :: name
+    character(len=20), parameter :: soft(3) = [character(len=20) :: 'compliant_contact', 'kelvin_voigt_contact', 'contact_curve']
+    integer :: i
+    name = ''
+    do i = 1, size(soft)
+      if (soft(i) /= but .and. has_effect(choices, soft(i))) name = trim(soft(i))
+    end do
+  end function soft_effect
+
+  !> What is wrong with a table of an effect, '' if nothing. `implied` knots are not in the list, which is as much shorter.
+  pure function table_problem(effect, knots, values, implied) result(problem)
     type(law_choice_t), intent(in) :: effect
     character(len=*), intent(in) :: knots, values
+    integer, intent(in), optional :: implied
     character(len=:), allocatable :: problem
     problem = knots_problem(list_of(effect, knots), size(list_of(effect, values)))
+    if (present(implied)) then
+      if (size(list_of(effect, knots)) > most_knots - implied) problem = 'allowed 2 to '//to_text(most_knots - implied)//' knots'
+    end if
     if (len(problem) > 0) problem = '.'//knots//': found '//to_text(size(list_of(effect, knots)))//' knots and '// &
                                     to_text(size(list_of(effect, values)))//' values of '//values//', '//problem
   end function table_problem
 
-  pure function ripple_problem(choices, effect) result(problem)
+  pure function harmonics_problem(choices, effect) result(problem)
     type(law_choice_t), intent(in) :: choices(:), effect
+    character(len=:), allocatable :: problem
+    problem = drive_problem(choices)
+    if (size(list_of(effect, 'cosine')) /= size(list_of(effect, 'sine'))) then
+      problem = '.sine: found '//to_text(size(list_of(effect, 'sine')))//' values, allowed as many as cosine has, '// &
+                to_text(size(list_of(effect, 'cosine')))
+    end if
+  end function harmonics_problem
+
+  !> What is wrong with an effect of the drive where the foot does not turn with a crank, '' if nothing.
+  pure function drive_problem(choices) result(problem)
+    type(law_choice_t), intent(in) :: choices(:)
     character(len=:), allocatable :: problem, law
     problem = ''
     law = name_of(choices, 'drive')
-    if (law /= 'harmonic' .and. law /= 'fourier' .and. law /= 'crank_lever_rod') then
-      problem = ': found with drive.law = "'//law//'", allowed with harmonic, fourier, crank_lever_rod'
-    else if (abs(value_of(effect, 'harmonic') - anint(value_of(effect, 'harmonic'))) > 0) then
+    if (law /= 'harmonic' .and. law /= 'fourier' .and. law /= 'crank_lever_rod') problem = &
+      ': found with drive.law = "'//law//'", allowed with harmonic, fourier, crank_lever_rod'
+  end function drive_problem
+
+  pure function ripple_problem(choices, effect) result(problem)
+    type(law_choice_t), intent(in) :: choices(:), effect
+    character(len=:), allocatable :: problem
+    problem = drive_problem(choices)
+    if (len(problem) > 0) return
+    if (abs(value_of(effect, 'harmonic') - anint(value_of(effect, 'harmonic'))) > 0) then
       problem = '.harmonic: found '//number(value_of(effect, 'harmonic'))//', allowed a whole number'
     end if
   end function ripple_problem

@@ -6,10 +6,10 @@
 module oscillator
   use constants, only: two_pi
   use contact_law, only: add_to_contact, barrier_positions, compliant_contact, contact_of, contact_t, force_on_body
-  use drive_law, only: add_ripple, drive_of, drive_t, foot_motion, measured_force
+  use drive_law, only: add_harmonics, add_ripple, drive_of, drive_t, foot_motion, measured_force
   use effect_check, only: refuse_effects
-  use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, replace_friction, sensor_t, &
-    slip_memory_t
+  use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, place_force, replace_friction, &
+    sensor_t, slip_in_series, slip_memory_t, stretch_bounds, stretch_force, stretch_slope
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
@@ -107,12 +107,17 @@ contains
       if (choices(i)%name == 'drive_ripple') call add_ripple(machine%drive, choices(i))
     end do
     do i = 1, size(choices)
-      ! After the second barrier, which is to be soft too.
-      if (choices(i)%family == effect_family .and. choices(i)%name == 'compliant_contact') then
+      if (choices(i)%family /= effect_family) cycle
+      ! After the second barrier, which is to be soft too; after the ripple, which these harmonics have no part in.
+      select case (choices(i)%name)
+      case ('compliant_contact', 'kelvin_voigt_contact', 'contact_curve')
         machine%contact = compliant_contact(machine%contact, choices(i))
-      end if
+      case ('drive_harmonics')
+        call add_harmonics(machine%drive, choices(i))
+      end select
     end do
     call replace_friction(machine%effects, machine%friction)
+    call slip_in_series(machine%effects, machine%restoring%stiffness)
     call finish_effects(machine%effects)
     if (.not. machine%drive%converged) call fail(error, exit_bad_case, 'effect.drive_ripple: too large: the Fourier series of '// &
                                                  'the drive does not converge')
@@ -153,7 +158,7 @@ contains
     barriers = barrier_positions(machine%contact)
     turn = 0
     if (abs(machine%effects%cubic) > 0 .or. abs(machine%effects%friction_slope) > 0 .or. &
-        machine%effects%over_place%count > 0) return
+        machine%effects%over_place%count > 0 .or. machine%effects%by_position) return
     if (barriers(1) >= unreachable .and. barriers(2) <= -unreachable) turn = machine%restoring%turn
   end function turn_of
 
@@ -179,6 +184,8 @@ contains
       if (effects%present) machine%force_scale = machine%force_scale + abs(effects%offset) + abs(effects%asymmetric_coulomb) &
                                                  + effects%dahl_sliding + abs(effects%cubic)*length**3 &
                                                  + maxval(abs([effects%upwards%value, effects%downwards%value]))
+      if (effects%by_position) machine%force_scale = machine%force_scale + maxval(abs(effects%spring%value)) &
+                                                     + maxval(abs(effects%force%value)) + effects%series_stiffness*effects%play
     end associate
   end subroutine set_bounds
 
@@ -206,7 +213,7 @@ contains
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, phi
     real(wp), intent(out) :: force, rate, curvature_bound
-    real(wp) :: foot, foot_rate, stretch, longest
+    real(wp) :: foot, foot_rate, stretch, longest, bounds(2)
     call foot_motion(machine%drive, phi, foot, foot_rate)
     stretch = machine%restoring%free_length + foot - x
     force = restoring_force(machine%restoring, stretch)
@@ -220,6 +227,12 @@ contains
       longest = abs(machine%restoring%free_length + machine%drive%mean - x) + sum(abs(machine%drive%cosine)) &
                 + sum(abs(machine%drive%sine))
       curvature_bound = curvature_bound + abs(cubic)*longest*(3*longest*machine%foot_acceleration_bound + 6*speed**2)
+      if (.not. machine%effects%by_position) return
+      ! The cubic spring is in it already.
+      force = force + (stretch_force(machine%effects, stretch) - cubic*stretch**3) + place_force(machine%effects, x)
+      rate = rate + (stretch_slope(machine%effects, stretch) - 3*cubic*stretch**2)*foot_rate*machine%drive_frequency
+      bounds = stretch_bounds(machine%effects)
+      curvature_bound = curvature_bound + bounds(1)*machine%foot_acceleration_bound + bounds(2)*speed**2
     end associate
   end subroutine holding_force
 

@@ -56,6 +56,10 @@ def test_what_a_force_without_a_name_depends_on_is_told(hide, number):
     best = verdict["character"][0]
     assert best["depends_on"] == depends_on
     assert min(best["closed"].values()) > 0.8
+    # no law of one body has a hidden state or a time of its own, and it is said
+    assert verdict["added"] == []
+    assert f"no law of a force that depends on {' and '.join(depends_on)}" in verdict["not_added"]
+    assert verdict["gap"]["training"]["after"] == verdict["gap"]["training"]["before"]
     if constant:
         assert best["constant"]["value"] == pytest.approx(truth["parameters"][constant], rel=0.12)
     if name == "maxwell_element":
@@ -72,6 +76,9 @@ def test_an_effect_that_is_not_asked_for_is_characterised_by_what_it_depends_on(
     assert verdict["outcome"] == "characterised"
     assert verdict["character"][0]["depends_on"] == ["speed"]
     assert verdict["character"][0]["formula"] == "-a v |v|"
+    # a function of the speed is a law of the simulator: the gap is closed by a table, without a name
+    assert (verdict["effects"], verdict["added"]) == ([], ["friction_curve"])
+    assert all(one["after"] - 1 < 0.3 * (one["before"] - 1) for one in verdict["gap"].values())
     found, hidden = (
         verdict["character"][0]["size"]["value"],
         truth["parameters"]["effect.quadratic_drag.coefficient"],

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision.decide import foremost
+from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import Judged, held_out_bounds, stable
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free

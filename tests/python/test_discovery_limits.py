@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.decision.limits import detectable, distance
+from separatrix.discovery.decision.experiments import d_prime
+from separatrix.discovery.decision.limits import detectable
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free, base_parameters
 from separatrix.discovery.fitting.problem import Problem
@@ -52,19 +53,31 @@ def fitted(stiffness: float) -> Fitted:
     return Fitted((), model, problem, fit, ())
 
 
-def test_both_machines_get_the_same_drive_from_the_same_starts():
+def test_both_machines_get_the_same_drive_from_the_same_states():
     one, other = fitted(1.0), fitted(1.04)
-    assert distance(one, one, 9.0) == 0
+    assert d_prime(one, one, 1.1, 1.6) == pytest.approx(0, abs=1e-3)
     one.model.asked.clear()
-    assert distance(one, other, 9.0) > 0
-    (values, start), (other_values, other_start) = one.model.asked[0], other.model.asked[0]
+    assert d_prime(one, other, 1.1, 1.6) > 1
+    # how it settles, and the periods that are compared
+    (_, begun), (values, start) = one.model.asked
+    (other_values, other_start) = other.model.asked[0]
+    assert begun.shape == (1, 3)
     assert np.array_equal(start, other_start)
-    assert one.model.drive_frequency(values) == pytest.approx(9.0)
-    assert other.model.drive_frequency(other_values) == pytest.approx(9.0)
-    frequency = one.problem.prepared[0].frequency
-    assert start[:, 2] == pytest.approx(0.7 + frequency * 0.5 * np.arange(12))
+    frequency = one.model.drive_frequency({"drive.ratio": 1.1})
+    assert one.model.drive_frequency(values) == pytest.approx(frequency)
+    assert other.model.drive_frequency(other_values) == pytest.approx(frequency)
     amplitude = one.model.parameters["drive.cosine[1]"].value
-    assert values["drive.cosine[1]"] == other_values["drive.cosine[1]"] == pytest.approx(0.5 * amplitude)
+    # 1.6 times the half drive of the record
+    assert values["drive.cosine[1]"] == other_values["drive.cosine[1]"] == pytest.approx(0.8 * amplitude)
+
+
+def test_what_the_parameters_of_a_machine_can_be_is_not_apart():
+    """A stiffness that the record leaves free tells nothing; the same difference with a known one does."""
+    one, other = fitted(1.0), fitted(1.0002)
+    free = d_prime(one, other, 1.1, 1.0)
+    reduced = one.fit.reduced
+    reduced.matrix[:] = 1e6 * reduced.matrix
+    assert d_prime(one, other, 1.1, 1.0) > 3 * free
 
 
 @pytest.mark.parametrize(

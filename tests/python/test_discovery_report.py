@@ -133,6 +133,8 @@ def verdict(outcome: str) -> dict:
             "held_out": {"before": 41234.5, "after": 1.0093 if found else 41234.5, "noise_floor": 1.0},
         },
         "character": CHARACTER if outcome == "characterised" else [],
+        "added": [],
+        "not_added": "nothing is added to the case: no law" if outcome == "characterised" else "",
         "gates": {"converged": True, "detect": True, "separate": outcome == "named"} if found else {},
         "p_value": 5.8e-74 if found else None,
         "reasons": [] if outcome in ("named", "none") else ["gate 'separate' was not passed"],
@@ -147,6 +149,9 @@ def verdict(outcome: str) -> dict:
         },
         "confusability": {"names": NAMES, "matrix": [[1.0, 0.31, 0.2], [0.31, 1.0, 0.98], [0.2, 0.98, 1.0]]},
         "separating_experiment": "measure the barrier" if outcome == "ambiguous" else "",
+        "experiments": [{"drive_ratio": 1.2, "scale": 1.6, "d_prime": 14.2, "text": "a record"}]
+        if outcome == "ambiguous"
+        else [],
         "d_prime": {"cubic_spring": 11.879, "offset_force": 8.2804, "sensor_bias": 0.0},
         "candidates": [
             {

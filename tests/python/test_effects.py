@@ -122,7 +122,7 @@ def test_laws_tell_the_effects(separatrix, tmp_path):
     effects = {
         row["law"]: {p["name"]: p for p in row["parameters"]} for row in rows if row["family"] == "effect"
     }
-    assert len(effects) == 20
+    assert len(effects) == 26
     assert effects["quadratic_drag"]["coefficient"]["unit"] == "N s^2/m^2"
     assert effects["stribeck"]["exponent"]["default"] == 2
     assert effects["dahl"]["stiffness"]["default"] is None

@@ -24,7 +24,7 @@ class Discovery:
 
     `outcome` is "named", "ambiguous", "none", "characterised" or "not-in-catalogue"; `effects` are the names;
     `verdict` is all of it, as in verdict.json (docs/discovery-guide.md). `case` is the case with the effects
-    found, None without any; `files` are what was written.
+    found or the table of a force without a name, None without any; `files` are what was written.
     """
 
     verdict: dict
@@ -94,7 +94,7 @@ def discover(
             require_writable(Path(out))
         still = None if rest is None else Path(rest)
         verdict, findings = investigate(case.model, _paths(records), _paths(hold_out), options, still)
-        text = extended_case(verdict, findings) if findings.decision.accepted else None
+        text = extended_case(verdict, findings) if findings.decision.corrected is not None else None
         files = {} if out is None else _write(Path(out), case, verdict, findings, options)
         told("steps", 1000, 1000)
     return Discovery(verdict, None if text is None else Case.from_text(text, case.directory), files)

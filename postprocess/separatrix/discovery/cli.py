@@ -114,6 +114,13 @@ class Progress:
         print(f"[{100 * done:3.0f} %] {stage} ({passed:.1f} s{left})", file=sys.stderr, flush=True)
 
 
+def added(verdict: dict) -> str:
+    """What of a gap without a name was added to the case, or why nothing was."""
+    if not verdict["added"]:
+        return verdict["not_added"]
+    return f"added to the case as a table, effect.{verdict['added'][-1]}, which is no name"
+
+
 def summary(verdict: dict) -> list[str]:
     """The verdict in a few lines."""
     names = " and ".join(verdict["effects"])
@@ -126,6 +133,7 @@ def summary(verdict: dict) -> list[str]:
         "characterised": [
             f"something is missing that {searched(verdict)} does not name:",
             *(f"  {'or ' if number else ''}{one['text']}" for number, one in enumerate(verdict["character"])),
+            added(verdict),
         ],
     }[verdict["outcome"]]
     for path, found in verdict["parameters"].items():

@@ -93,11 +93,11 @@ class _UndoneError(Exception):
 
 
 def write_results(folder: Path, verdict: dict, findings: Findings) -> None:
-    """Write verdict.json, details.h5 and, where effects were named, extended.toml."""
+    """Write verdict.json, details.h5 and, where a law was found, extended.toml."""
     text = json.dumps(plain(verdict), indent=2, allow_nan=False) + "\n"
     (folder / "verdict.json").write_text(text, encoding="utf-8")
     write_details(folder / "details.h5", findings)
-    if findings.decision.accepted:
+    if findings.decision.corrected is not None:
         (folder / "extended.toml").write_text(extended_case(verdict, findings), encoding="utf-8")
 
 
@@ -120,7 +120,7 @@ def plain(value: object) -> object:
 
 def extended_case(verdict: dict, findings: Findings) -> str:
     """The base case with the effect and all fitted values: an ordinary case file."""
-    fitted = findings.decision.accepted[0].fitted
+    fitted = findings.decision.corrected.fitted
     records = ", ".join(f"{one['name']} ({one['use']})" for one in verdict["records"])
     lines = [
         f"# Written by separatrix-discover {verdict['version']}: {', '.join(fitted.names)} added.",
@@ -170,7 +170,7 @@ def machine_values(fitted: Fitted) -> dict[str, float]:
 def write_details(path: Path, findings: Findings) -> None:
     """Numbers behind the figures: see docs/discovery-guide.md for the layout."""
     decision, bench = findings.decision, findings.bench
-    final = decision.accepted[0] if decision.accepted else None
+    final = decision.corrected
     with h5py.File(path, "w") as file:
         units = units_of(findings.base.model.parameters)
         file.attrs["position_unit"], file.attrs["velocity_unit"] = units.position, units.velocity

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from separatrix.discovery.decision.added import with_law
 from separatrix.discovery.decision.characterise import characterised
 from separatrix.discovery.decision.decide import decide
 from separatrix.discovery.decision.partial import decide_in_part, nearest
@@ -76,7 +77,7 @@ def investigate(
         decision = decide(bench, fitted)
         decision.reasons += nearest(bench, decision)
         options.progress("asking what the rest of the gap depends on", 0.9)
-        decision = characterised(bench, decision)
+        decision = with_law(bench, characterised(bench, decision))
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)

@@ -29,7 +29,7 @@ from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
 from separatrix.layout import compose
 from separatrix.open import table
-from separatrix.reduce import Plane, majority_plane, scalar_plane
+from separatrix.reduce import Plane, Strip, majority_plane, scalar_plane
 
 MOST_PANELS = 12
 _PANEL = 42.0  # mm, height of a panel where three stand side by side
@@ -186,7 +186,7 @@ def _read_panels(
     panels = []
     with _source(path, result, field) as dataset:
         if axes[0] is None:
-            dataset = _Strip(dataset)
+            dataset = Strip(dataset)
         plane = (dims.index(axes[0]), dims.index(axes[1])) if axes[0] else (1, 0)
         for place in places:
             heading = ", ".join(
@@ -223,21 +223,6 @@ def _source(path: str | Path | None, result: xr.Dataset, field: str) -> Iterator
     else:
         with h5py.File(path, "r") as file:
             yield file[field]
-
-
-class _Strip:
-    """A dataset with one axis seen as one with a second axis of length 1."""
-
-    ndim = 2
-    chunks = None
-
-    def __init__(self, dataset: h5py.Dataset | np.ndarray) -> None:
-        self._dataset = dataset
-        self.shape = (*dataset.shape, 1)
-        self.dtype = dataset.dtype
-
-    def __getitem__(self, selection: tuple) -> np.ndarray:
-        return self._dataset[selection[0]][:, np.newaxis][:, selection[1]]
 
 
 def _spread(places: list, most: int) -> list:

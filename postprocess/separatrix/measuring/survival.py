@@ -69,23 +69,23 @@ def survival(
     left, unknown = np.full(motions, np.inf), np.zeros(motions, bool)
     random = generator(seed, 12)
     state, clock = states[motions:].copy(), np.zeros(motions)
-    todo = np.arange(motions)
+    staying = np.arange(motions)
     with Progress(progress) as told:
         for _ in range(_MOST_BLOWS):
             # drawn for all, so that a motion's blows do not depend on the others
-            waits = random.exponential(1 / rate, motions)[todo]
-            going = clock[todo] + waits <= length
+            waits = random.exponential(1 / rate, motions)[staying]
+            going = clock[staying] + waits <= length
             told("motions", motions - int(going.sum()), motions)
             kicks = generator(seed, 13, int(random.integers(1 << 62)))
-            todo, waits = todo[going], waits[going]
-            if not len(todo):
+            staying, waits = staying[going], waits[going]
+            if not len(staying):
                 break
-            clock[todo] += waits
-            state[todo] = _flown(found, state[todo], waits)
-            out, lost = _strike(found, attractor, state, deviation, kicks, todo)
-            left[todo[out]] = clock[todo[out]]
-            unknown[todo[lost]] = True
-            todo = todo[~out]
+            clock[staying] += waits
+            state[staying] = _flown(found, state[staying], waits)
+            out, lost = _strike(found, attractor, state, deviation, kicks, staying)
+            left[staying[out]] = clock[staying[out]]
+            unknown[staying[lost]] = True
+            staying = staying[~out]
     return _dataset(result, attractor, once, left, unknown, length, rate, deviation)
 
 
@@ -139,12 +139,12 @@ def _strike(
     states: np.ndarray,
     deviation: float,
     random: np.random.Generator,
-    todo: np.ndarray | None = None,
+    staying: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Change the velocities of `states` in place; whether each is out of the basin, and not known."""
-    todo = np.arange(len(states)) if todo is None else todo
-    states[todo, 1] += deviation * random.standard_normal(len(states))[todo]
-    labels = found.machine.labels_of(states[todo])
+    staying = np.arange(len(states)) if staying is None else staying
+    states[staying, 1] += deviation * random.standard_normal(len(states))[staying]
+    labels = found.machine.labels_of(states[staying])
     return labels != own, labels == NOT_KNOWN
 
 

@@ -5,7 +5,6 @@
 Parameters are texts of an address; each is checked before anything is done. None names files.
 """
 
-import math
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
@@ -14,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.errors import USAGE, SeparatrixError
+from separatrix.errors import SeparatrixError
 from separatrix.library import CaseError
 from separatrix.view import live
 from separatrix.view.files import ResultFile
 from separatrix.view.keep import keep_file
 from separatrix.view.machine import EVENTS, REASONS, REGIMES, Machine, events_csv, samples_csv
 from separatrix.view.packing import pack
+from separatrix.view.parameters import Parameters, RefusedError, shown
 from separatrix.view.pyramid import Plane
 
 __all__ = ["PROTOCOL_VERSION", "REQUESTS", "Desk", "RefusedError"]
@@ -30,15 +30,6 @@ _PLANES = 24  # kept in memory
 _MOST_SAMPLES = 400_000
 _MOST_LIVE = 65_536  # points of one request
 _MOST_KEPT = 16_000_000
-_LARGEST = 1e300
-
-
-class RefusedError(SeparatrixError):
-    """A request that is not understood or out of range."""
-
-    def __init__(self, message: str) -> None:
-        """Keep what is wrong."""
-        super().__init__(message, USAGE)
 
 
 @dataclass(frozen=True)
@@ -49,50 +40,6 @@ class Request:
     needs: tuple[str, ...]
     may_have: tuple[str, ...] = ()
     acts: bool = False
-
-
-class Parameters:
-    """Texts of a request as checked numbers."""
-
-    def __init__(self, texts: Mapping[str, str]) -> None:
-        """Keep the texts."""
-        self.texts = texts
-
-    def whole(self, name: str, low: int, high: int, default: int | None = None) -> int:
-        """Return a whole number from low to high."""
-        text = self.texts.get(name)
-        if text is None and default is not None:
-            return default
-        digits = (text or "").removeprefix("-")
-        if not (digits.isascii() and digits.isdigit() and len(digits) <= 12 and low <= int(text) <= high):
-            raise RefusedError(
-                f"{name}: found {_shown(text)}, allowed is a whole number from {low} to {high}"
-            )
-        return int(text)
-
-    def real(self, name: str, default: float | None = None) -> float:
-        """Return a finite number."""
-        text = self.texts.get(name)
-        if text is None and default is not None:
-            return default
-        try:
-            value = float(text or "") if len(text or "") <= 40 else math.nan
-        except ValueError:
-            value = math.nan
-        if not abs(value) <= _LARGEST:
-            raise RefusedError(f"{name}: found {_shown(text)}, allowed is a finite number")
-        return value
-
-    def changes(self) -> dict[str, float]:
-        """Return `with=path:value;...`, other values of parameters."""
-        text = self.texts.get("with", "")
-        found = {}
-        for part in text.split(";") if text else []:
-            path, _, value = part.partition(":")
-            found[path] = Parameters({path: value}).real(path)
-        if len(found) > 16 or len(text) > 2000:
-            raise RefusedError("with: allowed are at most 16 parameters")
-        return found
 
 
 class Desk:
@@ -113,7 +60,7 @@ class Desk:
         """Return the answer to a request. RefusedError if it is not understood, or what it fails with."""
         request = REQUESTS.get(name)
         if request is None:
-            raise RefusedError(f"{_shown(name)}: no such request")
+            raise RefusedError(f"{shown(name)}: no such request")
         unknown = set(texts) - set(request.needs) - set(request.may_have)
         missing = set(request.needs) - set(texts)
         if unknown or missing:
@@ -301,7 +248,7 @@ def download(desk: Desk, parameters: Parameters) -> bytes:
         found = _fly(machine, start, changed, parameters)
         text = samples_csv(found) if what == "samples" else events_csv(found)
     else:
-        raise RefusedError(f"what: found {_shown(what)}, allowed are case, samples, events")
+        raise RefusedError(f"what: found {shown(what)}, allowed are case, samples, events")
     return pack({"text": text})
 
 
@@ -378,10 +325,6 @@ def _lattice(desk: Desk, parameters: Parameters, most: int) -> tuple:
     changed = parameters.changes()
     desk.machine(source).check(changed)
     return source, across, up, at, lattice, changed, _view(parameters)
-
-
-def _shown(text: str | None) -> str:
-    return "nothing" if text is None else f"'{text[:40]}'"
 
 
 def _list(names: set[str]) -> str:

@@ -78,7 +78,7 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
     found = [_best(training, held_out, one) for one in hypotheses(training)]
     best = max(found, key=lambda one: one.evidence)
     if not _known(best, bench):
-        return decision
+        return replace(decision, suspected=best if _likely(best, bench) else None)
     others: dict[tuple[str, ...], Character] = {}
     for one in sorted(found, key=lambda one: -one.evidence):
         close = one.evidence > best.evidence - bench.options.separation * _left(best, base.fit)
@@ -91,6 +91,11 @@ def _known(best: Character, bench: Bench) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = bench.options
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > options.characterised
+
+
+def _likely(best: Character, bench: Bench) -> bool:
+    """Whether it may be known once it is fitted: of a large gap the linearised share says little."""
+    return best.p < bench.options.detection_level and best.closed > bench.options.characterised
 
 
 def _akin(one: Character, best: Character) -> bool:

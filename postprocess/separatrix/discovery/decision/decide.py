@@ -2,36 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from separatrix.discovery.decision.flexible import flexible_member
-from separatrix.discovery.decision.judge import (
-    Judged,
-    adequate,
-    admissible,
-    detection,
-    equivalent,
-    held_out_bounds,
-    judged,
-    lead,
-    margin,
-    sizeable,
-    stable,
-)
+from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
+from separatrix.discovery.decision.judge import Judged, admissible, equivalent, sizeable
 from separatrix.discovery.decision.misfit import missed
-from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.decision.rounds import Bench, Round, run_round
+from separatrix.discovery.decision.several import with_more
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
-from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.refit import Fitted, refit, shared_values
-from separatrix.discovery.fitting.screen import screen, signature
-from separatrix.discovery.options import Options
+from separatrix.discovery.fitting.refit import Fitted, shared_values
 
-_PAIRS = 6
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
 _RENEWALS = 3
 _LEADERS = 3
@@ -57,6 +41,16 @@ class Decision:
     complete: bool = True
     # of a gap without a name: on what the missing force depends, likeliest first
     characters: list = field(default_factory=list)
+    # that force as a table of the simulator, which is no name; else why there is none
+    added: Judged | None = None
+    # what is told only if it closes the gap as a table
+    suspected: object | None = None
+    not_added: str = ""
+
+    @property
+    def corrected(self) -> Judged | None:
+        """The machine that goes on: with the effects of the verdict, or with a table that has no name."""
+        return self.accepted[0] if self.accepted else self.added
 
 
 def decide(bench: Bench, base: Fitted) -> Decision:
@@ -69,7 +63,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     best, rivals = _lead(bench, first)
     found = first
     if not _detected(best):
-        return _without_name(bench, decision)
+        return _shape_alone(bench, _without_name(bench, decision), first)
     shaped = None if best.gates["adequate"] else _shaped(bench, first)
     if shaped is None and not (best.gates["adequate"] or bench.options.quick):
         # the linear screen may have passed over the effect that closes the gap
@@ -88,7 +82,17 @@ def decide(bench: Bench, base: Fitted) -> Decision:
         shaped = _shaped(bench, found)
     if shaped is not None:
         return _conclude(bench, decision, *shaped)
-    return _with_more(bench, decision, best)
+    more = with_more(bench, decision.rounds, best) if bench.options.most_effects > 1 else None
+    return _give_up(decision) if more is None else _conclude(bench, decision, *more)
+
+
+def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
+    """A family as a function where none of its closed forms, nor any other effect, stands out of chance."""
+    shaped = _shaped(bench, found) if decision.outcome == "not-in-catalogue" else None
+    if shaped is None:
+        return decision
+    decision.reasons.clear()
+    return _conclude(bench, decision, *shaped)
 
 
 def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
@@ -101,7 +105,7 @@ def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
     pass_gates(bench, one, found.base, rivals, found.screened.tests)
     if not _detected(one):
         return None
-    _judge_ceiling(bench, one)
+    judge_ceiling(bench, one)
     return member if one.gates["adequate"] and one.gates["admissible"] and one.gates["converged"] else None
 
 
@@ -128,7 +132,7 @@ def _lead(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     best, rivals = leaders(bench, found)
     pass_gates(bench, best, found.base, rivals, found.screened.tests)
     if _detected(best):
-        _judge_ceiling(bench, best)
+        judge_ceiling(bench, best)
     return best, rivals
 
 
@@ -172,60 +176,6 @@ def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     return choice(bench, found.base, found.foretold, able or found.judged, foremost)
 
 
-def choice(
-    bench: Bench, base: Fitted, foretold: Prediction | None, pool: list[Judged], choose: Callable
-) -> tuple[Judged, list[Judged]]:
-    """What `choose` takes from a pool, and its rivals.
-
-    Who was not asked to foretell is asked now, and the choice is made again.
-    """
-    pool = list(pool)
-    while True:
-        best, rivals = choose(pool, bench.options)
-        if best.prediction is not None or foretold is None:
-            return best, rivals
-        place = next(i for i, one in enumerate(pool) if one is best)
-        pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
-
-
-def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
-    """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
-
-    A fit that has not converged may not be named, but what it gained so far may stand against a name.
-    """
-    order = sorted(pool, key=lambda one: -one.evidence)
-    best = next((one for one in order if one.fitted.fit.converged), order[0])
-    return best, [one for one in order if one is not best and lead(best, one) < margin(best, one, options)]
-
-
-def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
-    """Set the p value of a candidate and every gate but the adequacy."""
-    options = bench.options
-    best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
-    best.gates["converged"] = best.fitted.fit.converged
-    best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
-    if best.prediction is not None:
-        bounds = held_out_bounds(best, options).values()
-        helps = any(low > 0 for low, _ in bounds)
-        best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
-    best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best, base, options)[0]
-    best.gates["stable"] = stable(best, base, options) >= options.inclusion
-
-
-def _of_some_size(best: Judged, options: Options) -> bool:
-    """Whether what an effect explains, where it was fitted or foretold, is no fault of a rig."""
-    seen = sizeable(2 * best.training, best.fitted.fit, options, options.least_effect)
-    if best.prediction is None:
-        return seen
-    return seen or sizeable(2 * best.held_out, best.prediction.fit, options, options.least_effect)
-
-
-def _judge_ceiling(bench: Bench, one: Judged) -> None:
-    one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
-    one.gates["adequate"] = adequate(one, bench.options)
-
-
 def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
     """A name, if every gate is passed; else what it could be."""
     failed = [gate for gate, passed in best.gates.items() if not passed]
@@ -257,70 +207,6 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"forces that depend on {gap.best.name} would explain more, no effect does")
     return decision
-
-
-def _with_more(bench: Bench, decision: Decision, best: Judged) -> Decision:
-    """One effect is not enough: try a second on top of the best, and the pairs that the screen finds."""
-    if bench.options.most_effects < 2:
-        return _give_up(decision)
-    base = decision.rounds[0].base
-    second = run_round(bench, best.fitted, best.prediction, 0.8, 0.9)
-    decision.rounds.append(second)
-    pairs = [over_base(bench, base, decision.foretold, one) for one in second.judged]
-    tried = {frozenset(one.fitted.names) for one in pairs}
-    for _, one, other in pair_gains(decision.rounds[0])[:_PAIRS]:
-        if frozenset((one, other)) not in tried:
-            made = fit_pair(bench, decision.rounds[0], one, other)
-            if made is not None:
-                pairs.append(over_base(bench, base, decision.foretold, made))
-                tried.add(frozenset((one, other)))
-    pairs = [one for one in pairs if admissible(one, base, bench.options)[0]]
-    if not pairs:
-        return _give_up(decision)
-    pair, close = choice(bench, base, decision.foretold, pairs, foremost)
-    pass_gates(bench, pair, base, close, second.screened.tests)
-    # both must be needed: each over the other alone
-    needed = bench.options.needed * bench.options.separation
-    singles = {one.name: one for one in decision.rounds[0].judged}
-    for name in pair.fitted.names:
-        others = [other for other in pair.fitted.names if other != name]
-        without = singles.get(others[0]) if len(others) == 1 else None
-        if without is not None and pair.evidence - without.evidence < needed:
-            pair.gates["drop"] = False
-    _judge_ceiling(bench, pair)
-    if pair.gates["adequate"] and pair.gates.get("drop", True):
-        return _conclude(bench, decision, pair, close)
-    return _give_up(decision)
-
-
-def over_base(bench: Bench, base: Fitted, foretold: Prediction | None, one: Judged | Fitted) -> Judged:
-    """Evidence of a pair over the base, all parameters of both effects counted."""
-    fitted = one.fitted if isinstance(one, Judged) else one
-    prediction = one.prediction if isinstance(one, Judged) else bench.foretell(fitted)
-    added = tuple(i for i, free in enumerate(fitted.problem.free) if _is_added(free.path, base))
-    whole = Fitted(fitted.names, fitted.model, fitted.problem, fitted.fit, added, fitted.tries)
-    return judged(base, foretold, whole, prediction)
-
-
-def _is_added(path: str, base: Fitted) -> bool:
-    return path.startswith("effect.") and path not in base.model.parameters
-
-
-def fit_pair(bench: Bench, found: Round, one: str, other: str) -> Fitted | None:
-    """The second effect on top of a fit of the first."""
-    singles = {single.name: single for single in found.judged}
-    if one not in singles:
-        one, other = other, one
-    if one not in singles:
-        return None
-    fitted = singles[one].fitted
-    free = with_values(fitted.problem.free, fitted.fit.values)
-    made = candidate(fitted.model, free, fitted.names, other, bench.scales)
-    if isinstance(made, str):
-        return None
-    shown = signature(fitted.problem, fitted.fit, made)
-    screened = None if shown is None else screen(fitted.fit, [shown])
-    return refit(bench.training, fitted, made, screened, quick=True)
 
 
 def _give_up(decision: Decision) -> Decision:

@@ -14,11 +14,13 @@ from separatrix.library import effects
 
 # share of the best evidence, or of what free forces explain, from which on a family is tried
 _PROMISING = 0.3
+# share of a gap that more knots must leave for still more to be tried, though they are not worth it yet
+_SATURATED = 0.8
 
 
 def flexible_member(bench: Bench, found: Round, ceiling: Ceiling) -> tuple[Judged, list[Judged]] | None:
     """The best family as a function, and its rivals of other families; or None."""
-    fitted = [one for member in _promising(bench, found, ceiling) for one in _best(bench, found, member)]
+    fitted = [one for member in _promising(bench, found, ceiling) for one in best_table(bench, found, member)]
     if not fitted:
         return None
     able = [one for one in fitted if admissible(one, found.base, bench.options)[0]]
@@ -48,12 +50,15 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
     return sorted(shares, key=lambda member: -shares[member])
 
 
-def _best(bench: Bench, found: Round, member: Member) -> Iterator[Judged]:
-    """The table of a family on as many knots as the evidence pays for; nothing where none converges."""
+def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) -> Iterator[Judged]:
+    """The table of a family on as many knots as the evidence pays for; nothing where none converges.
+
+    What is no name need not converge where not `strict`: what it foretells is its proof.
+    """
     known = _begun(found, member.family)
     best = None
     seen = member.seen(known)
-    for alike in (True, False) if len(member.values) > 1 else (False,):
+    for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in KNOTS:
             knots = knots_at(member, seen, count)
             made = (
@@ -63,21 +68,34 @@ def _best(bench: Bench, found: Round, member: Member) -> Iterator[Judged]:
                 break
             bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
             if not made.fit.converged:
+                # more knots than these records can tell apart, no function, or one far from its shape yet
                 if best is not None and made.fit.total < best.fitted.fit.total + WORSE:
-                    # more knots than these records can tell apart
                     best.fitted.finer = made
+                if count > KNOTS[0] and _saturated(known, made):
                     break
-                continue
-            known = made
+                known = min(known, made, key=lambda one: one.fit.excess)
+                if strict:
+                    continue
+            else:
+                known = made
             one = found.judge(made, bench.foretell(made, found.foretold))
             if best is not None and one.evidence < best.evidence + margin(best, one, bench.options):
                 best.fitted.finer = made
-                break
+                if _saturated(best.fitted, made):
+                    break
+                # far from its shape yet: it follows the fitted records and foretells no others
+                continue
             best = one
         if best is not None:
             known = best.fitted
     if best is not None:
         yield best
+
+
+def _saturated(one: Fitted, more: Fitted) -> bool:
+    """Whether more knots leave nearly as much of a gap, or there is none left."""
+    before, after = (max(0.0, fitted.fit.excess) for fitted in (one, more))
+    return after >= _SATURATED * before
 
 
 def _begun(found: Round, family: str) -> Fitted:

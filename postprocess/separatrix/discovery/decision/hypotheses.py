@@ -15,7 +15,14 @@ from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knots_of, scaled_motion, splines
+from separatrix.discovery.fitting.motions import (
+    after_impacts,
+    impacts_at,
+    knots_of,
+    scaled_motion,
+    splines,
+    stretches,
+)
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns, kick_columns
@@ -51,6 +58,8 @@ class Motion:
     stretch: float
     t: np.ndarray
     phase: np.ndarray | None
+    # stretch of the spring at the samples [m]; None without a linear spring, or where it is the place
+    spring: np.ndarray | None
     good: np.ndarray
 
     @property
@@ -94,7 +103,9 @@ def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
         frequency = prepared.frequency or frequency
     phase = scaled_motion(problem, fit)["phase"]
     stretch = _STRETCH * 2 * np.pi / frequency
-    return Motion(problem, fit, mass, natural, stretch, t, phase, problem.segments.inside & fit.good[:, None])
+    spring = None if phase is None else stretches(problem, fit)
+    good = problem.segments.inside & fit.good[:, None]
+    return Motion(problem, fit, mass, natural, stretch, t, phase, spring, good)
 
 
 def hypotheses(training: Motion) -> Iterator[Hypothesis]:
@@ -118,6 +129,9 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
         )
     yield _function(("speed",), lambda m: splines(m.v, over_v, m.good))
     yield _function(("place",), lambda m: splines(m.x, over_x, m.good))
+    if training.spring is not None:
+        over_s = knots_of(training.spring[training.good], 7)
+        yield _function(("stretch",), lambda m: splines(m.spring, over_s, m.good))
     yield _function(
         ("speed", "place"), lambda m: _products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
     )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What could not have been seen, and the experiment that would tell rivals apart."""
+"""What could not have been seen, and what is known to tell names of one motion apart."""
 
 from dataclasses import replace
 
@@ -10,13 +10,10 @@ from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import screen, signature
-from separatrix.discovery.wording import unit_of, units_of
+from separatrix.discovery.wording import unit_of
 from separatrix.library import effects
 
 _LADDER = 4.0 ** np.arange(-3, 4)
-_RATIOS = np.linspace(0.6, 1.5, 19)
-_PERIODS = 3
-_STEPS = 60
 # usual sizes (some per cent of the machine's own) up to which a linearised size is told
 _BELIEVED = 100.0
 _ADVICE = {
@@ -102,54 +99,10 @@ def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
     return float(rungs[i] + share * (rungs[i + 1] - rungs[i]))
 
 
-def separating_experiment(bench: Bench, one: Fitted, others: list[Fitted]) -> str:
-    """What to measure next: known advice, else the drive ratio at which the rivals differ most."""
-    for other in others:
-        advice = _ADVICE.get(frozenset((one.names[-1], other.names[-1])))
-        if advice:
-            return advice
-    if not others or bench.training.prepared[0].frequency is None:
-        return ""
-    other = others[0]
-    apart = [distance(one, other, one.model.drive_frequency({"drive.ratio": float(r)})) for r in _RATIOS]
-    if not np.isfinite(apart).any():
-        return ""
-    best = int(np.nanargmax(apart))
-    return (
-        f"a record at drive ratio {_RATIOS[best]:.2f}, where {_label(one)} and {_label(other)} differ by "
-        f"{apart[best]:.3g} {units_of(one.model.parameters).position} after {_PERIODS} drive periods"
-    )
-
-
-def _label(fitted: Fitted) -> str:
-    return " with ".join(fitted.names)
-
-
-def distance(one: Fitted, other: Fitted, frequency: float) -> float:
-    """Root mean square of the difference of two machines [unit of x] at a drive frequency [rad/s].
-
-    Over some periods, from starts and crank angles of the records; the drive is that of the first record.
-    """
-    rows = np.arange(0, one.fit.starts.shape[0], max(1, one.fit.starts.shape[0] // 12))
-    segments, prepared = one.problem.segments, one.problem.prepared
-    angles = [
-        one.problem.crank_angle(r, one.fit.values, float(prepared[r].samples.t[first]))
-        for r, first in zip(segments.record[rows], segments.first[rows], strict=True)
-    ]
-    start = np.column_stack([one.fit.starts[rows], angles])
-    times = np.tile(np.linspace(0, _PERIODS * 2 * np.pi / frequency, _STEPS), rows.size)
-    first = np.arange(rows.size + 1) * _STEPS
-    seen = []
-    for fitted in (one, other):
-        values = fitted.problem.machine_values(0, fitted.fit.values)
-        # the ratio is one to the natural frequency of each machine
-        values["drive.ratio"] *= frequency / fitted.model.drive_frequency(values)
-        flown = fitted.model.segments(
-            list(values), np.array(list(values.values())), start, first, times, derivatives=False
-        )
-        seen.append(flown.x)
-    difference = seen[0] - seen[1]
-    return float(np.sqrt(np.nanmean(difference**2))) if np.isfinite(difference).any() else np.nan
+def advice(one: Fitted, others: list[Fitted]) -> str:
+    """What is known to tell two names of one motion apart, where no drive does; '' where nothing is."""
+    pairs = (frozenset((one.names[-1], other.names[-1])) for other in others if one.names and other.names)
+    return next((_ADVICE[pair] for pair in pairs if pair in _ADVICE), "")
 
 
 def equivalents(names: list[str]) -> list[str]:

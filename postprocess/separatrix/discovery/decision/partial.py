@@ -10,12 +10,12 @@ the one with the fewest parameters is taken, and each effect must close a share 
 other effect closes.
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision, choice, decide, fit_pair, over_base, pass_gates
+from separatrix.discovery.decision.decide import Decision, decide
+from separatrix.discovery.decision.gates import choice, pass_gates
 from separatrix.discovery.decision.judge import (
     Judged,
     adequate,
@@ -27,6 +27,7 @@ from separatrix.discovery.decision.judge import (
     margin,
 )
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.decision.several import fit_set, over_base, without
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
@@ -135,7 +136,7 @@ def _pair(bench: Bench, found: Round) -> Judged | None:
     for _, one, other in pair_gains(found)[:_PAIRS]:
         if frozenset((one, other)) in tried:
             continue
-        fitted = fit_pair(bench, found, one, other)
+        fitted = fit_set(bench, found, (one, other))
         if fitted is not None:
             pairs.append(over_base(bench, found.base, found.foretold, fitted))
     pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found, bench.options)]
@@ -205,24 +206,14 @@ def _all_needed(bench: Bench, first: Round, one: Judged) -> bool:
     """
     missed = {}
     for name in one.fitted.names:
-        without = _without(bench, first, name, one.fitted.names)
-        if without is None or (without.prediction is None and one.prediction is not None):
+        other = without(bench, first, name, one.fitted.names)
+        if other is None or (other.prediction is None and one.prediction is not None):
             # it cannot be flown, or is so far behind that it was not asked to foretell
             missed[name] = np.inf
             continue
-        over = judged(without.fitted, without.prediction, one.fitted, one.prediction)
-        needed = _adds(one, without, bench.options)
+        over = judged(other.fitted, other.prediction, one.fitted, one.prediction)
+        needed = _adds(one, other, bench.options)
         missed[name] = over.evidence if needed else -np.inf
     one.gates["drop"] = all(size > 0 for size in missed.values())
     one.fitted = replace(one.fitted, names=tuple(sorted(missed, key=lambda name: -missed[name])))
     return one.gates["drop"]
-
-
-def _without(bench: Bench, first: Round, name: str, names: Iterable[str]) -> Judged | None:
-    """The machine with all effects but one; None where it cannot be fitted."""
-    others = [other for other in names if other != name]
-    singles = {one.name: one for one in first.judged}
-    if len(others) == 1:
-        return singles.get(others[0])
-    fitted: Fitted | None = fit_pair(bench, first, *others)
-    return None if fitted is None else over_base(bench, first.base, first.foretold, fitted)

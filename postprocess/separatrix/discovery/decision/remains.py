@@ -72,9 +72,8 @@ def _remains(
     mass: float,
     known: Ceiling | None = None,
 ) -> Remains:
-    gap, left = (max(0.0, _sample_chi2(one) - 1) for one in (before, after))
-    closed = None if gap == 0 else max(0.0, 1 - left / gap)
-    size = float(np.sqrt(left))
+    closed = closed_share(_fit_of(before), _fit_of(after))
+    size = float(np.sqrt(max(0.0, _fit_of(after).sample_chi2 - 1)))
     if size < _WORTH_WORDS:
         return Remains(use, closed, size, "")
     families = (known or ceiling(after.problem, after.fit, mass)).families
@@ -83,6 +82,11 @@ def _remains(
     return Remains(use, closed, size, best.name if best.gain > _MOST * free else "")
 
 
-def _sample_chi2(one: Fitted | Prediction) -> float:
-    fit: Fit | Prediction = one.fit if isinstance(one, Fitted) else one
-    return fit.sample_chi2
+def _fit_of(one: Fitted | Prediction) -> Fit | Prediction:
+    return one.fit if isinstance(one, Fitted) else one
+
+
+def closed_share(before: Fit | Prediction, after: Fit | Prediction) -> float | None:
+    """Share of a gap that is closed, 0 where it has grown; None where there was none."""
+    gap, left = (max(0.0, one.sample_chi2 - 1) for one in (before, after))
+    return None if gap == 0 else max(0.0, 1 - left / gap)

@@ -8,8 +8,9 @@ import numpy as np
 
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.decoys import decoys
+from separatrix.discovery.decision.experiments import experiments
 from separatrix.discovery.decision.judge import Judged
-from separatrix.discovery.decision.limits import detectable, equivalents, separating_experiment
+from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
@@ -23,6 +24,9 @@ from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.library import effects
 from separatrix.version import __version__
+
+# experiments that are told
+_EXPERIMENTS = 5
 
 
 @dataclass
@@ -40,17 +44,20 @@ def verdict_of(findings: Findings) -> dict:
     """Return the content of verdict.json."""
     decision, bench = findings.decision, findings.bench
     first = decision.rounds[0]
-    best = decision.accepted[0] if decision.accepted else None
+    best = decision.corrected
     final = best.fitted if best else findings.base
     findings.maps = where_maps(findings.base, bench.scales.mass, bench.options)
+    named = list(final.names) if decision.accepted else []
     rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
     return {
         "outcome": decision.outcome,
         "complete": decision.complete,
-        "effects": list(final.names),
+        "effects": named,
+        "added": list(final.names) if decision.added else [],
+        "not_added": decision.not_added,
         "alternatives": ["+".join(names) for names in decision.alternatives],
         "equivalent": decision.equivalent,
-        "equivalences": equivalents([*final.names, *[names[-1] for names in decision.alternatives]]),
+        "equivalences": equivalents([*named, *[names[-1] for names in decision.alternatives]]),
         "parameters": _parameters(final),
         "base_parameters": _parameters(findings.base),
         "where": sentences(findings.maps),
@@ -60,13 +67,13 @@ def verdict_of(findings: Findings) -> dict:
         "function": _function(final),
         "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
-        "p_value": best.p if best else None,
+        "p_value": best.p if decision.accepted else None,
         "reasons": decision.reasons,
         "asked_for": None if bench.options.candidates is None else list(bench.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
         "detectable": detectable(bench, first),
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
-        "separating_experiment": separating_experiment(bench, final, [one.fitted for one in rivals]),
+        **_next(findings, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
         "decoys": decoys(first, bench.options),
         "candidates": [_candidate(one) for one in first.judged],
@@ -83,13 +90,27 @@ def verdict_of(findings: Findings) -> dict:
     }
 
 
+def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
+    """What to measure next where the name is in doubt: known advice, experiments by what they would tell."""
+    if findings.decision.outcome != "ambiguous":
+        return {"separating_experiment": "", "experiments": []}
+    other = rivals[0] if rivals else findings.base
+    names = [" with ".join(one.names) or "the machine without it" for one in (final, other)]
+    found = [one for one in experiments(final, other) if one.d_prime > 1][:_EXPERIMENTS]
+    said = [one for one in (advice(final, rivals), *(one.text(*names) for one in found[:1])) if one]
+    return {
+        "separating_experiment": "; or ".join(said),
+        "experiments": [asdict(one) | {"text": one.text(*names)} for one in found],
+    }
+
+
 def _remaining(findings: Findings) -> list[Remains]:
     """What the accepted effect leaves of the gap."""
     decision = findings.decision
-    if not decision.accepted:
+    if decision.corrected is None:
         return []
     mass = findings.bench.scales.mass
-    return remains_of(findings.base, decision.foretold, decision.accepted[0], mass)
+    return remains_of(findings.base, decision.foretold, decision.corrected, mass)
 
 
 def _function(fitted: Fitted) -> dict | None:
@@ -164,6 +185,9 @@ def _warnings(findings: Findings) -> list[str]:
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")
+    added = findings.decision.added
+    if added is not None and not added.fitted.fit.converged:
+        notes.append(f"the fit of effect.{added.name} did not converge: its band may be too narrow")
     lost = int((~fit.good).sum())
     if lost:
         notes.append(
@@ -182,7 +206,7 @@ def _warnings(findings: Findings) -> list[str]:
 def _final(findings: Findings) -> list[tuple[str, Data, Fitted | Prediction]]:
     """Use of records, the records, and the machine of the verdict on them."""
     bench, decision = findings.bench, findings.decision
-    best = decision.accepted[0] if decision.accepted else None
+    best = decision.corrected
     fits = [("training", bench.training, best.fitted if best else findings.base)]
     if bench.held_out is not None:
         fits.append(("held out", bench.held_out, best.prediction if best else decision.foretold))
@@ -235,7 +259,7 @@ def _parameters(fitted: Fitted) -> dict:
 
 def _gap(findings: Findings) -> dict:
     decision = findings.decision
-    best = decision.accepted[0] if decision.accepted else None
+    best = decision.corrected
     gap = {"training": {"before": findings.base.fit.sample_chi2, "noise_floor": 1.0}}
     gap["training"]["after"] = best.fitted.fit.sample_chi2 if best else gap["training"]["before"]
     if decision.foretold is not None:

@@ -57,6 +57,7 @@ STARTS: dict[str, Starts] = {
     "asymmetric_friction": _asymmetry,
     "position_dependent_friction": lambda s: {"slope": [0.1 / s.length]},
     "cubic_spring": lambda s: {"stiffness": [0.02 * s.force / s.length**3]},
+    "backlash": lambda s: {"gap": [share * s.length for share in (0.05, 0.2, 0.01)]},
     "offset_force": lambda s: {"force": [0.02 * s.force]},
     "restitution_slope": lambda s: {"slope": [0.1 / s.impact_speed]},
     "compliant_contact": lambda s: {
@@ -64,6 +65,10 @@ STARTS: dict[str, Starts] = {
             1.25 * s.mass * s.impact_speed**2 / (share * s.length) ** 2.5 for share in (0.03, 0.008, 0.1)
         ],
         "damping": [0.6 / s.impact_speed],
+    },
+    "kelvin_voigt_contact": lambda s: {
+        "stiffness": [s.mass * s.impact_speed**2 / (share * s.length) ** 2 for share in (0.03, 0.008, 0.1)],
+        "damping": [0.3 * s.mass * s.impact_speed / (0.03 * s.length)],
     },
     "second_barrier": lambda s: {"position": [np.nan]},
     "drive_ripple": lambda s: {"sine": [0.02], "cosine": [0.02]},

@@ -26,6 +26,8 @@ KNOTS = (3, 5, 8, 12)
 _IMPACTS = 3
 # least range of the variable beside its largest value
 _NARROW = 0.05
+# places at which a series is drawn
+_TURN = 49
 # share of the range in which knots lie evenly; the rest of them goes where the motion is
 _EVEN = 0.5
 
@@ -69,6 +71,11 @@ def knots_at(member: Member, seen: np.ndarray, count: int) -> np.ndarray | None:
     """Knots over the seen values, half of the way from even ones to their quantiles; None for too few."""
     if seen.size < _IMPACTS * count or not np.ptp(seen) > _NARROW * np.max(np.abs(seen)):
         return None
+    if not member.knots:
+        return np.arange(1.0, count + 1)
+    if member.beside:
+        # zero is implied
+        return seen[-1] * np.arange(1, count + 1) / count
     first = 0.0 if member.from_zero else seen[0]
     even = np.linspace(first, seen[-1], count)
     return _EVEN * even + (1 - _EVEN) * np.quantile(np.append(first, seen), np.linspace(0, 1, count))
@@ -84,8 +91,10 @@ def fit_member(
     begun = member.known(known, base, knots)
     if begun is None:
         return None
-    values = {f"{member.knots}[{i}]": float(one) for i, one in enumerate(knots, start=1)}
+    values = {f"{member.knots}[{i}]": float(one) for i, one in enumerate(knots, start=1) if member.knots}
     values |= {f"{key}[{i}]": 0.0 for key in member.values for i in range(1, knots.size + 1)}
+    if member.beside:
+        values[member.beside[0]] = 0.0
     try:
         extended = base.model.with_effect(member.effect, values)
     except SeparatrixError:
@@ -94,6 +103,10 @@ def fit_member(
         one for one in base.problem.free if not (member.replaces and one.path.startswith(member.replaces))
     ]
     added, start = _table(member, begun, alike)
+    if member.beside:
+        key, of = member.beside
+        added.append(Free(f"effect.{member.effect}.{key}", 0.0, 0.0, np.inf, max(of(known), 1e-6)))
+        start.append(of(known))
     names = (*base.names, member.effect)
     place = tuple(range(len(free), len(free) + len(added)))
     values = values_of(known, [*free, *added])
@@ -110,14 +123,16 @@ def fit_member(
 def _table(member: Member, begun: list[np.ndarray], alike: bool) -> tuple[list[Free], list[float]]:
     """The free values of a table, and those to start from."""
     added, start = [], []
-    bound = (-1.0, np.inf if member.by_share else 1.0) if member.anchor else (-np.inf, np.inf)
+    bound = (-1.0, np.inf if member.by_share else 1.0) if member.anchor else (member.least, np.inf)
+    # what the anchor, or scale and phase of the drive, would only repeat
+    first = 1 if member.anchor or not member.knots else 0
     for key, whole in zip(member.values[:1] if alike else member.values, begun, strict=False):
         table, size = whole, 0.05 * max(float(np.max(np.abs(whole))), 1e-6)
         if member.anchor:
             table, size = whole - whole[0], 0.05
         if member.by_share:
             table = table / whole[0]
-        for i in range(1 if member.anchor else 0, table.size):
+        for i in range(first, table.size):
             path = f"effect.{member.effect}.{key}[{i + 1}]"
             also = path.replace(f".{key}[", f".{member.values[1]}[") if alike else None
             added.append(Free(path, 0.0, *bound, size, also=also))
@@ -135,6 +150,8 @@ def function_values(fitted: Fitted) -> tuple[Member, list[Part]] | None:
     if member is None:
         return None
     parameters, paths = fitted.model.parameters, [one.path for one in fitted.problem.free]
+    if not member.knots:
+        return member, [_series(fitted, member)]
     count = sum(path.startswith(f"effect.{member.effect}.{member.knots}[") for path in parameters)
     knots = np.array(
         [parameters[f"effect.{member.effect}.{member.knots}[{i}]"].value for i in range(1, count + 1)]
@@ -156,7 +173,8 @@ def function_values(fitted: Fitted) -> tuple[Member, list[Part]] | None:
         elif member.anchor:
             slopes[1:, 0] = 1
             value = slopes @ value
-        else:
+        elif member.effect == "friction_curve":
+            # all of it: the law of the machine is in it
             value = friction_at(fitted, knots, -1.0 if key == "downwards" else 1.0)
         covariance = slopes @ fitted.covariance[np.ix_(places, places)] @ slopes.T
         name = "" if len(member.values) == 1 or alike else key
@@ -170,6 +188,21 @@ def function_values(fitted: Fitted) -> tuple[Member, list[Part]] | None:
             wanted = np.maximum(0.0, chance - one.error**2) + np.maximum(0.0, changed - chance)
             one.covariance = one.covariance + np.diag(wanted)
     return member, parts
+
+
+def _series(fitted: Fitted, member: Member) -> Part:
+    """A series of harmonics by its values over a turn."""
+    at = np.linspace(0, 2 * np.pi, _TURN)
+    paths = [one.path for one in fitted.problem.free]
+    columns, places = [], []
+    for key, wave in zip(member.values, (np.cos, np.sin), strict=True):
+        for place, path in enumerate(paths):
+            if path.startswith(f"effect.{member.effect}.{key}["):
+                places.append(place)
+                columns.append(wave(int(path.split("[")[1][:-1]) * at))
+    basis = np.column_stack(columns)
+    covariance = basis @ fitted.covariance[np.ix_(places, places)] @ basis.T
+    return Part("", at, basis @ fitted.fit.values[places], covariance)
 
 
 def function_of(fitted: Fitted) -> Function | None:

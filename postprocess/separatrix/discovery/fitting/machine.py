@@ -15,7 +15,8 @@ _FIXED = (
     "drive.ratio",
     "drive.interval",
 )
-_FIXED_ENDS = ("exponent", "harmonic", "tension")
+_FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding")
+_KNOTS = ("speed[", "place[", "stretch[", "penetration[")
 SENSOR_BIAS = "effect.sensor_bias.bias"
 SENSOR_ZERO = "nuisance:sensor_zero"
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
@@ -84,7 +85,7 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
 def _is_fitted(path: str, measured_force: bool) -> bool:
     if path == "body.mass":
         return measured_force
-    if ".speed[" in path or ".place[" in path:
+    if path.split(".")[-1].startswith(_KNOTS):
         # knots of a table
         return False
     if path.startswith((*_AMPLITUDES, "drive.force")) or path in _FIXED or path.endswith(_FIXED_ENDS):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.fitting.motions import stretches
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.library import effects
 
@@ -18,7 +19,10 @@ _INSTANT = 1e-5
 
 @dataclass(frozen=True)
 class Member:
-    """An effect that is a table: the key of its knots and those of its values."""
+    """An effect that is a table: the key of its knots and those of its values.
+
+    One without knots is a series of harmonics; the first is what the scale and the phase of the drive are.
+    """
 
     effect: str
     knots: str
@@ -39,8 +43,14 @@ class Member:
     seen: Callable[[Fitted], np.ndarray]
     # the function in a known machine beside a base at the knots, one for each of `values`, or None
     known: Callable[[Fitted, Fitted, np.ndarray], list[np.ndarray] | None]
+    # on what a missing force depends that it can be, as hypotheses have it
+    depends_on: tuple[str, ...] = ()
     # whether the knots begin at zero
     from_zero: bool = False
+    # least value of the table
+    least: float = -np.inf
+    # parameter beside the table, and what to start it from
+    beside: tuple[str, Callable[[Fitted], float]] | None = None
 
     @property
     def family(self) -> str:
@@ -73,6 +83,34 @@ def _places(fitted: Fitted) -> np.ndarray:
     return np.sort(x[speed > _SLOW * speed.max(initial=0)])
 
 
+def _everywhere(fitted: Fitted) -> np.ndarray:
+    """Places of the fitted motion at the samples [m]."""
+    return np.sort(fitted.fit.evaluation.x[_inside(fitted)])
+
+
+def _stretches(fitted: Fitted) -> np.ndarray:
+    """Stretches of the spring at the samples [m]; none without a linear spring."""
+    found = stretches(fitted.problem, fitted.fit)
+    return np.zeros(0) if found is None else np.sort(found[_inside(fitted)])
+
+
+def _penetrations(fitted: Fitted) -> np.ndarray:
+    """Penetrations into a soft barrier at the samples [m]."""
+    values = _values(fitted)
+    x = fitted.fit.evaluation.x[_inside(fitted)]
+    depth = np.zeros(0)
+    for path, side in (("contact.upper", 1), ("contact.lower", -1)):
+        if path in fitted.model.parameters:
+            depth = np.append(depth, side * (x - values.get(path, fitted.model.parameters[path].value)))
+    return np.sort(depth[depth > 0])
+
+
+def _angles(fitted: Fitted) -> np.ndarray:
+    """Angles of the crank at the samples [rad], where there is a drive."""
+    driven = any(one.frequency is not None for one in fitted.problem.prepared)
+    return np.linspace(0, 2 * np.pi, _inside(fitted).sum()) if driven else np.zeros(0)
+
+
 def _inside(fitted: Fitted) -> np.ndarray:
     return fitted.problem.segments.inside & fitted.fit.good[:, None]
 
@@ -90,6 +128,50 @@ def _known_over_place(known: Fitted, base: Fitted, places: np.ndarray) -> list[n
     values = _values(known)
     slope = values.get("effect.position_dependent_friction.slope", 0.0)
     return [values["friction.kinetic_coefficient"] * np.maximum(1 + slope * places, 0)]
+
+
+def _known_spring(known: Fitted, base: Fitted, at: np.ndarray) -> list[np.ndarray]:
+    values, case = _values(known), base.model.parameters["restoring.stiffness"].value
+    stiffness = values.get("restoring.stiffness", case)
+    slack = 0.5 * values.get("effect.backlash.gap", 0.0)
+    cubic = values.get("effect.cubic_spring.stiffness", 0.0)
+    return [(stiffness - case) * at + cubic * at**3 - stiffness * np.clip(at, -slack, slack)]
+
+
+def _known_force(known: Fitted, base: Fitted, at: np.ndarray) -> list[np.ndarray]:
+    return [np.full(at.size, _values(known).get("effect.offset_force.force", 0.0))]
+
+
+def _known_contact(known: Fitted, base: Fitted, at: np.ndarray) -> list[np.ndarray] | None:
+    for name, default in (("compliant_contact", 1.5), ("kelvin_voigt_contact", 1.0)):
+        stiffness = _values(known).get(f"effect.{name}.stiffness")
+        if stiffness is not None:
+            exponent = known.model.parameters.get(f"effect.{name}.exponent")
+            return [stiffness * at ** (default if exponent is None else exponent.value)]
+    # a table that was fitted on fewer knots
+    count = sum(path.startswith("effect.contact_curve.force[") for path in _values(known))
+    if not count:
+        return None
+    table = [
+        [known.model.parameters[f"effect.contact_curve.penetration[{i}]"].value for i in range(1, count + 1)],
+        [_values(known)[f"effect.contact_curve.force[{i}]"] for i in range(1, count + 1)],
+    ]
+    return [np.interp(at, [0, *table[0]], [0, *table[1]])]
+
+
+def _contact_damping(known: Fitted) -> float:
+    """Of a force that grows with the rate of penetration by this share [s/m]."""
+    values = _values(known)
+    for name in ("compliant_contact", "contact_curve"):
+        if f"effect.{name}.damping" in values:
+            return values[f"effect.{name}.damping"]
+    deepest = _penetrations(known).max(initial=0.0)
+    force = values["effect.kelvin_voigt_contact.stiffness"] * deepest / 2
+    return values["effect.kelvin_voigt_contact.damping"] / max(force, 1e-300)
+
+
+def _no_harmonics(known: Fitted, base: Fitted, orders: np.ndarray) -> list[np.ndarray]:
+    return [np.zeros(orders.size), np.zeros(orders.size)]
 
 
 def _values(fitted: Fitted) -> dict[str, float]:
@@ -163,14 +245,32 @@ def _is_friction(path: str) -> bool:
 MEMBERS = (
     Member(
         "restitution_curve", "speed", ("change",), "impact speed", "m/s", "restitution",
-        "contact.restitution", False, None, "impacts", _impact_speeds, _known_restitution,
+        "contact.restitution", False, None, "impacts", _impact_speeds, _known_restitution, ("impact speed",),
     ),
     Member(
         "friction_curve", "speed", ("upwards", "downwards"), "speed", "m/s", "friction (N)",
-        None, False, "friction.", "speed", _speeds, _known_friction, from_zero=True,
+        None, False, "friction.", "speed", _speeds, _known_friction, ("speed",), from_zero=True,
     ),
     Member(
         "friction_place_curve", "place", ("change",), "place", "m", "coefficient of kinetic friction",
         "friction.kinetic_coefficient", True, None, "speed and place", _places, _known_over_place,
+        ("speed", "place"),
+    ),
+    Member(
+        "spring_curve", "stretch", ("force",), "stretch", "m", "force beyond the spring of the case (N)",
+        None, False, "restoring.", "place", _stretches, _known_spring, ("stretch",),
+    ),
+    Member(
+        "force_curve", "place", ("force",), "place", "m", "force beyond the spring of the case (N)",
+        None, False, "restoring.", "place", _everywhere, _known_force, ("place",),
+    ),
+    Member(
+        "contact_curve", "penetration", ("force",), "penetration", "m", "contact force (N)",
+        None, False, None, "time since impact", _penetrations, _known_contact, ("time since impact",),
+        least=0.0, beside=("damping", _contact_damping),
+    ),
+    Member(
+        "drive_harmonics", "", ("cosine", "sine"), "drive phase", "rad", "motion of the foot (m)",
+        None, False, None, "phase", _angles, _no_harmonics, ("drive phase",),
     ),
 )  # fmt: skip

@@ -3,11 +3,17 @@
 """What a missing force may be a function of, along a fitted motion: place, speed, phase, time, impacts."""
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, CubicSpline
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import sample_times
+from separatrix.library import effects
+
+# angles of the crank at which the foot of the spring is asked for
+_ANGLES = np.linspace(0, 2 * np.pi, 65)
+# time over which a force is measured, in natural periods or seconds
+_INSTANT = 1e-5
 
 
 def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
@@ -27,6 +33,48 @@ def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
             phase = np.zeros(inside.shape) if phase is None else phase
             phase[rows] = problem.crank_angle(number, fit.values, stamps)
     return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
+
+
+def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
+    """Stretch of the spring at the samples [m]; None where there is no linear spring."""
+    if "restoring.stiffness" not in problem.model.parameters:
+        return None
+    found = np.zeros(problem.segments.inside.shape)
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        if not rows.size:
+            continue
+        stamps = prepared.samples.t[problem.segments.index[rows]]
+        where = CubicSpline(_ANGLES, _slack_places(problem, fit, number), bc_type="periodic")
+        angle = np.mod(problem.crank_angle(number, fit.values, stamps), 2 * np.pi)
+        found[rows] = where(angle) - fit.evaluation.x[rows]
+    return found
+
+
+def _slack_places(problem: Problem, fit: Fit, number: int) -> np.ndarray:
+    """Places at which the spring pulls nothing [m], at the crank angles `_ANGLES` of a record.
+
+    From the force on a body in the middle of the motion when only the spring acts.
+    """
+    model, x = problem.model, float(np.median(fit.evaluation.x[problem.segments.inside]))
+    values = problem.machine_values(number, fit.values)
+    for path in model.parameters:
+        first, *middle, last = path.split(".")
+        acts = first == "effect" and last.split("[")[0] in effects()[middle[0]].amplitudes
+        if (first == "friction" and last.endswith(("coefficient", "damping"))) or acts:
+            values[path] = 0.0
+    time = _INSTANT / max(1.0, model.drive_frequency({}))
+    start = np.column_stack([np.full(_ANGLES.size, x), np.zeros(_ANGLES.size), _ANGLES])
+    flown = model.segments(
+        list(values), np.array(list(values.values())), start, 2 * np.arange(_ANGLES.size + 1),
+        np.tile([0.0, time], _ANGLES.size), derivatives=False, tolerance=1e-12,
+    )  # fmt: skip
+    mass, stiffness = (
+        values.get(path, model.parameters[path].value) for path in ("body.mass", "restoring.stiffness")
+    )
+    pulled = mass * flown.v[1::2] / (time * stiffness)
+    pulled[-1] = pulled[0]
+    return x + pulled
 
 
 def impacts_at(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:

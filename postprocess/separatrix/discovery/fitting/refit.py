@@ -26,6 +26,8 @@ _SPARED = 3
 _FEW = 0.1
 # log-likelihood by which a machine that contains the base may be worse than it
 WORSE = 1.0
+# share of chi^2 by which two fits of one minimum may differ
+_SAME = 1e-3
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -95,9 +97,13 @@ def refit(
         if not fit.far_off(_hopeless(base)):
             fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
+        # from afar to the same minimum: there is no need of another start
+        agreed = best is not None and kind == "far" and _same_minimum(found, best)
         if best is None or _better(found, best):
             best = found
         best.tries = tries
+        if agreed:
+            break
         promised = base.fit.reduced_chi2 < _BAD and kind == "linear"
         if (promised or best.fit.like_noise(1)) and _delivers(best, base, candidate, screened):
             break
@@ -152,6 +158,12 @@ def _delivers(found: Fitted, base: Fitted, candidate: Candidate, screened: Scree
     believed = screened is not None and base.fit.reduced_chi2 < _BAD
     promised = screened.gain.get(candidate.names[-1], 0.0) if believed else 0.0
     return gain_over(found, base)[0] >= _DELIVERED * promised
+
+
+def _same_minimum(one: Fitted, other: Fitted) -> bool:
+    """Whether two fits follow the same segments as closely."""
+    both = one.fit.good.sum() == other.fit.good.sum()
+    return bool(both and abs(gain_over(one, other)[0]) < max(WORSE, _SAME * one.fit.total))
 
 
 def _better(one: Fitted, other: Fitted) -> bool:

@@ -61,6 +61,32 @@ FORMS: dict[str, dict[str, Form]] = {
             lambda x: [[0.1, 0.01, 0.01, turns * np.pi / np.ptp(x)] for turns in (0.5, 1, 2, 3, 4, 6)],
         ),
     },
+    "spring_curve": {
+        "linear": _LINEAR,
+        "quadratic": _SQUARE,
+        "cubic": Form(lambda s, a, b, c: a + b * s + c * s**3, lambda x: [[0.0, 0.0, 0.0]]),
+        "free play": Form(
+            lambda s, a, b, c, d: a + b * s + c * np.clip(s, -abs(d), abs(d)),
+            lambda x: [[0.0, 0.0, 1.0, share * np.max(np.abs(x))] for share in (0.1, 0.3, 0.6)],
+        ),
+    },
+    "force_curve": {
+        "constant": _CONSTANT,
+        "linear": _LINEAR,
+        "quadratic": _SQUARE,
+        "cubic": Form(lambda x, a, b, c, d: a + b * x + c * x**2 + d * x**3, lambda x: [[0.0] * 4]),
+        "sine": Form(
+            lambda x, a, b, c, d: a + b * np.sin(d * x) + c * np.cos(d * x),
+            lambda x: [[0.1, 0.01, 0.01, turns * np.pi / np.ptp(x)] for turns in (0.5, 1, 2, 3, 4, 6)],
+        ),
+    },
+    "contact_curve": {
+        "linear": Form(lambda p, a: a * p, lambda x: [[1.0]]),
+        "hertz": Form(lambda p, a: a * p**1.5, lambda x: [[1.0]]),
+        "power": Form(lambda p, a, b: a * p ** np.clip(b, 0.5, 10), lambda x: [[1.0, 1.5]]),
+    },
+    # a series is its own closed form
+    "drive_harmonics": {},
 }
 """By effect: the function over its variable."""
 

@@ -65,7 +65,7 @@ def compare(
 
 
 def _reason(verdict: dict) -> str:
-    if not verdict["effects"]:
+    if not (verdict["effects"] or verdict["added"]):
         return "no effect was added"
     if any(one["drive_frequency"] is None for one in verdict["records"]):
         return "the machine has no drive that turns"

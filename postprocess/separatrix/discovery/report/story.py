@@ -66,6 +66,13 @@ def _summary(verdict: dict) -> Section:
     lines = [f"Verdict: {verdict['outcome']}. {said}"]
     for place, one in enumerate(verdict["character"]):
         lines.append(f"{'Or ' if place else 'Most likely '}{one['text']}.")
+    if verdict["added"]:
+        lines.append(
+            f"It is added to the case as a table, effect.{verdict['added'][-1]}: no name, but the function "
+            "that closes the gap."
+        )
+    elif verdict["not_added"]:
+        lines.append(f"{verdict['not_added'][0].upper()}{verdict['not_added'][1:]}.")
     for path, one in verdict["parameters"].items():
         if path.startswith("effect."):
             digits = digits_of(one["value"], one["standard_error"])
@@ -281,7 +288,7 @@ def _foretold(verdict: dict) -> str:
         f"{number(one['before'])} for the base machine, {number(one['after'])} for "
         + (
             "the machine of the verdict."
-            if verdict["effects"]
+            if verdict["effects"] or verdict["added"]
             else "the machine of the verdict, which is the base machine."
         )
     )
@@ -325,7 +332,17 @@ def _detectable(verdict: dict) -> Section:
 
 def _experiment(verdict: dict) -> Section:
     if verdict["separating_experiment"]:
+        rows = [
+            [
+                number(one["drive_ratio"], 3) if one["drive_ratio"] is not None else "-",
+                number(one["scale"], 3),
+                number(one["d_prime"], 3),
+            ]
+            for one in verdict["experiments"]
+        ]
         said = f"To tell apart what remains: {verdict['separating_experiment']}."
+        header = ["drive ratio", "drive (or start) over that of the first record", "standard errors apart"]
+        return Section("next", "What to measure next", [said, *([Table(header, rows)] if rows else [])])
     elif verdict["outcome"] == "ambiguous":
         said = "No experiment with this machine was found that would tell the candidates apart."
     elif verdict["outcome"] in ("not-in-catalogue", "characterised"):

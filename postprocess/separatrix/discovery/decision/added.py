@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A gap without a name, of which it is known on what it depends, as a law of the simulator: a table."""
+
+from dataclasses import replace
+
+from separatrix.discovery.decision.characterise import Character
+from separatrix.discovery.decision.decide import Decision
+from separatrix.discovery.decision.flexible import best_table
+from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.remains import closed_share
+from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.fitting.curves import fits_machine
+from separatrix.discovery.fitting.members import MEMBERS
+
+
+def with_law(bench: Bench, decision: Decision) -> Decision:
+    """The decision with what was characterised as a table, or with the reason why the simulator has none.
+
+    The table must close as much of the gap as what is characterised must, fitted and on held-out records.
+    """
+    if decision.suspected is not None:
+        found = _law(bench, decision, decision.suspected)
+        if not isinstance(found, Judged):
+            return decision
+        return replace(decision, outcome="characterised", characters=[decision.suspected], added=found)
+    if decision.outcome != "characterised":
+        return decision
+    reasons = []
+    for character in decision.characters:
+        found = _law(bench, decision, character)
+        if isinstance(found, Judged):
+            return replace(decision, added=found, not_added="")
+        reasons.append(found)
+    return replace(decision, not_added=f"nothing is added to the case: {'; '.join(reasons)}")
+
+
+def _law(bench: Bench, decision: Decision, character: Character) -> Judged | str:
+    """The table that a character is, fitted; or why there is none."""
+    base, depends_on = decision.rounds[0].base, character.hypothesis.depends_on
+    what = " and ".join(depends_on)
+    members = [one for one in MEMBERS if one.depends_on == depends_on]
+    if not members:
+        return f"the simulator has no law of a force that depends on {what}{_elsewhere(character)}"
+    member = next((one for one in members if fits_machine(one, base.model)), None)
+    if member is None:
+        return f"this machine has no place for effect.{members[0].effect}, a force that depends on {what}"
+    best = next(best_table(bench, decision.rounds[0], member, strict=False), None)
+    if best is None:
+        return f"effect.{member.effect} could not be fitted to these records"
+    shares = [closed_share(base.fit, best.fitted.fit)]
+    if best.prediction is not None:
+        shares.append(closed_share(decision.foretold, best.prediction))
+    lowest = min(share for share in shares if share is not None)
+    if lowest <= bench.options.characterised:
+        return f"effect.{member.effect}, over {member.variable}, closes only {100 * lowest:.0f} % of the gap"
+    return best
+
+
+def _elsewhere(character: Character) -> str:
+    """Where a hidden state is known to be that of a body of its own, and which."""
+    if character.size is None or "(z - x)" not in character.hypothesis.formula:
+        return ""
+    stiffness = character.size[0]
+    mass = stiffness / character.constant**2
+    return (
+        f"; a further body of {mass:.3g} kg on a spring of {stiffness:.3g} N/m has such a state: that is a "
+        "structure (docs/case-file.md), which is no base machine yet"
+    )

@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What to measure next: the experiments of the rig, by how far apart they would put two machines.
+
+One machine is flown to its motion at another drive, the other from the same states, drive period by drive
+period. What the starts of these and the parameters can imitate, the parameters within what the records leave
+of their errors, is projected out; the rest over the noise is d', the size in standard errors.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.errors import SeparatrixError
+
+_RATIOS = np.linspace(0.6, 1.5, 13)
+# of the drive, or without one of the start
+_SCALES = (0.6, 1.0, 1.6)
+# periods before the motion is looked at, periods that are compared, samples in each
+_SETTLING, _PERIODS, _STEPS = 12, 12, 40
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A record as long as the first one: its drive ratio, scale of the drive or of the start, d'."""
+
+    drive_ratio: float | None
+    scale: float
+    d_prime: float
+
+    def text(self, one: str, other: str) -> str:
+        """In words."""
+        what = "a record of a free motion from" if self.drive_ratio is None else "a record at"
+        where = f"{self.scale:g} times the start of the first one"
+        if self.drive_ratio is not None:
+            where = f"drive ratio {self.drive_ratio:.2f} with {self.scale:g} times the drive"
+        return f"{what} {where}: {one} and {other} would differ by {self.d_prime:.3g} standard errors"
+
+
+def experiments(one: Fitted, other: Fitted) -> list[Experiment]:
+    """What the rig allows, the most telling first; none where the force on the body must be known."""
+    first = one.problem.prepared[0]
+    if first.record.force is not None:
+        return []
+    ratios = [None] if first.frequency is None else [float(ratio) for ratio in _RATIOS]
+    found = []
+    for ratio in ratios:
+        for scale in _SCALES:
+            try:
+                apart = d_prime(one, other, ratio, scale)
+            except SeparatrixError:
+                # no such machine
+                continue
+            if np.isfinite(apart):
+                found.append(Experiment(ratio, scale, apart))
+    return sorted(found, key=lambda experiment: -experiment.d_prime)
+
+
+def d_prime(one: Fitted, other: Fitted, ratio: float | None, scale: float) -> float:
+    """Size in standard errors of what tells two machines apart in a record at a drive ratio of the case."""
+    first = one.problem.prepared[0]
+    frequency = None if ratio is None else one.model.drive_frequency({"drive.ratio": ratio})
+    length = 2 * np.pi / (frequency or first.natural or 2 * np.pi / (first.record.t[-1] / _PERIODS))
+    values = [_values(fitted, frequency, scale) for fitted in (one, other)]
+    start = _states(one, values[0], frequency, length, scale)
+    times = np.tile(np.arange(_STEPS) * length / _STEPS, _PERIODS)
+    edges = np.arange(_PERIODS + 1) * _STEPS
+    paths, directions, prior = _directions(one, values[0], scale if ratio is not None else 1.0)
+    flown = one.model.segments(
+        paths, np.array([values[0][path] for path in paths]), start, edges, times, directions=directions
+    )
+    beside = other.model.segments(
+        list(values[1]), np.array(list(values[1].values())), start, edges, times, derivatives=False
+    )
+    shape = (_PERIODS, _STEPS)
+    apart = ((beside.x - flown.x) / first.sigma).reshape(shape)
+    slopes = (flown.jacobian / first.sigma).reshape(*shape, -1)
+    usable = np.isfinite(apart).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)) & flown.steady
+    if not usable.any():
+        return np.nan
+    # samples of a whole record for each of these
+    seen = np.ptp(first.record.t) / first.record.interval / (usable.sum() * _STEPS)
+    return _left(apart[usable], slopes[usable], directions.shape[0], seen, prior)
+
+
+def _values(fitted: Fitted, frequency: float | None, scale: float) -> dict[str, float]:
+    """The machine as fitted with the drive of an experiment."""
+    values = fitted.problem.machine_values(0, fitted.fit.values)
+    if frequency is None:
+        return values
+    for path in fitted.problem.amplitudes:
+        values[path] = scale * values.get(path, fitted.model.parameters[path].value)
+    # the ratio is one to the natural frequency of each machine
+    values["drive.ratio"] *= frequency / fitted.model.drive_frequency(values)
+    return values
+
+
+def _states(
+    one: Fitted, values: dict[str, float], frequency: float | None, length: float, scale: float
+) -> np.ndarray:
+    """States (periods, 3) at the beginnings of the periods that are compared, once the motion has settled."""
+    begun = one.fit.starts[0] * (1.0 if frequency else scale)
+    before = _SETTLING if frequency else 0
+    times = np.arange(before + _PERIODS) * length
+    start = np.array([[*begun, 0.0]])
+    flown = one.model.segments(
+        list(values), np.array(list(values.values())), start, [0, times.size], times, derivatives=False
+    )
+    return np.column_stack([flown.x, flown.v, np.zeros(times.size)])[before:]
+
+
+def _directions(
+    one: Fitted, values: dict[str, float], scale: float
+) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Paths of the machine, directions of what is free in it, and what the records know of these."""
+    paths = list(values)
+    rows, places = [], []
+    for place, free in enumerate(one.problem.free):
+        row = np.zeros(len(paths))
+        if free.path == "nuisance:drive_scale":
+            for path, size in one.problem.amplitudes.items():
+                row[paths.index(path)] = scale * size
+        elif not free.is_nuisance:
+            for path in free.paths:
+                row[paths.index(path)] = free.slope(one.fit.values[place])
+        if row.any():
+            rows.append(row)
+            places.append(place)
+    covariance = one.covariance[np.ix_(places, places)]
+    known = np.diag(covariance) > 0
+    prior = np.zeros_like(covariance)
+    prior[np.ix_(known, known)] = np.linalg.pinv(covariance[np.ix_(known, known)], hermitian=True)
+    return paths, np.array(rows), prior
+
+
+def _left(apart: np.ndarray, slopes: np.ndarray, count: int, seen: float, prior: np.ndarray) -> float:
+    """Length of the difference beside what starts and parameters imitate."""
+    matrix, gradient, square = prior.copy(), np.zeros(count), 0.0
+    for difference, table in zip(apart, slopes, strict=True):
+        by_parameter, by_start = table[:, :count], table[:, count : count + 2]
+        basis = np.linalg.qr(by_start / np.maximum(np.linalg.norm(by_start, axis=0), 1e-300))[0]
+        difference = difference - basis @ (basis.T @ difference)
+        by_parameter = by_parameter - basis @ (basis.T @ by_parameter)
+        matrix += seen * by_parameter.T @ by_parameter
+        gradient += seen * by_parameter.T @ difference
+        square += seen * float(difference @ difference)
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    step = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-11, hermitian=True) @ (gradient / size)
+    return float(np.sqrt(max(0.0, square - step @ (gradient / size))))

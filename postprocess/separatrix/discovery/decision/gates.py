@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The choice among candidates and the gates that the chosen one has to pass."""
+
+from collections.abc import Callable
+
+from separatrix.discovery.decision.judge import (
+    Judged,
+    adequate,
+    admissible,
+    detection,
+    held_out_bounds,
+    judged,
+    lead,
+    margin,
+    sizeable,
+    stable,
+)
+from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.fitting.ceiling import ceiling
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.options import Options
+
+
+def choice(
+    bench: Bench, base: Fitted, foretold: Prediction | None, pool: list[Judged], choose: Callable
+) -> tuple[Judged, list[Judged]]:
+    """What `choose` takes from a pool, and its rivals.
+
+    Who was not asked to foretell is asked now, and the choice is made again.
+    """
+    pool = list(pool)
+    while True:
+        best, rivals = choose(pool, bench.options)
+        if best.prediction is not None or foretold is None:
+            return best, rivals
+        place = next(i for i, one in enumerate(pool) if one is best)
+        pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
+
+
+def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
+    """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
+
+    A fit that has not converged may not be named, but what it gained so far may stand against a name.
+    """
+    order = sorted(pool, key=lambda one: -one.evidence)
+    best = next((one for one in order if one.fitted.fit.converged), order[0])
+    return best, [one for one in order if one is not best and lead(best, one) < margin(best, one, options)]
+
+
+def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
+    """Set the p value of a candidate and every gate but the adequacy."""
+    options = bench.options
+    best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
+    best.gates["converged"] = best.fitted.fit.converged
+    best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
+    if best.prediction is not None:
+        bounds = held_out_bounds(best, options).values()
+        helps = any(low > 0 for low, _ in bounds)
+        best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
+    best.gates["separate"] = not rivals
+    best.gates["admissible"] = admissible(best, base, options)[0]
+    best.gates["stable"] = stable(best, base, options) >= options.inclusion
+
+
+def _of_some_size(best: Judged, options: Options) -> bool:
+    """Whether what an effect explains, where it was fitted or foretold, is no fault of a rig."""
+    seen = sizeable(2 * best.training, best.fitted.fit, options, options.least_effect)
+    if best.prediction is None:
+        return seen
+    return seen or sizeable(2 * best.held_out, best.prediction.fit, options, options.least_effect)
+
+
+def judge_ceiling(bench: Bench, one: Judged) -> None:
+    """Set the gate of the adequacy: what a flexible machine would still explain."""
+    one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
+    one.gates["adequate"] = adequate(one, bench.options)

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""More than one effect: found one by one, fitted jointly, and each held against leaving it out."""
+
+from collections.abc import Iterable
+
+from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
+from separatrix.discovery.decision.judge import Judged, admissible, judged
+from separatrix.discovery.decision.remains import closed_share
+from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
+from separatrix.discovery.fitting.catalogue import candidate
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.machine import with_values
+from separatrix.discovery.fitting.refit import Fitted, refit
+from separatrix.discovery.fitting.screen import screen, signature
+
+_PAIRS = 6
+# share of what is left of the gap that an effect must close for another one to be looked for on top of it
+_CLOSES = 0.5
+
+
+def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, list[Judged]] | None:
+    """Several effects that close the gap together, and their rivals; None where none do.
+
+    On top of the best effect a second is tried, and the pairs that the screen finds; then a third, and so on,
+    as long as each is needed and closes most of what was left. The rounds are added to `rounds`.
+    """
+    first, found = rounds[0], best
+    while len(found.fitted.names) < bench.options.most_effects:
+        grown = [one for one in _grown(bench, rounds, found) if admissible(one, first.base, bench.options)[0]]
+        if not grown:
+            return None
+        larger, close = choice(bench, first.base, first.foretold, grown, foremost)
+        pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
+        judge_ceiling(bench, larger)
+        larger.gates["drop"] = _all_needed(bench, first, larger, found)
+        if larger.gates["adequate"] and larger.gates["drop"]:
+            return larger, close
+        if not (larger.gates["drop"] and larger.fitted.fit.converged and _closes_most(found, larger)):
+            return None
+        found = larger
+    return None
+
+
+def _grown(bench: Bench, rounds: list[Round], found: Judged) -> list[Judged]:
+    """Sets of effects with one more than `found`; pairs of any two as well."""
+    first = rounds[0]
+    rounds.append(run_round(bench, found.fitted, found.prediction, 0.8, 0.9))
+    sets = [over_base(bench, first.base, first.foretold, one) for one in rounds[-1].judged]
+    if len(found.fitted.names) > 1:
+        return sets
+    tried = {frozenset(one.fitted.names) for one in sets}
+    for _, *pair in pair_gains(first)[:_PAIRS]:
+        if frozenset(pair) not in tried:
+            made = fit_set(bench, first, pair)
+            if made is not None:
+                sets.append(over_base(bench, first.base, first.foretold, made))
+                tried.add(frozenset(pair))
+    return sets
+
+
+def _closes_most(before: Judged, after: Judged) -> bool:
+    """Whether most of what was left of the gap is closed, in training and on held-out records."""
+    shares = [closed_share(before.fitted.fit, after.fitted.fit)]
+    if before.prediction is not None and after.prediction is not None:
+        shares.append(closed_share(before.prediction, after.prediction))
+    return all(share is None or share > _CLOSES for share in shares)
+
+
+def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool:
+    """Whether each effect of a set is worth it over the set without it, on held-out records too."""
+    least = bench.options.needed * bench.options.separation
+    for name in whole.fitted.names:
+        if set(part.fitted.names) == {*whole.fitted.names} - {name}:
+            other: Judged | None = part
+        else:
+            other = without(bench, first, name, whole.fitted.names)
+        if other is None:
+            # it cannot be fitted
+            continue
+        if whole.evidence - other.evidence < least:
+            return False
+        if whole.prediction is not None and other.prediction is not None:
+            over = judged(other.fitted, other.prediction, whole.fitted, whole.prediction)
+            if over.held_out <= 0:
+                return False
+    return True
+
+
+def without(bench: Bench, first: Round, name: str, names: Iterable[str]) -> Judged | None:
+    """The machine with all effects but one; None where it cannot be fitted."""
+    others = [other for other in names if other != name]
+    if len(others) == 1:
+        return next((one for one in first.judged if one.name == others[0]), None)
+    fitted = fit_set(bench, first, others)
+    return None if fitted is None else over_base(bench, first.base, first.foretold, fitted)
+
+
+def over_base(bench: Bench, base: Fitted, foretold: Prediction | None, one: Judged | Fitted) -> Judged:
+    """Evidence of several effects over the base, the parameters of all of them counted."""
+    fitted = one.fitted if isinstance(one, Judged) else one
+    prediction = one.prediction if isinstance(one, Judged) else bench.foretell(fitted)
+    added = tuple(i for i, free in enumerate(fitted.problem.free) if _is_added(free.path, base))
+    whole = Fitted(fitted.names, fitted.model, fitted.problem, fitted.fit, added, fitted.tries)
+    return judged(base, foretold, whole, prediction)
+
+
+def _is_added(path: str, base: Fitted) -> bool:
+    return path.startswith("effect.") and path not in base.model.parameters
+
+
+def fit_set(bench: Bench, found: Round, names: Iterable[str]) -> Fitted | None:
+    """Effects fitted one on top of the other, one that was fitted alone first; None where that cannot be."""
+    names = list(names)
+    singles = {one.name: one.fitted for one in found.judged}
+    fitted = next((singles[name] for name in names if name in singles), None)
+    for name in names if fitted is not None else ():
+        if name in fitted.names:
+            continue
+        free = with_values(fitted.problem.free, fitted.fit.values)
+        made = candidate(fitted.model, free, fitted.names, name, bench.scales)
+        if isinstance(made, str):
+            return None
+        shown = signature(fitted.problem, fitted.fit, made)
+        screened = None if shown is None else screen(fitted.fit, [shown])
+        fitted = refit(bench.training, fitted, made, screened, quick=True)
+    return fitted
