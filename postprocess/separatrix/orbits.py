@@ -60,6 +60,7 @@ def branches(
     *,
     searches: int | None = None,
     free: tuple[str, float, float] | None = None,
+    contacts: bool = False,
     x0: tuple[float, float] | None = None,
     v0: tuple[float, float] | None = None,
     output: str | Path | None = None,
@@ -78,6 +79,8 @@ def branches(
         At how many values orbits are searched; 12 if not given.
     free
         A second parameter and its range, over which the labelled points are followed as curves.
+    contacts
+        Whether homoclinic contacts and boundary crises of the saddles are looked for.
     x0, v0
         Ranges of the starts from which they are searched [m, m/s]; those of the axes of the case, else twice
         the motion that the drive brings about.
@@ -97,6 +100,8 @@ def branches(
             options += [name, toml(value)]
     if searches is not None:
         options += ["--searches", str(searches)]
+    if contacts:
+        options += ["--contacts"]
     if free is not None:
         options += ["--free", free[0], "--free-from", toml(free[1]), "--free-to", toml(free[2])]
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:

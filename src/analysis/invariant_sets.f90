@@ -13,7 +13,7 @@ module invariant_sets
   use matrices, only: solve
   use motion_state, only: tally_t
   use one_body, only: one_body_t
-  use saddle_search, only: saddle_t, section_distance
+  use saddle_search, only: distance_to_saddle, saddle_t, section_distance
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -98,7 +98,7 @@ contains
       else if (.not. any(is_inside(growth, levels(k)%nodes))) then
         set%ending = end_left
         exit
-      else if (.not. stable .and. k > 10*growth%turns .and. has_converged(body, levels(k)%nodes)) then
+      else if (.not. stable .and. k > 10*growth%turns .and. has_converged(body, saddle, levels(k)%nodes)) then
         set%ending = end_converged
         exit
       end if
@@ -383,12 +383,15 @@ contains
     needs = norm2(one/norm2(one) - other/norm2(other)) > most_angle
   end function needs_middle
 
-  !> Whether a level is much shorter than the spacing: it has come to an attractor.
-  pure logical function has_converged(body, nodes) result(converged)
+  !> Whether a level is much shorter than the spacing, and has left the saddle: it has come to an attractor.
+  pure logical function has_converged(body, saddle, nodes) result(converged)
     type(one_body_t), intent(in) :: body
+    type(saddle_t), intent(in) :: saddle
     type(node_t), intent(in) :: nodes(:)
     real(wp) :: length
     integer :: i
+    converged = distance_to_saddle(body, saddle, nodes(1)%y) > spacing
+    if (.not. converged) return
     length = 0
     do i = 1, size(nodes) - 1
       length = length + section_distance(body, nodes(i)%y, nodes(i + 1)%y)

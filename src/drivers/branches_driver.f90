@@ -3,6 +3,7 @@
 
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
+  use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
   use build_jointed, only: is_jointed
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
@@ -34,6 +35,8 @@ module branches_driver
 
   !> Starts at each value at which orbits are searched.
   integer, parameter :: starts = 48
+  !> At an impact without speed the derivative is not finite: what is larger than this is rounding.
+  real(wp), parameter :: endless = 1e9_wp
   !> Powers of 1/p for the root p of p^3 = p + 1 (Roberts 2018).
   real(wp), parameter :: irrational(2) = [0.7548776662466927_wp, 0.5698402909980532_wp]
 
@@ -45,6 +48,7 @@ contains
     type(session_t) :: session
     type(search_t) :: search
     type(curves_t) :: curves
+    type(contacts_t) :: contacts
     type(schema_t) :: schema
     type(bounds_t) :: bounds
     type(error_t), allocatable :: error
@@ -58,6 +62,8 @@ contains
     call session%stop_if(error)
     if (curves%wanted .and. is_jointed(session%the_case%laws)) then
       call fail(error, exit_bad_case, '--free: labels are followed over two parameters for machines of one body')
+    else if (command%contacts .and. is_jointed(session%the_case%laws)) then
+      call fail(error, exit_bad_case, '--contacts: homoclinic contacts are looked for in machines of one body')
     else
       call set_starts(session%the_case, search, error)
     end if
@@ -76,8 +82,9 @@ contains
         call session%journal%progress(int(i, int64))
       end do
       call follow_seeds(search)
+      if (command%contacts) call look_for_contacts(session, search, contacts)
       if (curves%wanted) call follow_labels(search, curves)
-      call report(session, search, trim(bounds%unit))
+      call report(session, search, contacts, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
     if (size(search%branches) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
@@ -183,9 +190,10 @@ contains
   end subroutine set_starts
 
   !> Every labelled point, and what was found from how many seeds.
-  subroutine report(session, search, unit)
+  subroutine report(session, search, contacts, unit)
     type(session_t), intent(inout) :: session
     type(search_t), intent(in) :: search
+    type(contacts_t), intent(in) :: contacts
     character(len=*), intent(in) :: unit
     integer :: b, i, families
     do b = 1, size(search%branches)
@@ -194,12 +202,17 @@ contains
                                   to_text(size(line%points))//' points')
         do i = 1, size(line%points)
           if (line%points(i)%label /= no_label) call report_point(session, search, line%points(i), b, unit)
+          if (allocated(contacts%list)) call report_contacts(session, search, contacts, b, i, unit)
         end do
+        if (allocated(contacts%list)) call report_contacts(session, search, contacts, b, 0, unit)
       end associate
     end do
-    families = sum(search%found%families)
     call session%journal%line('found', to_text(size(search%branches))//' branches from '//to_text(search%seeds)// &
       ' seeds at '//to_text(size(search%values))//' values of '//search%family%path//'; there may be others')
+    families = sum(search%found%equilibria)
+    if (families > 0) call session%journal%line('equilibria', 'equilibria were met '//to_text(families)// &
+                                                ' times; they are not followed')
+    families = sum(search%found%families)
     if (families > 0) call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
                                                 to_text(families)//' times; they are not followed')
   end subroutine report
@@ -263,6 +276,8 @@ contains
     complex(wp), intent(in) :: z
     character(len=:), allocatable :: text
     text = to_text(real(z, wp), 9)
+    if (abs(z) > endless) text = 'infinite'
+    if (abs(z) > endless) return
     if (abs(aimag(z)) > 0) text = text//merge('+', '-', aimag(z) > 0)//to_text(abs(aimag(z)), 9)//'i'
   end function complex_text
 

@@ -14,6 +14,8 @@ module command_line
   public :: read_command_line
 
   integer, parameter :: longest_argument = 4096
+  !> Each costs seconds.
+  integer, parameter :: most_searches = 10000
 
   type, public :: command_t
     character(len=:), allocatable :: name
@@ -45,6 +47,8 @@ module command_line
     character(len=:), allocatable :: free
     real(wp) :: free_from = 0, free_to = 0
     logical :: has_free_from = .false., has_free_to = .false.
+    !> Homoclinic contacts are looked for.
+    logical :: contacts = .false.
     !> `boundary`: invariant sets are grown within so many times the window of the map; 0 = none.
     real(wp) :: grow = 1
     !> `stability`: drive periods that are watched.
@@ -125,8 +129,6 @@ contains
       call fail(error, exit_usage, '--search-only searches, --catalogue takes what was found: choose one')
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
-    else if (command%name == 'stability' .and. len(command%output) > 0) then
-      call fail(error, exit_usage, 'stability writes no file: -o does not belong to it (--log FILE keeps its report)')
     else if (command%name == 'stability' .and. command%periods < 64) then
       call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed is a whole number from 64')
     else if (command%name == 'branches' .and. len(command%parameter) == 0) then
@@ -235,6 +237,8 @@ contains
       command%resume = .true.
     case ('--search-only')
       command%search_only = .true.
+    case ('--contacts')
+      command%contacts = .true.
     case ('--json')
       command%json = .true.
     case ('--quiet')
@@ -268,28 +272,36 @@ contains
     case ('--parameter')
       command%parameter = value
     case ('--from')
-      command%has_from = .true.
-      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%from, error)
+      call read_end('the parameter', command%has_from, command%from)
     case ('--to')
-      command%has_to = .true.
-      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the parameter', command%to, error)
+      call read_end('the parameter', command%has_to, command%to)
     case ('--free')
       command%free = value
     case ('--free-from')
-      command%has_free_from = .true.
-      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the second parameter', command%free_from, error)
+      call read_end('the second parameter', command%has_free_from, command%free_from)
     case ('--free-to')
-      command%has_free_to = .true.
-      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), 'the second parameter', command%free_to, error)
+      call read_end('the second parameter', command%has_free_to, command%free_to)
     case ('--grow')
       call read_number_in(name, value, 0.0_wp, 1000.0_wp, 'windows', command%grow, error)
     case ('--searches')
-      call read_integer(name, value, 1, command%searches, error)
+      call read_integer(name, value, 1, command%searches, error, most_searches)
     case ('--periods')
       call read_integer(name, value, 1, command%periods, error)
     case ('--max-changes')
       call read_number_in(name, value, 0.0_wp, 100.0_wp, 'per cent', command%max_changes, error)
     end select
+
+  contains
+
+    !> An end of the range of a parameter.
+    subroutine read_end(what, has, number)
+      character(len=*), intent(in) :: what
+      logical, intent(out) :: has
+      real(wp), intent(out) :: number
+      has = .true.
+      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), what, number, error)
+    end subroutine read_end
+
   end subroutine take_value
 
   !> 'I/N', share I of N.
@@ -349,18 +361,25 @@ contains
     call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of "//unit//range)
   end subroutine read_number_in
 
-  subroutine read_integer(name, value, least, number, error)
+  subroutine read_integer(name, value, least, number, error, most)
     character(len=*), intent(in) :: name, value
     integer, intent(in) :: least
     integer, intent(out) :: number
     type(error_t), allocatable, intent(out) :: error
-    integer :: status
+    integer, intent(in), optional :: most
+    character(len=:), allocatable :: range
+    integer :: status, largest
+    largest = huge(largest)
+    range = ' from '//to_text(least)
+    if (present(most)) then
+      largest = most
+      range = range//' to '//to_text(most)
+    end if
     number = least - 1
     status = verify(value, '0123456789')
     if (status == 0) read (value, *, iostat=status) number
-    if (status /= 0 .or. number < least) then
-      call fail(error, exit_usage, name//": found '"//value//"', allowed is a whole number"// &
-                trim(merge(' from 1', ' from 0', least > 0)))
+    if (status /= 0 .or. number < least .or. number > largest) then
+      call fail(error, exit_usage, name//": found '"//value//"', allowed is a whole number"//range)
     end if
   end subroutine read_integer
 

@@ -16,9 +16,8 @@ module command_table
     !> What stands behind the name, and what it does, in a line.
     character(len=9) :: reads
     character(len=110) :: summary
-    !> All that `--help` tells of it; whether the options of all commands follow.
-    character(len=700) :: help
-    logical :: common
+    !> What `--help` tells of it before its options.
+    character(len=900) :: help
   end type command_row_t
 
   type(command_row_t), parameter :: rows(11) = [ &
@@ -26,20 +25,21 @@ module command_table
       'where every point of a grid of starts or parameters ends up', &
       'separatrix basin CASE [-o FILE]: where every point of a grid ends up'//nl// &
       '  The grid is the [[axis]] tables of the case: two or more of x0, v0, crank_angle, drive.ratio or any'//nl// &
-      '  other parameter. Run it with mpirun to share the work.'//nl, .true.), &
+      '  other parameter. Run it with mpirun to share the work.'//nl), &
     command_row_t('sweep', 'CASE', &
       'amplitude-frequency and bifurcation diagram, run up, run down and from many starts', &
       'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
       '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
-      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl, .true.), &
+      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl), &
     command_row_t('branches', 'CASE', &
       'periodic orbits over a parameter, stable and unstable, with their bifurcations', &
       'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
       '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
       '  Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
       '  --searches N       values at which orbits are searched (default 12)'//nl// &
+      '  --contacts         looks for homoclinic contacts and boundary crises of the saddles'//nl// &
       '  --free NAME        a second parameter, over which the labels found are followed as curves'//nl// &
-      '  --free-from A, --free-to B   its range, without which it is that of the axis of this parameter'//nl, .true.), &
+      '  --free-from A, --free-to B   its range, without which it is that of the axis of this parameter'//nl), &
     command_row_t('boundary', 'MAP', &
       'the boundaries between the basins of a map, as curves', &
       'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
@@ -47,38 +47,36 @@ module command_table
       '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
       '  takes a small part of the time of the map. The pieces are named by what they lead to, and the stable and'//nl// &
       '  unstable sets of the saddles are grown (one body).'//nl// &
-      '  --grow F           grows these sets within F times the window of the map (default 1; 0: not at all)'//nl, .true.), &
+      '  --grow F           grows these sets within F times the window of the map (default 1; 0: not at all)'//nl), &
     command_row_t('stability', 'CASE', &
       'Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic', &
       'separatrix stability CASE|MAP [--periods N]: Lyapunov exponents and the kind of a motion'//nl// &
       '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
       '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period (chaotic, quasi-periodic,'//nl// &
-      '  long transient, period above the limit, not known). One body. Writes no file.'//nl// &
-      '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl, .true.), &
+      '  long transient, period above the limit, not known). Writes no file.'//nl// &
+      '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl), &
     command_row_t('trajectory', 'CASE', &
       'one motion with all its events', &
       'separatrix trajectory CASE [-o FILE] [--csv FILE] [--record FILE]: one motion with all its events'//nl// &
       '  --csv FILE      also write the events as a table'//nl// &
-      '  --record FILE   also write the position as the sensor of the table [record] would measure it'//nl, .true.), &
+      '  --record FILE   also write the position as the sensor of the table [record] would measure it'//nl), &
     command_row_t('points', 'CASE', &
       'a list of starts', &
       'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
       '  --list FILE     table with the columns x0,v0, optionally ratio and starts of further bodies (body.NAME.x0);'//nl// &
       '                  replaces the grid of the case'//nl// &
-      '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl, .true.), &
+      '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl), &
     command_row_t('merge', 'OUT SHARD', &
       'one file from the shares of a map', &
       'separatrix merge OUT SHARD...: one result file from the files that --shard I/N has written'//nl// &
       '  The shards must be all of one case: N files, each share once. They are kept.'//nl// &
-      '  --csv FILE      of a list of starts also the table that points --csv writes'//nl// &
-      '  --force         replaces an existing OUT'//nl// &
-      '  --json, --quiet, --log FILE  as for the other commands'//nl, .false.), &
+      '  --csv FILE      of a list of starts also the table that points --csv writes'//nl), &
     command_row_t('laws', '', &
       'every law with parameters, units, bounds and source', &
-      'separatrix laws [--json]: every law with parameters, units, bounds and source'//nl, .false.), &
+      'separatrix laws [--json]: every law with parameters, units, bounds and source'//nl), &
     command_row_t('info', 'FILE', &
       'what a file holds', &
-      'separatrix info FILE [--json]: what a file holds, with shares of regimes and attractors'//nl, .false.), &
+      'separatrix info FILE [--json]: what a file holds, with shares of regimes and attractors'//nl), &
     command_row_t('verify', 'FILE', &
       'checks a file and reruns a sample of it at higher precision', &
       'separatrix verify FILE [--sample N] [--seed N] [--max-changes P] [--json]: checks a file'//nl// &
@@ -87,7 +85,7 @@ module command_table
       '  Ends with code 77 if more labels would change than are allowed.'//nl// &
       '  --sample N      points rerun (default 200)'//nl// &
       '  --seed N        seed that chooses them (default 1)'//nl// &
-      '  --max-changes P per cent of the labels rerun that may change (default 1)'//nl, .false.)]
+      '  --max-changes P per cent of the labels rerun that may change (default 1)'//nl)]
 
   character(len=*), parameter, public :: commands(size(rows)) = rows%name
 
@@ -101,18 +99,18 @@ module command_table
     character(len=130) :: help
   end type option_row_t
 
-  type(option_row_t), parameter, public :: options(34) = [ &
-    option_row_t('--output', '-o', .true., '', &
+  type(option_row_t), parameter, public :: options(35) = [ &
+    option_row_t('--output', '-o', .true., 'basin sweep branches boundary trajectory points', &
       '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'), &
     option_row_t('--set', '', .true., 'basin sweep branches stability trajectory points', &
       '  --set KEY=VALUE    replaces a value of the case, e.g. --set friction.damping=0.3; repeatable'), &
-    option_row_t('--validate', '', .false., '', &
+    option_row_t('--validate', '', .false., 'basin sweep branches boundary stability trajectory points', &
       '  --validate         checks the case and stops'), &
     option_row_t('--draw', '', .true., 'basin sweep branches stability trajectory points', &
       '  --draw FILE.svg    draws the machine as it was understood and stops'), &
-    option_row_t('--dry-run', '', .false., '', &
+    option_row_t('--dry-run', '', .false., 'basin sweep branches boundary stability trajectory points', &
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'), &
-    option_row_t('--force', '', .false., '', &
+    option_row_t('--force', '', .false., 'basin sweep branches boundary stability trajectory points merge', &
       '  --force            replaces an existing output'), &
     option_row_t('--resume', '', .false., 'basin sweep points', &
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'), &
@@ -124,17 +122,17 @@ module command_table
       '  --search-only      basin --shard: only makes the file of the share, from which all can take the attractors'), &
     option_row_t('--time-limit', '', .true., 'basin sweep points', &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'), &
-    option_row_t('--ranks-per-node', '', .true., '', &
+    option_row_t('--ranks-per-node', '', .true., 'basin sweep points', &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'), &
     option_row_t('--tile-times', '', .true., 'basin sweep points', &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'), &
-    option_row_t('--progress', '', .true., '', &
+    option_row_t('--progress', '', .true., 'basin sweep branches boundary stability trajectory points', &
       '  --progress S       progress every S seconds (default: in a log after 10 s, then ever less often)'), &
     option_row_t('--json', '', .false., '', &
       '  --json             log as JSON lines'), &
     option_row_t('--log', '', .true., 'basin sweep branches boundary stability trajectory points merge', &
       '  --log FILE         the log as JSON lines behind what is in FILE, beside the one on stdout'), &
-    option_row_t('--quiet', '-q', .false., '', &
+    option_row_t('--quiet', '-q', .false., 'basin sweep branches boundary stability trajectory points merge verify', &
       '  -q, --quiet        errors only'), &
     option_row_t('--version', '', .false., '', &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'), &
@@ -151,6 +149,8 @@ module command_table
     option_row_t('--to', '', .true., 'branches', &
       ''), &
     option_row_t('--searches', '', .true., 'branches', &
+      ''), &
+    option_row_t('--contacts', '', .false., 'branches', &
       ''), &
     option_row_t('--free', '', .true., 'branches', &
       ''), &
@@ -193,7 +193,7 @@ contains
     words = 'the command'//trim(merge('s', ' ', count(among) > 1))//' '//join(pack(commands, among), ', ')
   end function belonging_to
 
-  !> The text of `--help`, of one command or, with '', of the program.
+  !> The text of `--help`: of one command, with the options that belong to it; or, with '', of the program, with all.
   pure function help_text(command) result(lines)
     character(len=*), intent(in) :: command
     character(len=:), allocatable :: lines
@@ -202,7 +202,6 @@ contains
     k = findloc(commands == command, .true., 1)
     if (k > 0) then
       lines = trim(rows(k)%help)
-      if (.not. rows(k)%common) return
     else
       lines = 'separatrix COMMAND FILE [OPTIONS]: where the motions of impacting and rubbing machines end up'//nl//nl
       do k = 1, size(rows)
@@ -213,7 +212,11 @@ contains
     end if
     lines = lines//nl//'Options:'//nl
     do k = 1, size(options)
-      if (len_trim(options(k)%help) > 0) lines = lines//trim(options(k)%help)//nl
+      if (len_trim(options(k)%help) == 0) cycle
+      if (any(commands == command)) then
+        if (len(belonging_to(options(k), command)) > 0) cycle
+      end if
+      lines = lines//trim(options(k)%help)//nl
     end do
     lines = lines//nl// &
       'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &

@@ -208,6 +208,15 @@ def test_merging_tells_shared_boundaries() -> None:
     assert wada.merging(np.where(blocks == 3, 1, blocks))[0].size == 0
 
 
+def test_merging_of_an_angle_does_not_depend_on_where_it_is_cut() -> None:
+    sectors = np.repeat(np.repeat([1, 2, 3], [25, 10, 25])[:, None], 8, axis=1)
+    distances, shares = wada.merging(sectors, (True, False))
+    for shift in (7, 20, 41):
+        again = wada.merging(np.roll(sectors, shift, axis=0), (True, False))
+        np.testing.assert_array_equal(again[0], distances)
+        np.testing.assert_array_equal(again[1], shares)
+
+
 def test_the_grid_method_finds_the_boundary_of_newtons_map() -> None:
     grid, axes = grid_of(newton, (-1.5, -1.5), (1.5, 1.5), 40)
     found = wada.grid_method(newton, grid, axes)

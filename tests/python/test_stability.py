@@ -6,6 +6,7 @@ import json
 import subprocess
 from pathlib import Path
 
+import h5py
 import pytest
 
 
@@ -44,7 +45,7 @@ def test_what_makes_no_sense_is_refused(run):
     assert run("--periods", "3").returncode == 64
     ended = run("-o", "file.h5")
     assert ended.returncode == 64
-    assert "writes no file" in ended.stderr
+    assert "--output belongs to" in ended.stderr
 
 
 def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp_path: Path):
@@ -95,6 +96,18 @@ axis = [{ name = "x0", from = -2.5, to = 0, count = 8 }, { name = "v0", from = -
     _, *entries = map(json.loads, ended.stdout.splitlines())
     assert [(one["type"], one["period"]) for one in entries] == [("period_above_the_limit", 3)]
     assert entries[0]["exponents"][0] < 0
+
+
+def test_a_damaged_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):
+    target = tmp_path / "map.h5"
+    count = ["--set", "axis[1].count=4", "--set", "axis[2].count=4"]
+    case = source_dir / "examples" / "basin_coulomb.toml"
+    subprocess.run([separatrix, "basin", case, "-o", target, "-q", *count], check=True)
+    with h5py.File(target, "r+") as file:
+        file["catalogue/period"][0] = 0
+    ended = subprocess.run([separatrix, "stability", target], capture_output=True, text=True, check=False)
+    assert ended.returncode == 74
+    assert "period" in ended.stderr
 
 
 def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):

@@ -28,6 +28,8 @@ _MARKS = {
     "chatter_onset": ("X", "chatter onset"),
     "stiction_end": ("h", "stiction end"),
     "release": ("<", "release"),
+    "homoclinic_contact": ("d", "homoclinic contact"),
+    "boundary_crisis": ("p", "boundary crisis"),
     "not_known": ("x", "end not known"),
     "too_long": ("|", "events too many to go on"),
 }

@@ -26,7 +26,7 @@ def merging(grid: np.ndarray, turning: tuple[bool, ...] | None = None) -> tuple[
     edges = [_edges(grid == label, known, turning) for label in basins]
     farthest = np.zeros(grid.shape)
     for edge in edges:
-        farthest = np.maximum(farthest, distance_transform_edt(~edge) if edge.any() else np.inf)
+        farthest = np.maximum(farthest, _distances(edge, turning) if edge.any() else np.inf)
     boundary = np.logical_or.reduce(edges)
     if not boundary.any():
         return np.empty(0), np.empty(0)
@@ -34,6 +34,14 @@ def merging(grid: np.ndarray, turning: tuple[bool, ...] | None = None) -> tuple[
     top = values[np.isfinite(values)].max(initial=0.0)
     distances = np.arange(0, int(np.ceil(top)) + 1)
     return distances, np.array([np.mean(values > r) for r in distances])
+
+
+def _distances(edge: np.ndarray, turning: tuple[bool, ...] | None) -> np.ndarray:
+    """Distance [points] of every point to the nearest of an edge; axes that turn are on a circle."""
+    pad = [(n // 2, n // 2) if turns else (0, 0) for n, turns in zip(edge.shape, turning or (), strict=False)]
+    pad += [(0, 0)] * (edge.ndim - len(pad))
+    away = distance_transform_edt(~np.pad(edge, pad, mode="wrap"))
+    return away[tuple(slice(a, a + n) for (a, _), n in zip(pad, edge.shape, strict=True))]
 
 
 def _edges(own: np.ndarray, known: np.ndarray, turning: tuple[bool, ...] | None) -> np.ndarray:
