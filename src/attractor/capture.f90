@@ -5,9 +5,10 @@
 module capture
   use attractors, only: attractor_t, find_capture, most_coordinates, squared_distance
   use kinds, only: wp
+  use machine_facts, only: rest_lasts
   use motion, only: motion_t
   use motion_state, only: tally_t
-  use strobe, only: advance_to_section, copy_of, rest_lasts, section_point, strobe_t, turn_point
+  use strobe, only: advance_to_section, copy_of, section_point, strobe_t, turn_point
   implicit none
   private
 

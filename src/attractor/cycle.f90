@@ -10,11 +10,12 @@ module cycle
   use elementary, only: sine_cosine
   use free_motion, only: free_multipliers, is_linear
   use kinds, only: wp
+  use machine_facts, only: smallest_motion
   use matrices, only: cholesky, eigenvalues, solve, spectral_radius
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
-  use strobe, only: advance_strobe_period, begin_tally, scales_of, section_point, smallest_motion, strobe_at, strobe_t, turn_of
+  use strobe, only: advance_strobe_period, begin_tally, scales_of, section_point, strobe_at, strobe_t, turn_of
   use turn_section, only: has_no_clock
   implicit none
   private

@@ -14,12 +14,13 @@ module discover
   use exact_return, only: exact_cycle, returns_t, watch_returns
   use free_motion, only: is_linear
   use kinds, only: int64, wp
+  use machine_facts, only: rest_lasts
   use matrices, only: solve
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, rest_lasts, scales_of, section_point, &
-    section_state, start_strobe, strobe_t, turn_of, without_stops
+  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
+    start_strobe, strobe_t, turn_of, without_stops
   use trajectory, only: span_t
   use turn_section, only: has_no_clock
   implicit none

@@ -6,9 +6,10 @@ module motion_features
   use attractors, only: features_t, regime_at_rest, regime_of, regime_stuck, wrap_range
   use event_words, only: canonical_word
   use kinds, only: int64, wp
+  use machine_facts, only: rides_along
   use motion, only: motion_t
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, rides_along, strobe_t
+  use strobe, only: advance_strobe_period, begin_tally, strobe_t
   implicit none
   private
 

@@ -12,8 +12,8 @@ module c_labels
   use errors, only: error_t, fail
   use grid, only: grid_t
   use kinds, only: int64, wp
+  use machine_facts, only: has_driver
   use model_type, only: model_t
-  use motion_columns, only: has_driver
   use point_columns, only: outcome_values, point_values
   use status, only: exit_resumable, exit_usage
   use text, only: to_text

@@ -11,9 +11,9 @@ module c_trajectory
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
   use kinds, only: wp
+  use machine_facts, only: has_driver
   use model_type, only: model_t
   use motion, only: motion_t
-  use motion_columns, only: has_driver
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: closing_error, log_t, open_log
   use settled_cycle, only: describe_cycle

@@ -12,8 +12,8 @@ module variants
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
+  use machine_facts, only: is_one_body
   use motion, only: motion_t
-  use motion_columns, only: is_one_body
   use motion_state, only: flight_adaptive, options_t
   use natural_scale, only: natural_size, scales_of, scales_t
   use parameter_list, only: parameter_t, put_values

@@ -16,8 +16,9 @@ module case_warnings
   use jointed, only: joint_contact, jointed_t
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use machine_facts, only: contact_sizes
   use motion, only: motion_t
-  use strobe, only: contact_sizes, section_obstacle
+  use strobe, only: section_obstacle
   use text, only: to_text
   implicit none
   private

@@ -10,8 +10,8 @@ module record_writer
   use elementary, only: logarithm, sine_cosine
   use errors, only: error_t, fail
   use kinds, only: int64, real64, wp
+  use machine_facts, only: has_driver
   use motion, only: motion_t
-  use motion_columns, only: has_driver
   use oscillator, only: oscillator_t
   use random, only: uniform
   use sampling, only: sample_positions

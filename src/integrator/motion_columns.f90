@@ -13,7 +13,7 @@ module motion_columns
   implicit none
   private
 
-  public :: sample_columns, event_columns, has_driver, is_one_body
+  public :: sample_columns, event_columns
 
   !> A quantity at the samples, or at the events.
   type, public :: motion_column_t
@@ -24,18 +24,6 @@ module motion_columns
   end type motion_column_t
 
 contains
-
-  !> Whether `moving%machine` says all of the machine.
-  pure logical function is_one_body(moving)
-    type(motion_t), intent(in) :: moving
-    is_one_body = .not. allocated(moving%pair) .and. .not. allocated(moving%jointed)
-  end function is_one_body
-
-  !> Whether there is a driving body beside the one that is looked at.
-  pure logical function has_driver(moving)
-    type(motion_t), intent(in) :: moving
-    has_driver = allocated(moving%pair)
-  end function has_driver
 
   !> At the samples of a motion that began with the crank at `crank_angle` [rad].
   pure function sample_columns(moving, crank_angle, log) result(columns)

@@ -51,7 +51,6 @@ contains
     type(watch_t) :: watches(guards)
     type(stretch_t) :: stretch
     real(wp) :: p(0:order), t, first, sizes(most_unknowns)
-    real(wp) :: after(most_unknowns)
     integer :: i
     logical :: begins, sure(guards)
     call refresh(moving, state)
@@ -64,21 +63,14 @@ contains
     begins = .true.
     do
       sure = are_sure(moving, state, watches, sizes, begins)
-      associate (linear => moving%modes(state%mode))
-        if (all(sure) .and. linear%rate*(time_end - state%time) > 1 .and. &
+      if (all(sure)) then
+        if (moving%modes(state%mode)%rate*(time_end - state%time) > 1 .and. &
             turns_nowhere(moving, state, sizes, tally%wants_v_max)) then
-          after = stride(linear, state%y)
-          tally%v_max = max(tally%v_max, state%y(at_v2), after(at_v2))
-          if (present(log)) then
-            call expand(linear, state%y, time_end - state%time, stretch)
-            call write_down(moving, state, stretch, 1.0_wp, log)
-          end if
-          state%y = after
-          state%time = min(state%time + 1/linear%rate, time_end)
+          call pass_stretch(moving, state, time_end, tally, log)
           begins = .false.
           cycle
         end if
-      end associate
+      end if
       call expand(moving%modes(state%mode), state%y, time_end - state%time, stretch)
       fallen = guard_none
       first = 1
@@ -113,6 +105,27 @@ contains
       call note_miss(moving, -sense_of(state%mode), state%y(at_x2) - state%y(at_x1), tally)
     end if
   end subroutine fly_pair
+
+  !> Moves over a full stretch in which nothing can be.
+  pure subroutine pass_stretch(moving, state, time_end, tally, log)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(stretch_t) :: stretch
+    real(wp) :: after(most_unknowns)
+    associate (linear => moving%modes(state%mode))
+      after = stride(linear, state%y)
+      tally%v_max = max(tally%v_max, state%y(at_v2), after(at_v2))
+      if (present(log)) then
+        call expand(linear, state%y, time_end - state%time, stretch)
+        call write_down(moving, state, stretch, 1.0_wp, log)
+      end if
+      state%y = after
+      state%time = min(state%time + 1/linear%rate, time_end)
+    end associate
+  end subroutine pass_stretch
 
   !> Which guards certainly do not fall along a full stretch; those that are not watched among them. `sizes` are those of the
   !> unknowns where the flight begins.

@@ -2,9 +2,9 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The one interface to machines of one body, two (friction pairs) or several with joints: a state that moves from section to
-!> section, and the coordinates that fix it there. Which of the three a machine is, is asked here and in the modules of this
-!> folder; nowhere above it. With `by_event` the section is where the motion of a machine without a clock turns round, see
-!> `turn_section`.
+!> section, and the coordinates that fix it there. Which of the three a machine is, is asked here, in `machine_facts` and in the
+!> other modules of this folder; nowhere above it. With `by_event` the section is where the motion of a machine without a clock
+!> turns round, see `turn_section`.
 module strobe
   use body_section, only: body_at, body_point, coordinates_of_body, resumed_body, scales_of_body, start_of_body
   use contact_law, only: barrier_positions, contact_t
@@ -17,8 +17,6 @@ module strobe
   use kinds, only: wp
   use motion, only: advance, advance_period, motion_t
   use motion_state, only: log_t, record_sample, reset_tally, state_t, take_turns, tally_t
-  use pair, only: driven_by_motion, impact_mass
-  use pair_damper, only: is_damper
   use pair_flight, only: body_state, driver_of, energy_of
   use pair_modes, only: pair_state_t
   use pair_motion, only: advance_pair, advance_pair_period
@@ -31,10 +29,9 @@ module strobe
   implicit none
   private
 
-  public :: strobe_t, coordinates_of, has_section, section_obstacle, contact_sizes, start_strobe, start_is_allowed, &
-    resume_strobe, strobe_at, section_point, section_state, scales_of, smallest_motion, without_stops, advance_strobe, &
-    advance_strobe_period, begin_tally, driver_now, rides_along, rest_lasts, energy_now, record_end, advance_to_section, &
-    copy_of, turn_point, turn_of
+  public :: strobe_t, coordinates_of, has_section, section_obstacle, start_strobe, start_is_allowed, resume_strobe, strobe_at, &
+    section_point, section_state, scales_of, without_stops, advance_strobe, advance_strobe_period, begin_tally, driver_now, &
+    energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
 
   !> `state` is that of the body, of the driven one of two, or of the watched one of several.
   type :: strobe_t
@@ -94,20 +91,6 @@ contains
                                                            moving%pair%machine%sample_time > 0))// &
                                        ' the state at crank angle 0 does not tell what follows'
   end function section_obstacle
-
-  !> What presses a contact: the mass that an impact feels [kg], the size of the forces [N], and whether it is flown in closed form.
-  pure subroutine contact_sizes(moving, mass, force, closed_form)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(out) :: mass, force
-    logical, intent(out) :: closed_form
-    mass = moving%machine%mass
-    force = moving%machine%force_scale
-    closed_form = moving%pressed%available
-    if (.not. allocated(moving%pair)) return
-    mass = impact_mass(moving%pair%machine)
-    force = moving%pair%force_scale
-    closed_form = is_damper(moving%pair)
-  end subroutine contact_sizes
 
   !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
   !> are places and velocities of the coordinates of several bodies, in the place of those that the machine says.
@@ -247,18 +230,6 @@ contains
     end if
   end function scales_of
 
-  !> Half range [m] of a motion below which it is one of the rounding: a thousandth of what the forces do.
-  pure real(wp) function smallest_motion(moving) result(smallest)
-    type(motion_t), intent(in) :: moving
-    smallest = 1e-3_wp
-    if (moving%machine%restoring%stiffness > 0) then
-      smallest = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
-    end if
-    if (allocated(moving%pair)) then
-      smallest = 1e-3_wp*moving%pair%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
-    end if
-  end function smallest_motion
-
   !> What the first coordinate repeats after on the section.
   pure real(wp) function turn_of(moving)
     type(motion_t), intent(in) :: moving
@@ -360,20 +331,6 @@ contains
     driver = 0
     if (allocated(moving%pair)) driver = driver_of(strobe%pair)
   end function driver_now
-
-  !> Whether bodies that do not slip may well move: they ride along.
-  pure logical function rides_along(moving)
-    type(motion_t), intent(in) :: moving
-    rides_along = allocated(moving%pair)
-  end function rides_along
-
-  !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move
-  !> as one in a way that is given.
-  pure logical function rest_lasts(moving)
-    type(motion_t), intent(in) :: moving
-    rest_lasts = .true.
-    if (allocated(moving%pair)) rest_lasts = moving%pair%machine%drive == driven_by_motion
-  end function rest_lasts
 
   !> Energy of the machine [J].
   pure real(wp) function energy_now(moving, strobe) result(energy)

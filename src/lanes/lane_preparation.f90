@@ -10,8 +10,8 @@ module lane_preparation
   use kinds, only: wp
   use lane_types, only: contact_series_t, lane_flow_t, layer_nodes, machine_t, mode_t, most_harmonics, restitution_curve_t
   use layer_transit, only: gauss
+  use machine_facts, only: is_one_body
   use motion, only: motion_t
-  use motion_columns, only: is_one_body
   use motion_state, only: flight_adaptive
   use oscillator, only: oscillator_t
   use rest, only: chatter_speed

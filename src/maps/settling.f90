@@ -8,10 +8,11 @@ module settling
   use attractors, only: features_t, most_coordinates, regime_impact, regime_non_impact
   use circle, only: point_near
   use kinds, only: wp
+  use machine_facts, only: rides_along
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, rides_along, scales_of, section_point, strobe_t, turn_of
+  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, scales_of, section_point, strobe_t, turn_of
   use turn_section, only: has_no_clock
   implicit none
   private

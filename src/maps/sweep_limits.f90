@@ -9,8 +9,8 @@ module sweep_limits
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
+  use machine_facts, only: has_driver
   use motion, only: motion_t
-  use motion_columns, only: has_driver
   use settling, only: settle, settled_t
   use status, only: reason_time_over
   use strobe, only: coordinates_of, resume_strobe, strobe_at, strobe_t
