@@ -20,6 +20,7 @@ import numpy as np
 from markdown import table
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 SOURCE = Path(__file__).resolve().parents[1]
 CASES = SOURCE / "examples" / "validation" / "structures"
@@ -77,6 +78,15 @@ class Program:
             )
             names = ("event_time", "event_joint_x", "event_joint_v_before", "event_joint_v_after")
             return np.column_stack([file[name][:][wanted] for name in names])
+
+    def labels(self, case: str, name: str, low: float, high: float) -> dict[str, float]:
+        """Values of a parameter at the labels of the branches over it, the last of each name."""
+        output = self.folder / f"{case}_branches.h5"
+        words = ["--parameter", name, "--from", str(low), "--to", str(high), "-q", "--force", "-o", output]
+        subprocess.run([self.path, "branches", CASES / f"{case}.toml", *words], check=True)
+        with h5py.File(output) as file:
+            names = text(file["label"].attrs["flag_meanings"]).split()
+            return dict(zip((names[k] for k in file["label"][:]), file["parameter"][:], strict=True))
 
     def multipliers(self, case: str, **settings: str | float) -> np.ndarray:
         """Multipliers of the impacting cycle in the catalogue of a map, the largest first."""
@@ -192,7 +202,16 @@ def fold(program: Program) -> list[Number]:
     ]
     powers = np.column_stack([np.power(left, k) for k in (0, 2, 3, 4)])
     edge = np.linalg.solve(powers, places)[0]
-    return [Number(CLOSED, "two masses with a stop: saddle-node (rad/s)", 1.144117503720, edge, 2e-6)]
+    found = [Number(CLOSED, "two masses with a stop: saddle-node (rad/s)", 1.144117503720, edge, 2e-6)]
+    labels = program.labels("two_masses", "drive.force.frequency", 0.9, 1.2)
+    for label, what, place in (
+        ("SN", "saddle-node", 1.144117503720),
+        ("NS", "Neimark-Sacker point", 0.909658534285),
+        ("GR-fold", "graze of the motion without impacts", 0.999206009038),
+    ):
+        name = f"two masses with a stop, `branches`: {what} (rad/s)"
+        found.append(Number(CLOSED, name, place, labels[label], 1e-9))
+    return found
 
 
 def ball(program: Program) -> list[Number]:
@@ -337,6 +356,32 @@ def known(file: h5py.File, kind: str) -> np.ndarray:
     """Labels of the entries of a kind."""
     kinds = text(file["catalogue/kind"].attrs["flag_meanings"]).split()
     return file["catalogue/attractor"][:][file["catalogue/kind"][:] == kinds.index(kind) + 1]
+
+
+def end_of_sticking(mass: float = 1, damping: float = 0.05, kinetic: float = 1, static: float = 1.5) -> float:
+    """Belt velocity that the slide of a mass on a spring of 1 N/m, let go, just comes back to."""
+    decay = damping / 2 / mass
+    turning = np.sqrt(1 / mass - decay**2)
+
+    def excess(belt: float) -> float:
+        cosine = static - damping * belt - kinetic
+        sine = (belt + decay * cosine) / turning
+        amplitude = cosine - 1j * sine
+        # velocity and acceleration of Re amplitude exp((-decay + i turning) t)
+        rate = -decay + 1j * turning
+        first = (np.pi / 2 - np.angle(amplitude * rate**2)) / turning
+        times = first + np.arange(1, 9) * np.pi / turning
+        speeds = (amplitude * rate * np.exp(rate * times)).real
+        return float(max(speeds[times > 2]) - belt)
+
+    return float(brentq(excess, 0.1, 3, xtol=1e-15))
+
+
+def end_of_stick_slip(program: Program) -> list[Number]:
+    """Where the branch of the motion that sticks on a belt ends."""
+    labels = program.labels("belt_coulomb", "friction.belt.velocity", 0.5, 1)
+    what = "mass on a belt, `branches`: velocity at which the motion that sticks ends (m/s)"
+    return [Number(CLOSED, what, end_of_sticking(), labels["stick_onset"], 1e-11)]
 
 
 #: At 1.175 m/s motions come to the equilibrium within hundreds of turns only.
@@ -510,6 +555,7 @@ COMPUTED = (
     others,
     blocks,
     belt_oscillator,
+    end_of_stick_slip,
     turning_pendulum,
     simulated,
 )

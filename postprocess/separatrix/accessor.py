@@ -75,7 +75,8 @@ class Accessor:
         frame.insert(1, "label", labels[chosen])
         frame["event_word"] = self.decoded("event_word").values[chosen]
         multipliers = found["multiplier_real"].values + 1j * found["multiplier_imag"].values
-        frame["multiplier_1"], frame["multiplier_2"] = multipliers[chosen].T
+        for number, values in enumerate(multipliers[chosen].T, 1):
+            frame[f"multiplier_{number}"] = values
         return frame.rename(columns={"parameter": str(found.attrs["parameter"])})
 
     def shares(self, field: str = "attractor") -> "pandas.Series":

@@ -15,9 +15,9 @@ module exponents
   implicit none
   private
 
-  public :: lyapunov_exponents, zero_one_test, type_of_motion, period_of_section
+  public :: lyapunov_exponents, error_of, zero_one_test, type_of_motion, period_of_section
 
-  integer, parameter :: batches = 32
+  integer, parameter, public :: batches = 32
   !> Frequencies of the 0-1 test.
   integer, parameter :: frequencies = 100
 
@@ -28,18 +28,22 @@ module exponents
     'chaotic', 'transient']
 
   type, public :: spectrum_t
-    !> Exponents [1/s], the larger first, -huge for a direction that is lost (sticking, completed chatter); standard errors by
+    !> Exponents [1/s], the largest first, -huge for a direction that is lost (sticking, completed chatter); standard errors by
     !> batch means.
-    real(wp) :: exponents(2) = 0, errors(2) = 0
+    real(wp), allocatable :: exponents(:), errors(:)
     !> Sum of the exponents, and what it must be from damping, impacts and turning points alone; `has_sum` tells whether the
     !> machine has such a formula.
     real(wp) :: sum_found = 0, sum_exact = 0
     logical :: has_sum = .false.
+    !> The motion comes back to its section points, over and over.
+    logical :: returns = .false.
     !> Largest exponent of the first and of the second half.
     real(wp) :: halves(2) = 0
     integer(int64) :: impacts = 0
-    !> Drive periods that were used; `known` is false if the motion was given up or met an event tangentially.
+    !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event
+    !> tangentially.
     integer :: periods = 0
+    real(wp) :: mean_period = 0
     logical :: known = .false.
   end type spectrum_t
 
@@ -59,6 +63,8 @@ contains
     integer :: i, part
     logical :: singular, dead
     section = 0
+    spectrum%exponents = [0.0_wp, 0.0_wp]
+    spectrum%errors = [0.0_wp, 0.0_wp]
     direction = [0.6_wp, 0.8_wp]
     batch = 0
     lost = 0
@@ -97,6 +103,7 @@ contains
       call conclude(batch*batches/duration, lost*batches/duration, singular, dead, spectrum)
     end select
     spectrum%periods = periods
+    spectrum%mean_period = machines%centre%period
   end subroutine lyapunov_exponents
 
   !> Whether an event leaves less of the start than came to it: sticking one direction, completed chatter none.
@@ -236,7 +243,8 @@ contains
       else if (largest < -3*error .and. largest < 0 .and. k < 0.2_wp) then
         motion = motion_contracting
       else if (abs(largest) <= 3*error .and. k < 0.2_wp) then
-        motion = motion_neutral
+        ! One of a family of cycles is a cycle.
+        motion = merge(motion_contracting, motion_neutral, spectrum%returns)
       end if
     end associate
   end function type_of_motion

@@ -27,12 +27,14 @@ module orbit_search
   integer, parameter :: any_period = 12
   !> An orbit whose map less 1 has a determinant below this is one of a family.
   real(wp), parameter :: neutral = 1e-8_wp
+  !> Rate of change in natural sizes below which a motion is an equilibrium.
+  real(wp), parameter :: all_but_at_rest = 1e-5_wp
 
   !> Orbits found at one value: their section points are in `points`, column by column.
   type, public :: found_t
     type(orbit_t), allocatable :: orbits(:)
-    !> Orbits met that are not isolated.
-    integer :: families = 0
+    !> Orbits met that are not isolated; equilibria, which without a clock are met as cycles of no extent.
+    integer :: families = 0, equilibria = 0
   end type found_t
 
 contains
@@ -176,6 +178,10 @@ contains
     call orbit_of_motion(machines, value, point, periods, orbit, ok)
     if (ok) call correct_orbit(family, machines, orbit, direct(orbit, 1), ok)
     if (.not. ok) return
+    if (is_equilibrium(machines, orbit)) then
+      found%equilibria = found%equilibria + 1
+      return
+    end if
     if (abs(shifted_determinant(orbit%matrix, -1.0_wp)) < neutral) then
       found%families = found%families + 1
       return
@@ -194,5 +200,16 @@ contains
     found%orbits = [found%orbits, orbit]
     if (present(added)) added = .true.
   end subroutine add_orbit
+
+  !> Whether nothing moves on an orbit without a clock, in natural sizes; one that is all but at rest counts as well.
+  pure logical function is_equilibrium(machines, orbit)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(in) :: orbit
+    is_equilibrium = .not. machines%centre%has_clock
+    if (.not. is_equilibrium) return
+    associate (machine => machines%centre)
+      is_equilibrium = norm2(machine%slope(orbit%mode, 0.0_wp, orbit%y)/machine%size_of)*machine%size_of_time() < all_but_at_rest
+    end associate
+  end function is_equilibrium
 
 end module orbit_search

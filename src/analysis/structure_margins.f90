@@ -140,23 +140,28 @@ contains
     integer, intent(in) :: mode, k
     real(wp), intent(in) :: from, start(:), until
     type(margins_t), intent(inout) :: margins
-    type(mode_flow_t) :: flow
+    type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
     type(event_t) :: probe
-    real(wp) :: y(machine%n), t, last_t, value, rate, last_rate(most_guards)
+    real(wp) :: y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(most_guards)
     real(wp) :: least_t, least
     type(jointed_state_t) :: state
-    integer :: i, g, count_guards, count_looks
+    integer :: i, g, at, count_guards, count_looks
     state = state_in(machine, mode, from, start)
-    call flow_of(machine%frame%moving, state%phase, flow)
-    call guards_of(machine%frame%moving%machine, flow, state, list, count_guards)
+    call flow_of(machine%frame%moving, state%phase, at, spare)
+    if (at > 0) then
+      call guards_of(machine%frame%moving%machine, machine%frame%moving%flows(at), state, list, count_guards)
+    else
+      call guards_of(machine%frame%moving%machine, spare, state, list, count_guards)
+    end if
     count_looks = max(6, ceiling(looks*(until - from)/machine%period))
     last_t = from
+    last = start
     probe%before = mode
     do i = 0, count_looks
       t = from + (until - from)*i/count_looks
       y = start
-      if (i > 0) call machine%fly(mode, from, start, t, y)
+      if (i > 0) call machine%fly(mode, last_t, last, t, y)
       call note_place(machine, y, margins)
       do g = 1, count_guards
         if (list(g)%meaning == turns_round) cycle
@@ -169,12 +174,13 @@ contains
             if (orbit%events(k)%joint /= probe%joint) call note(machine, probe, k, t, value, margins)
           end if
         else if (last_rate(g) < 0 .and. rate > 0) then
-          call find_least(machine, probe, from, start, last_t, t, last_rate(g), rate, least_t, least)
+          call find_least(machine, probe, last, last_t, t, last_rate(g), rate, least_t, least)
           call note(machine, probe, k, least_t, least, margins)
         end if
         last_rate(g) = rate
       end do
       last_t = t
+      last = y
     end do
   end subroutine look_along
 
@@ -188,11 +194,12 @@ contains
     margins%x_min = min(margins%x_min, x)
   end subroutine note_place
 
-  !> Where the rate of a guard changes its sign, by the Illinois form of the secant rule, and its value there.
-  pure subroutine find_least(machine, probe, from, start, low, high, rate_low, rate_high, t, value)
+  !> Where the rate of a guard changes its sign after the state `start` at `low`, by the Illinois form of the secant rule, and its
+  !> value there.
+  pure subroutine find_least(machine, probe, start, low, high, rate_low, rate_high, t, value)
     type(structure_t), intent(in) :: machine
     type(event_t), intent(in) :: probe
-    real(wp), intent(in) :: from, start(:), low, high, rate_low, rate_high
+    real(wp), intent(in) :: start(:), low, high, rate_low, rate_high
     real(wp), intent(out) :: t, value
     real(wp) :: a, b, f_a, f_b, f, y(machine%n)
     integer :: i, side
@@ -204,7 +211,7 @@ contains
     do i = 1, most_secants
       t = b - f_b*((b - a)/(f_b - f_a))
       if (.not. (t > a .and. t < b)) t = a + (b - a)/2
-      call machine%fly(probe%before, from, start, t, y)
+      call machine%fly(probe%before, low, start, t, y)
       call value_and_rate(machine, probe, t, y, value, f)
       if (f*f_b > 0) then
         b = t

@@ -3,7 +3,7 @@
 
 !> Whether a motion under way has been captured by an attractor of a catalogue.
 module capture
-  use attractors, only: attractor_t, find_capture
+  use attractors, only: attractor_t, find_capture, most_coordinates, squared_distance
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: tally_t
@@ -11,7 +11,7 @@ module capture
   implicit none
   private
 
-  public :: captor_of
+  public :: captor_of, stays_in_family
 
 contains
 
@@ -31,5 +31,34 @@ contains
     call advance_to_section(moving, later, unused, reason)
     if (reason == 0) found = find_capture(catalogue, turn_point(moving, later), .true., by_event=.true.)
   end function captor_of
+
+  !> Whether a motion on the section, with what was counted since the last impact, has settled at one of a family of cycles, each
+  !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left
+  !> of its drift, |d| T/(1 - |multiplier|), is less than half of the distance at which it last missed a stop.
+  pure logical function stays_in_family(moving, catalogue, strobe, tally)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    class(strobe_t), intent(in) :: strobe
+    type(tally_t), intent(in) :: tally
+    real(wp) :: point(most_coordinates), drift
+    integer :: k, i, n
+    stays_in_family = .false.
+    if (tally%impacts > 0 .or. .not. any(catalogue%any_place)) return
+    point = section_point(moving, strobe)
+    do k = 1, size(catalogue)
+      associate (attractor => catalogue(k))
+        if (.not. attractor%any_place .or. attractor%multiplier >= 1) cycle
+        n = attractor%coordinates
+        do i = 1, attractor%period
+          if (squared_distance(attractor, i, point(2:)) > attractor%capture_radius**2) cycle
+          ! The first coordinate is a velocity.
+          drift = attractor%scale(1)*moving%machine%period/(1 - attractor%multiplier) &
+                  *sum(abs(point(2:n + 1) - attractor%points(:n, i))/attractor%scale(:n))
+          stays_in_family = drift < tally%grazing_margin/2
+          if (stays_in_family) return
+        end do
+      end associate
+    end do
+  end function stays_in_family
 
 end module capture

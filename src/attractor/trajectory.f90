@@ -5,7 +5,7 @@
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
   use attractors, only: attractor_t, features_t, find_box
-  use capture, only: captor_of
+  use capture, only: captor_of, stays_in_family
   use kinds, only: int64, wp
   use motion, only: advance, motion_t
   use motion_features, only: features_over
@@ -186,6 +186,9 @@ contains
       end if
     end if
     ended = course%reason /= 0 .or. (course%captured > 0 .and. ends_captured(span, course))
+    if (.not. ended .and. course%phase == phase_extension) then
+      ended = stays_in_family(moving, catalogue, course, course%tally)
+    end if
     if (ended .or. course%elapsed >= phase_end) call end_phase(moving, span, size(catalogue) > 0, ended, course, outcome)
     if (course%phase /= phase_over) call set_stop(moving, span, course)
   end subroutine pass_stop

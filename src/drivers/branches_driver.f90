@@ -207,9 +207,12 @@ contains
         if (allocated(contacts%list)) call report_contacts(session, search, contacts, b, 0, unit)
       end associate
     end do
-    families = sum(search%found%families)
     call session%journal%line('found', to_text(size(search%branches))//' branches from '//to_text(search%seeds)// &
       ' seeds at '//to_text(size(search%values))//' values of '//search%family%path//'; there may be others')
+    families = sum(search%found%equilibria)
+    if (families > 0) call session%journal%line('equilibria', 'equilibria were met '//to_text(families)// &
+                                                ' times; they are not followed')
+    families = sum(search%found%families)
     if (families > 0) call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
                                                 to_text(families)//' times; they are not followed')
   end subroutine report

@@ -4,22 +4,21 @@
 !> `separatrix stability`: Lyapunov exponents of the motion from [start], or of the entries of a map without a period, and what
 !> kind of motion it is.
 module stability_driver
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: family_t
   use case_check, only: require_start
   use case_setup, only: options_of
   use command_line, only: command_t
   use errors, only: error_t
-  use exponents, only: lyapunov_exponents, motion_names, spectrum_t, type_of_motion, zero_one_test
+  use exponents, only: motion_names, spectrum_t, type_of_motion, zero_one_test
   use files, only: file_exists, is_special, is_text
   use journal, only: json_number, json_text
   use kinds, only: wp
   use launcher, only: launched_rank
-  use motion, only: start_state
-  use motion_state, only: state_t
-  use one_body, only: one_body_t
+  use machine_family, only: machine_neighbourhood
   use session, only: open_session, session_t
   use stability_of_map, only: most_points, run_stability_of_map
   use status, only: exit_done
+  use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
   implicit none
@@ -55,7 +54,6 @@ contains
     type(family_t) :: family
     type(neighbourhood_t) :: machines
     type(spectrum_t) :: spectrum
-    type(state_t) :: state
     type(error_t), allocatable :: error
     real(wp) :: section(min(most_points, command%periods)), k
     call open_session(command, session)
@@ -63,7 +61,7 @@ contains
     call session%stop_if(error)
     family%laws = session%the_case%laws
     family%options = options_of(session%the_case)
-    call body_neighbourhood(family, 0.0_wp, machines, error)
+    call machine_neighbourhood(family, 0.0_wp, machines, error)
     call session%stop_if(error)
     if (command%validate .or. command%dry_run) then
       call session%journal%line('valid', command%path//' is a valid case for stability')
@@ -71,15 +69,12 @@ contains
     end if
     if (session%team%is_root()) then
       associate (start => session%the_case%start)
-        select type (body => machines%centre)
-        type is (one_body_t)
-          state = start_state(body%moving, start%x0, start%v0, start%crank_angle)
-        end select
+        call exponents_of_machine(machines, [start%x0, start%v0, start%crank_angle], command%periods/4, command%periods, spectrum, &
+                                  section)
       end associate
-      call lyapunov_exponents(machines, state, command%periods/4, command%periods, spectrum, section)
       if (spectrum%known) then
         k = zero_one_test(section)
-        call report(session, spectrum, k)
+        call report(session, spectrum, machines%centre%has_clock, k)
       else
         call session%journal%line('not_known', 'not known: the motion was given up, or met an event tangentially')
       end if
@@ -88,13 +83,14 @@ contains
   end subroutine run_stability_of_case
 
   !> What was found, with errors and the check.
-  subroutine report(session, spectrum, k)
+  subroutine report(session, spectrum, has_clock, k)
     type(session_t), intent(inout) :: session
     type(spectrum_t), intent(in) :: spectrum
+    logical, intent(in) :: has_clock
     real(wp), intent(in) :: k
     character(len=:), allocatable :: name
     integer :: i
-    do i = 1, 2
+    do i = 1, size(spectrum%exponents)
       associate (value => spectrum%exponents(i), error => spectrum%errors(i))
         if (value < -huge(1.0_wp)/2) then
           call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': -inf (a direction is lost: sticking or '// &
@@ -106,6 +102,8 @@ contains
         end if
       end associate
     end do
+    if (.not. has_clock) call session%journal%line('trivial', 'and the trivial exponent 0 of a motion without a clock; the '// &
+      'section is passed every '//to_text(spectrum%mean_period, 10)//' s', '"mean_period": '//json_number(spectrum%mean_period))
     if (spectrum%has_sum) then
       call session%journal%line('sum', 'their sum: '//to_text(spectrum%sum_found, 10)//' 1/s; exact, from damping, impacts and '// &
         'turning points: '//to_text(spectrum%sum_exact, 10)//' 1/s', '"found": '//json_number(spectrum%sum_found)// &
@@ -114,7 +112,8 @@ contains
     call session%journal%line('zero_one', '0-1 test: '//to_text(k, 3)//' (0 regular, 1 chaotic)', '"value": '//json_number(k))
     name = trim(motion_names(type_of_motion(spectrum, k)))
     call session%journal%line('motion', 'the motion is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')// &
-      ', by '//to_text(spectrum%periods)//' drive periods with '//to_text(spectrum%impacts)//' impacts', &
+      ', by '//to_text(spectrum%periods)//trim(merge(' drive periods', ' returns      ', has_clock))//' with '// &
+      to_text(spectrum%impacts)//' impacts', &
       '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts))
   end subroutine report
 

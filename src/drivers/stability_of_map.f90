@@ -4,23 +4,22 @@
 !> `separatrix stability MAP`: what the entries of a map's catalogue are that have no period.
 module stability_of_map
   use attractors, only: kind_rest
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: family_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of
   use case_type, only: case_t
   use command_line, only: command_t
   use errors, only: error_t, fail
-  use exponents, only: lyapunov_exponents, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
+  use exponents, only: motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
     motion_transient, period_of_section, spectrum_t, type_of_motion, zero_one_test
   use grid, only: grid_t, point_laws, point_slice, point_start
   use journal, only: journal_t, json_number, json_text
   use kinds, only: int64, wp
+  use machine_family, only: machine_neighbourhood
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
-  use motion, only: start_state
-  use motion_state, only: state_t
-  use one_body, only: one_body_t
   use status, only: exit_bad_case, exit_usage
+  use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
   implicit none
@@ -231,10 +230,10 @@ contains
     words = words//'; exponents'
     values = ''
     errors = ''
-    do i = 1, 2
+    do i = 1, size(found%spectrum%exponents)
       associate (value => found%spectrum%exponents(i), error => found%spectrum%errors(i))
-        if (i == 2) then
-          words = words//' and'
+        if (i > 1) then
+          words = words//trim(merge(' and', ',   ', i == size(found%spectrum%exponents)))
           values = values//', '
           errors = errors//', '
         end if
@@ -270,18 +269,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(family_t) :: family
     type(neighbourhood_t) :: machines
-    type(state_t) :: state
     real(wp) :: section(min(most_points, periods)), start(3 + size(grid%others))
     family%laws = point_laws(grid, index)
     family%options = grid%options
-    call body_neighbourhood(family, 0.0_wp, machines, error)
+    call machine_neighbourhood(family, 0.0_wp, machines, error)
     if (allocated(error)) return
     start = point_start(grid, index)
-    select type (body => machines%centre)
-    type is (one_body_t)
-      state = start_state(body%moving, start(1), start(2), start(3))
-    end select
-    call lyapunov_exponents(machines, state, periods/4, periods, found%spectrum, section)
+    call exponents_of_machine(machines, start, periods/4, periods, found%spectrum, section)
     if (.not. found%spectrum%known) return
     found%zero_one = zero_one_test(section)
     select case (type_of_motion(found%spectrum, found%zero_one))

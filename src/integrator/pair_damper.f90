@@ -224,14 +224,14 @@ contains
     real(wp) :: t
     bodies = stretch
     associate (pressing => damped%pressing, machine => moving%machine)
-      bodies%path(:, at_x2) = pressing%side*stretch%path(:, at_p) + pressing%carried*stretch%path(:, at_x1)
-      bodies%path(0, at_x2) = bodies%path(0, at_x2) + merge(machine%upper, machine%lower, pressing%side > 0)
-      bodies%path(:, at_v2) = pressing%side*stretch%path(:, at_rate) + pressing%carried*stretch%path(:, at_v1)
-      if (pressing%sense == 0) bodies%path(:, at_v2) = stretch%path(:, at_v1)
+      bodies%path(at_x2, :) = pressing%side*stretch%path(at_p, :) + pressing%carried*stretch%path(at_x1, :)
+      bodies%path(at_x2, 0) = bodies%path(at_x2, 0) + merge(machine%upper, machine%lower, pressing%side > 0)
+      bodies%path(at_v2, :) = pressing%side*stretch%path(at_rate, :) + pressing%carried*stretch%path(at_v1, :)
+      if (pressing%sense == 0) bodies%path(at_v2, :) = stretch%path(at_v1, :)
     end associate
     call note_extremes(bodies, last, tally)
     if (.not. present(log)) return
-    log%peak_penetration = max(log%peak_penetration, largest(stretch%path(:, at_p), last))
+    log%peak_penetration = max(log%peak_penetration, largest(stretch%path(at_p, :), last))
     log%peak_force = max(log%peak_force, largest(series_of(stretch, damped%force), last))
     book = log%book
     do while (log%sample_interval > 0)
@@ -258,9 +258,9 @@ contains
     real(wp), intent(in) :: last
     type(book_t), intent(inout) :: book
     real(wp) :: change(most_unknowns), v1(0:order), rate(0:order)
-    change = state_at(stretch, last) - stretch%path(0, :)
-    v1 = stretch%path(:, at_v1)
-    rate = stretch%path(:, at_rate)
+    change = state_at(stretch, last) - stretch%path(:, 0)
+    v1 = stretch%path(at_v1, :)
+    rate = stretch%path(at_rate, :)
     associate (machine => moving%machine, pressing => damped%pressing, length => stretch%length)
       book%friction = book%friction + pressing%sense*machine%friction &
         *((1 - pressing%carried)*change(at_x1) - pressing%side*change(at_p))

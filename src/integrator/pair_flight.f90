@@ -5,21 +5,21 @@
 !> stop, the break-away of the interface, or the release from the stop.
 module pair_flight
   use kinds, only: wp
-  use linear_flow, only: drop_rounding, expand, first_zero, most_unknowns, order, product_integral, series_of, series_value, &
-    state_at, stretch_t
+  use linear_flow, only: drop_rounding, expand, first_zero, is_above, most_unknowns, order, product_integral, series_of, &
+    series_value, state_at, stretch_t, stride
   use motion_state, only: book_t, log_t, mode_held, mode_slip_minus, mode_slip_plus, mode_stick, note_position, record_sample, &
     sample_due, sample_time, state_t, tally_t
   use pair, only: driven_by_motion
-  use pair_modes, only: at_cosine, at_one, at_sine, at_v1, at_v2, at_x1, at_x2, pair_motion_t, pair_state_t, refresh, sense_of, &
-    speed_size
+  use pair_modes, only: at_cosine, at_one, at_sine, at_v1, at_v2, at_x1, at_x2, interface_row, of_driven, of_lower, of_minus, &
+    of_plus, of_rate, of_slip, of_upper, pair_motion_t, pair_state_t, refresh, sense_of, speed_size, stop_row
   implicit none
   private
 
   public :: fly_pair, body_state, driver_of, energy_of, note_extremes
 
   !> Guards.
-  integer, parameter, public :: guard_none = 0, guard_upper = 1, guard_lower = 2, guard_slip = 3, guard_plus = 4, &
-    guard_minus = 5, guard_press = 6, guard_leave = 7
+  integer, parameter, public :: guard_none = 0, guard_upper = of_upper, guard_lower = of_lower, guard_slip = of_slip, &
+    guard_plus = of_plus, guard_minus = of_minus, guard_press = 6, guard_leave = 7
   integer, parameter :: guards = 7
   !> Of a contact with a soft stop: its end; no step is short enough.
   integer, parameter, public :: guard_separate = 8, guard_failed = 9
@@ -51,8 +51,9 @@ contains
     type(watch_t) :: watches(guards)
     type(stretch_t) :: stretch
     real(wp) :: p(0:order), t, first, sizes(most_unknowns)
+    real(wp) :: after(most_unknowns)
     integer :: i
-    logical :: begins
+    logical :: begins, sure(guards)
     call refresh(moving, state)
     watches = watches_of(moving, state, hold)
     ! The ties that choose a mode are taken in units of the amplitudes.
@@ -62,11 +63,27 @@ contains
     sizes(at_x1) = max(abs(sizes(at_x1)), moving%swing*sizes(at_v1))
     begins = .true.
     do
+      sure = are_sure(moving, state, watches, sizes, begins)
+      associate (linear => moving%modes(state%mode))
+        if (all(sure) .and. linear%rate*(time_end - state%time) > 1 .and. &
+            turns_nowhere(moving, state, sizes, tally%wants_v_max)) then
+          after = stride(linear, state%y)
+          tally%v_max = max(tally%v_max, state%y(at_v2), after(at_v2))
+          if (present(log)) then
+            call expand(linear, state%y, time_end - state%time, stretch)
+            call write_down(moving, state, stretch, 1.0_wp, log)
+          end if
+          state%y = after
+          state%time = min(state%time + 1/linear%rate, time_end)
+          begins = .false.
+          cycle
+        end if
+      end associate
       call expand(moving%modes(state%mode), state%y, time_end - state%time, stretch)
       fallen = guard_none
       first = 1
       do i = 1, guards
-        if (.not. watches(i)%active) cycle
+        if (.not. watches(i)%active .or. sure(i)) cycle
         p = series_of(stretch, watches(i)%row)
         if (begins .and. watches(i)%starts_at_zero) then
           p(0) = 0
@@ -96,6 +113,47 @@ contains
       call note_miss(moving, -sense_of(state%mode), state%y(at_x2) - state%y(at_x1), tally)
     end if
   end subroutine fly_pair
+
+  !> Which guards certainly do not fall along a full stretch; those that are not watched among them. `sizes` are those of the
+  !> unknowns where the flight begins.
+  pure function are_sure(moving, state, watches, sizes, begins) result(sure)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    type(watch_t), intent(in) :: watches(guards)
+    real(wp), intent(in) :: sizes(most_unknowns)
+    logical, intent(in) :: begins
+    logical :: sure(guards)
+    real(wp) :: side
+    integer :: i
+    do i = 1, guards
+      sure(i) = .not. watches(i)%active
+      if (sure(i) .or. i > guard_minus) cycle
+      side = merge(sense_of(state%mode), 1, i == guard_slip)
+      associate (bound => moving%bounds(i, state%mode))
+        if (begins) then
+          sure(i) = is_above(bound, side, state%y, sizes, watches(i)%starts_at_zero)
+        else
+          sure(i) = is_above(bound, side, state%y, state%y, .false.)
+        end if
+      end associate
+    end do
+  end function are_sure
+
+  !> Whether m2 certainly goes on in one direction along a full stretch, or rests on a stop; its acceleration too, if the
+  !> largest velocity is wanted.
+  pure logical function turns_nowhere(moving, state, sizes, wants_v_max)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    real(wp), intent(in) :: sizes(most_unknowns)
+    logical, intent(in) :: wants_v_max
+    real(wp) :: rate
+    turns_nowhere = .not. any([mode_slip_plus, mode_slip_minus, mode_stick] == state%mode)
+    if (turns_nowhere) return
+    turns_nowhere = is_above(moving%bounds(of_driven, state%mode), sign(1.0_wp, state%y(at_v2)), state%y, sizes, .false.)
+    if (.not. (turns_nowhere .and. wants_v_max)) return
+    rate = sum(moving%modes(state%mode)%matrix(at_v2, :)*state%y)
+    turns_nowhere = is_above(moving%bounds(of_rate, state%mode), sign(1.0_wp, rate), state%y, sizes, .false.)
+  end function turns_nowhere
 
   !> What ends the mode of a state.
   pure function watches_of(moving, state, hold) result(watches)
@@ -145,14 +203,8 @@ contains
     associate (machine => moving%machine, upper => watches(guard_upper), lower => watches(guard_lower))
       upper%active = machine%upper < unreachable
       lower%active = machine%lower > -unreachable
-      upper%row(at_x2) = -1
-      lower%row(at_x2) = 1
-      if (machine%carried) then
-        upper%row(at_x1) = 1
-        lower%row(at_x1) = -1
-      end if
-      if (upper%active) upper%row(at_one) = machine%upper
-      if (lower%active) lower%row(at_one) = -machine%lower
+      if (upper%active) upper%row = stop_row(moving, 1)
+      if (lower%active) lower%row = stop_row(moving, -1)
       upper%starts_at_zero = touch > 0
       lower%starts_at_zero = touch < 0
     end associate
@@ -164,8 +216,7 @@ contains
     type(watch_t), intent(inout) :: watch
     integer, intent(in) :: direction
     watch%active = .true.
-    watch%row = -direction*moving%interface
-    watch%row(at_one) = watch%row(at_one) + moving%machine%friction
+    watch%row = interface_row(moving, direction)
     watch%allowance = tie_allowance*moving%force_scale
   end subroutine watch_interface
 
@@ -178,15 +229,25 @@ contains
     logical, intent(in) :: begins
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
-    type(pair_state_t) :: sample
-    type(book_t) :: book
-    real(wp) :: t, place
+    real(wp) :: place
     integer :: direction
     call note_extremes(stretch, last, tally, direction, place)
     ! Not the stop that the flight begins on.
     if (begins .and. direction == state%touch) direction = 0
     if (direction /= 0 .and. .not. moving%machine%carried) call note_miss(moving, direction, place, tally)
-    if (.not. present(log)) return
+    if (present(log)) call write_down(moving, state, stretch, last, log)
+  end subroutine look_along
+
+  !> Samples and energy of a stretch up to a fraction of it.
+  pure subroutine write_down(moving, state, stretch, last, log)
+    type(pair_motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    type(stretch_t), intent(in) :: stretch
+    real(wp), intent(in) :: last
+    type(log_t), intent(inout) :: log
+    type(pair_state_t) :: sample
+    type(book_t) :: book
+    real(wp) :: t
     book = log%book
     call book_stretch(moving, state, stretch, last, log%book)
     if (log%sample_interval <= 0) return
@@ -198,7 +259,7 @@ contains
       sample%y = state_at(stretch, t)
       call record_at(moving, state, stretch, t, book, sample, log)
     end do
-  end subroutine look_along
+  end subroutine write_down
 
   !> Writes down a sample at a fraction of a stretch, `book` being that at its start.
   pure subroutine record_at(moving, state, stretch, t, book, sample, log)
@@ -227,13 +288,13 @@ contains
     integer :: k, direction
     if (present(turned)) turned = 0
     if (present(place)) place = 0
-    v = stretch%path(:, at_v2)
+    v = stretch%path(at_v2, :)
     k = findloc(abs(v) > 0, .true., dim=1) - 1
     direction = 0
     if (k >= 0) direction = nint(sign(1.0_wp, v(k)))
     t = first_zero(direction*v)
     if (t <= last .and. direction /= 0) then
-      call series_value(stretch%path(:, at_x2), t, x)
+      call series_value(stretch%path(at_x2, :), t, x)
       tally%x_max = max(tally%x_max, x)
       tally%x_min = min(tally%x_min, x)
       if (present(turned)) turned = direction
@@ -270,16 +331,16 @@ contains
     real(wp) :: change(most_unknowns), end_state(most_unknowns), v1(0:order)
     integer :: s
     end_state = state_at(stretch, last)
-    change = end_state - stretch%path(0, :)
+    change = end_state - stretch%path(:, 0)
     s = sense_of(state%mode)
     associate (machine => moving%machine)
       book%friction = book%friction + s*machine%friction*(change(at_x1) - change(at_x2))
       if (machine%drive == driven_by_motion) then
         book%work = book%work + s*machine%friction*change(at_x1)
         if (s == 0) book%work = book%work &
-          + 0.5_wp*machine%driven_mass*change(at_v2)*(end_state(at_v2) + stretch%path(0, at_v2))
+          + 0.5_wp*machine%driven_mass*change(at_v2)*(end_state(at_v2) + stretch%path(at_v2, 0))
       else
-        v1 = stretch%path(:, at_v1)
+        v1 = stretch%path(at_v1, :)
         if (machine%damping > 0) book%damping = book%damping &
           + machine%damping*stretch%length*product_integral(v1, v1, last)
         if (any(abs(moving%drive) > 0)) book%work = book%work &

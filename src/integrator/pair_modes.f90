@@ -7,19 +7,24 @@
 module pair_modes
   use elementary, only: sine_cosine
   use kinds, only: wp
-  use linear_flow, only: linear_t, most_unknowns, prepare_linear
+  use linear_flow, only: bound_of, bound_t, linear_t, most_unknowns, prepare_linear, tabulate
   use motion_state, only: mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, &
     mode_upper_barrier, options_t
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion, pair_t
   implicit none
   private
 
-  public :: prepare_pair, refresh, mode_together, mode_of_slip, sense_of, control_now, speed_size, stands, with_clocks
+  public :: prepare_pair, stop_row, interface_row, refresh, mode_together, mode_of_slip, sense_of, control_now, speed_size, &
+    stands, with_clocks
 
   !> Unknowns: both bodies, cosine and sine of the drive, one, integral of the control error, velocity of the drive
   !> times time, control held between samples.
   integer, parameter, public :: at_x1 = 1, at_v1 = 2, at_x2 = 3, at_v2 = 4, at_cosine = 5, at_sine = 6, at_one = 7, &
     at_integral = 8, at_ramp = 9, at_control = 10
+
+  !> What is looked at along the way: distance from the upper stop and from the lower one, relative velocity (of m1 where m2 rests
+  !> on a stop), what the interface has left in either direction, velocity of m2 and its rate. The first five are guards.
+  integer, parameter, public :: of_upper = 1, of_lower = 2, of_slip = 3, of_plus = 4, of_minus = 5, of_driven = 6, of_rate = 7
 
   !> A rebound that the forces end within this share of a period is none.
   real(wp), parameter :: briefest_bounce = 1e-10_wp
@@ -45,6 +50,8 @@ module pair_modes
     type(pair_t) :: machine
     type(options_t) :: options
     type(linear_t) :: modes(mode_held)
+    !> Of what is looked at along the way in each mode.
+    type(bound_t) :: bounds(of_rate, mode_held)
     !> As linear functions of the unknowns: force on m1 without the interface [N], or the acceleration of a given motion
     !> [m/s^2]; acceleration that the bodies have together; interface force then; reference and its rate; control.
     real(wp), dimension(most_unknowns) :: push = 0, together = 0, interface = 0, reference = 0, reference_rate = 0, &
@@ -101,7 +108,52 @@ contains
     moving%modes(mode_held) = prepare_linear(with_clocks(moving, bodies))
     moving%interface_rate = matmul(moving%interface, moving%modes(mode_stick)%matrix)
     moving%push_rate = matmul(moving%push, moving%modes(mode_held)%matrix)
+    do s = 1, mode_held
+      call tabulate(moving%modes(s))
+      call set_bounds(moving, s)
+    end do
   end subroutine prepare_pair
+
+  !> Bounds along the flights of a mode.
+  pure subroutine set_bounds(moving, mode)
+    type(pair_motion_t), intent(inout) :: moving
+    integer, intent(in) :: mode
+    real(wp) :: rows(most_unknowns, of_rate)
+    integer :: i
+    rows(:, of_upper) = stop_row(moving, 1)
+    rows(:, of_lower) = stop_row(moving, -1)
+    rows(:, of_slip) = 0
+    rows(at_v1, of_slip) = 1
+    if (mode == mode_slip_plus .or. mode == mode_slip_minus) rows(at_v2, of_slip) = -1
+    rows(:, of_plus) = interface_row(moving, 1)
+    rows(:, of_minus) = interface_row(moving, -1)
+    rows(:, of_driven) = 0
+    rows(at_v2, of_driven) = 1
+    rows(:, of_rate) = moving%modes(mode)%matrix(at_v2, :)
+    do i = 1, of_rate
+      moving%bounds(i, mode) = bound_of(moving%modes(mode), rows(:, i))
+    end do
+  end subroutine set_bounds
+
+  !> Distance of m2 from the stop on a side; infinite where there is none.
+  pure function stop_row(moving, side) result(row)
+    type(pair_motion_t), intent(in) :: moving
+    integer, intent(in) :: side
+    real(wp) :: row(most_unknowns)
+    row = 0
+    row(at_x2) = -side
+    if (moving%machine%carried) row(at_x1) = side
+    row(at_one) = side*merge(moving%machine%upper, moving%machine%lower, side > 0)
+  end function stop_row
+
+  !> What the interface has left in a direction.
+  pure function interface_row(moving, direction) result(row)
+    type(pair_motion_t), intent(in) :: moving
+    integer, intent(in) :: direction
+    real(wp) :: row(most_unknowns)
+    row = -direction*moving%interface
+    row(at_one) = row(at_one) + moving%machine%friction
+  end function interface_row
 
   !> The linear functions that drive and decide.
   pure subroutine set_rows(machine, moving)

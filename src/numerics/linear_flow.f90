@@ -10,7 +10,8 @@ module linear_flow
   implicit none
   private
 
-  public :: prepare_linear, expand, state_at, series_of, series_value, first_zero, product_integral, drop_rounding
+  public :: prepare_linear, tabulate, expand, state_at, bound_of, is_above, stride, series_of, series_value, first_zero, &
+    product_integral, drop_rounding
 
   integer, parameter, public :: most_unknowns = 10
   !> 1/21! is below the rounding of doubles by far; quadruple precision takes more terms.
@@ -21,17 +22,30 @@ module linear_flow
   !> Rounding of a sum, as a share of the sum of the absolute values; how many terms of a series are looked at.
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
   integer, parameter :: last_of_rounding = 3
+  !> Coefficients of a series that a bound knows by themselves.
+  integer, parameter :: last_leading = 4
 
   type, public :: linear_t
     real(wp) :: matrix(most_unknowns, most_unknowns) = 0
     !> Bound on how fast the unknowns change [1/s], 0 for motions that are polynomials in time.
     real(wp) :: rate = 0
+    !> Of a tabulated one over a full stretch, 1/rate long: the unknowns after it per unit of those before, their coefficients of
+    !> each power per unit of each unknown, and the last power that it has.
+    real(wp), allocatable :: stride(:, :), terms(:, :, :)
+    integer :: last(most_unknowns) = 0
   end type linear_t
 
-  !> A stretch of the motion: its length [s] and the unknowns by rising powers of the fraction of the length.
+  !> A linear function of the unknowns over a full stretch: its first coefficients per unit of an unknown, a bound on the sum of
+  !> the others, and the rounding of all. Only the unknowns `of` count.
+  type, public :: bound_t
+    integer :: count = 0, of(most_unknowns) = 0
+    real(wp) :: leading(0:last_leading, most_unknowns) = 0, rest(most_unknowns) = 0, blur(most_unknowns) = 0
+  end type bound_t
+
+  !> A stretch of the motion: its length [s] and the unknowns by rising powers (columns) of the fraction of the length.
   type, public :: stretch_t
     real(wp) :: length = 0
-    real(wp) :: path(0:order, most_unknowns) = 0
+    real(wp) :: path(most_unknowns, 0:order) = 0
   end type stretch_t
 
 contains
@@ -57,19 +71,123 @@ contains
     linear%rate = size_of_matrix*size_of_power
   end function prepare_linear
 
+  !> Tables for a motion that has many flights; none where nothing but powers of time is in it.
+  pure subroutine tabulate(linear)
+    type(linear_t), intent(inout) :: linear
+    real(wp) :: term(most_unknowns, most_unknowns)
+    integer :: k, j
+    if (.not. linear%rate > 0) return
+    allocate (linear%terms(most_unknowns, 0:order, most_unknowns))
+    term = 0
+    do k = 1, most_unknowns
+      term(k, k) = 1
+    end do
+    linear%stride = term
+    linear%terms(:, 0, :) = term
+    do k = 1, order
+      term = matmul(linear%matrix, term)/(linear%rate*k)
+      linear%stride = linear%stride + term
+      linear%terms(:, k, :) = term
+      do j = 1, most_unknowns
+        if (any(abs(term(:, j)) > 0)) linear%last(j) = k
+      end do
+    end do
+  end subroutine tabulate
+
+  !> The unknowns after a full stretch.
+  pure function stride(linear, y) result(after)
+    type(linear_t), intent(in) :: linear
+    real(wp), intent(in) :: y(most_unknowns)
+    real(wp) :: after(most_unknowns)
+    integer :: j
+    after = 0
+    do j = 1, most_unknowns
+      if (abs(y(j)) > 0) after = after + linear%stride(:, j)*y(j)
+    end do
+  end function stride
+
+  !> What bounds the linear function `row` of the unknowns over a full stretch.
+  pure function bound_of(linear, row) result(bound)
+    type(linear_t), intent(in) :: linear
+    real(wp), intent(in) :: row(most_unknowns)
+    type(bound_t) :: bound
+    real(wp) :: terms(0:order, most_unknowns), term(most_unknowns)
+    integer :: k, j
+    if (.not. linear%rate > 0) return
+    term = row
+    terms(0, :) = term
+    do k = 1, order
+      term = matmul(term, linear%matrix)/(linear%rate*k)
+      terms(k, :) = term
+    end do
+    do j = 1, most_unknowns
+      if (.not. any(abs(terms(:, j)) > 0)) cycle
+      bound%count = bound%count + 1
+      bound%of(bound%count) = j
+      bound%leading(:, bound%count) = terms(:last_leading, j)
+      bound%rest(bound%count) = sum(abs(terms(last_leading + 1:, j)))
+      bound%blur(bound%count) = rounding*sum(abs(terms(:, j)))
+    end do
+  end function bound_of
+
+  !> Whether `side` times a linear function is certainly positive all along a full stretch from `y`, or all but at its start
+  !> where it starts `from_zero`; `sizes` are those of the unknowns, for their rounding. The coefficients of Bernstein's
+  !> polynomials of the first terms lie above what the others can do.
+  pure logical function is_above(bound, side, y, sizes, from_zero)
+    type(bound_t), intent(in) :: bound
+    real(wp), intent(in) :: side, y(most_unknowns), sizes(most_unknowns)
+    logical, intent(in) :: from_zero
+    real(wp) :: c(0:last_leading), against, least
+    integer :: i
+    is_above = .false.
+    if (bound%count == 0) return
+    c = 0
+    against = 0
+    do i = 1, bound%count
+      associate (j => bound%of(i))
+        c = c + bound%leading(:, i)*y(j)
+        against = against + bound%rest(i)*abs(y(j)) + bound%blur(i)*abs(sizes(j))
+      end associate
+    end do
+    c = side*c
+    if (from_zero) then
+      least = min(c(1), c(1) + c(2)/3, c(1) + (2*c(2) + c(3))/3, c(1) + c(2) + c(3) + c(4))
+    else
+      least = min(c(0), c(0) + c(1)/4, c(0) + (3*c(1) + c(2))/6, c(0) + (3*c(1) + 2*c(2) + c(3))/4, &
+                  c(0) + c(1) + c(2) + c(3) + c(4))
+    end if
+    is_above = least > against
+  end function is_above
+
   !> The stretch from the state `y`, `longest` [s] at most.
   pure subroutine expand(linear, y, longest, stretch)
     type(linear_t), intent(in) :: linear
     real(wp), intent(in) :: y(most_unknowns), longest
     type(stretch_t), intent(out) :: stretch
+    real(wp) :: power(0:order)
     integer :: k, j
     stretch%length = longest
     if (linear%rate*longest > 1) stretch%length = 1/linear%rate
-    stretch%path(0, :) = y
+    if (allocated(linear%terms)) then
+      do j = 1, most_unknowns
+        if (.not. abs(y(j)) > 0) cycle
+        do k = 0, linear%last(j)
+          stretch%path(:, k) = stretch%path(:, k) + linear%terms(:, k, j)*y(j)
+        end do
+      end do
+      if (linear%rate*longest > 1) return
+      power(0) = 1
+      do k = 1, order
+        power(k) = power(k - 1)*(linear%rate*longest)
+        stretch%path(:, k) = stretch%path(:, k)*power(k)
+      end do
+      return
+    end if
+    stretch%path(:, 0) = y
     do k = 1, order
       do j = 1, most_unknowns
-        if (abs(stretch%path(k - 1, j)) > 0) stretch%path(k, :) = &
-          stretch%path(k, :) + linear%matrix(:, j)*(stretch%path(k - 1, j)*(stretch%length/k))
+        if (abs(stretch%path(j, k - 1)) > 0) stretch%path(:, k) = &
+          stretch%path(:, k) + linear%matrix(:, j)*(stretch%path(j, k - 1)*(stretch%length/k))
       end do
     end do
   end subroutine expand
@@ -80,9 +198,9 @@ contains
     real(wp), intent(in) :: fraction
     real(wp) :: y(most_unknowns)
     integer :: k
-    y = stretch%path(order, :)
+    y = stretch%path(:, order)
     do k = order - 1, 0, -1
-      y = y*fraction + stretch%path(k, :)
+      y = y*fraction + stretch%path(:, k)
     end do
   end function state_at
 
@@ -94,7 +212,7 @@ contains
     integer :: j
     p = 0
     do j = 1, most_unknowns
-      if (abs(row(j)) > 0) p = p + row(j)*stretch%path(:, j)
+      if (abs(row(j)) > 0) p = p + row(j)*stretch%path(j, :)
     end do
   end function series_of
 
@@ -150,7 +268,9 @@ contains
     t = 2
     if (.not. any(abs(p) > 0)) return
     t = 0
-    call series_value(p, t, value, rate, curvature)
+    value = p(0)
+    rate = p(1)
+    curvature = 2*p(2)
     if (value > 0) then
       step = positive_step(value, rate, second_bound)
     else

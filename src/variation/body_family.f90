@@ -66,7 +66,7 @@ contains
     if (allocated(error)) return
     if (.not. has_variation(moving)) then
       call fail(error, exit_bad_case, 'body.law, effect.dahl, drive.law, contact.law: variations are known of one body with '// &
-                'a drive, without Dahl friction, a measured force, or a damping that each impact sets')
+                'a drive and of structures, without Dahl friction, a measured force, or a damping that each impact sets')
       return
     end if
     body = one_body_of(moving, merge(family%sizes(1), size_of_motion(moving), family%sizes(1) > 0))

@@ -11,8 +11,10 @@ module machine_family
   use jointed_motion, only: start_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
+  use law_table, only: law_choice_t
   use motion_state, only: tally_t
   use one_body, only: one_body_t
+  use pair, only: is_pair
   use structure, only: coordinates_of, structure_t
   use structure_family, only: fly_structure, map_of_structure, structure_neighbourhood, structure_of_family
   use variations, only: neighbourhood_t
@@ -24,6 +26,12 @@ module machine_family
 
 contains
 
+  !> Whether a machine has several bodies.
+  pure logical function has_several(laws)
+    type(law_choice_t), intent(in) :: laws(:)
+    has_several = is_jointed(laws) .or. is_pair(laws)
+  end function has_several
+
   !> The machine with the parameter at `value`. Code 65 if it cannot be built or its variations are not known.
   subroutine machine_of_family(family, value, machine, error)
     type(family_t), intent(in) :: family
@@ -32,12 +40,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(one_body_t) :: body
     type(structure_t) :: structure
-    if (is_jointed(family%laws)) then
+    if (has_several(family%laws)) then
       call structure_of_family(family, value, structure, error)
-      allocate (machine, source=structure)
+      if (.not. allocated(error)) allocate (machine, source=structure)
     else
       call body_of_family(family, value, body, error)
-      allocate (machine, source=body)
+      if (.not. allocated(error)) allocate (machine, source=body)
     end if
   end subroutine machine_of_family
 
@@ -47,7 +55,7 @@ contains
     real(wp), intent(in) :: value
     type(neighbourhood_t), intent(out) :: machines
     type(error_t), allocatable, intent(out) :: error
-    if (is_jointed(family%laws)) then
+    if (has_several(family%laws)) then
       call structure_neighbourhood(family, value, machines, error)
     else
       call body_neighbourhood(family, value, machines, error)

@@ -205,10 +205,15 @@ contains
     real(wp), intent(in) :: t, y(:)
     real(wp) :: slope(size(y))
     type(jointed_state_t) :: state
-    type(mode_flow_t) :: flow
+    type(mode_flow_t) :: spare
+    integer :: at
     state = state_in(self, mode, t, y)
-    call flow_of(self%frame%moving, state%phase, flow)
-    slope = rates(self%frame, flow, state)
+    call flow_of(self%frame%moving, state%phase, at, spare)
+    if (at > 0) then
+      slope = rates(self%frame, self%frame%moving%flows(at), state)
+    else
+      slope = rates(self%frame, spare, state)
+    end if
   end function slope_of_structure
 
   !> The guard number `event%guard` of the joint, in the mode before the event.
@@ -218,14 +223,30 @@ contains
     real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: value, by_state(:), by_time
     type(jointed_state_t) :: state
-    type(mode_flow_t) :: flow
+    type(mode_flow_t) :: spare
+    integer :: at
+    state = state_in(self, event%before, t, y)
+    if (event%guard == turns_round) state%phase(event%joint) = event%side
+    call flow_of(self%frame%moving, state%phase, at, spare)
+    if (at > 0) then
+      call guard_in(self, self%frame%moving%flows(at), event, state, t, value, by_state, by_time)
+    else
+      call guard_in(self, spare, event, state, t, value, by_state, by_time)
+    end if
+  end subroutine guard_of_structure
+
+  !> The same, in a state and by its flow.
+  pure subroutine guard_in(self, flow, event, state, t, value, by_state, by_time)
+    class(structure_t), intent(in) :: self
+    type(mode_flow_t), intent(in) :: flow
+    type(event_t), intent(in) :: event
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(in) :: t
+    real(wp), intent(out) :: value, by_state(:), by_time
     type(joint_guard_t) :: list(most_guards)
     complex(wp) :: turning(self%frame%moving%harmonics)
     real(wp) :: s, u, given
     integer :: g, count_guards, i
-    state = state_in(self, event%before, t, y)
-    if (event%guard == turns_round) state%phase(event%joint) = event%side
-    call flow_of(self%frame%moving, state%phase, flow)
     by_state = 0
     by_time = 0
     value = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -251,7 +272,7 @@ contains
         if (guard%held > 0) call add_force(self, flow, state, turning, guard%held, guard%force, value, by_state, by_time)
       end associate
     end associate
-  end subroutine guard_of_structure
+  end subroutine guard_in
 
   !> Adds `share` of the force of constraint number `held`; those that depend on others have none of their own.
   pure subroutine add_force(self, flow, state, turning, held, share, value, by_state, by_time)

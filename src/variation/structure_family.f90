@@ -19,14 +19,14 @@ module structure_family
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point, &
     flight_adaptive, reset_tally, state_t, tally_t
   use status, only: exit_bad_case
-  use structure, only: coordinates_of, count_joints, mode_number, settle, state_in, structure_of, structure_t
+  use structure, only: coordinates_of, count_joints, mode_number, phases_in, settle, state_in, structure_of, structure_t
   use transition_list, only: transition_t, transitions_t
   use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
   implicit none
   private
 
   public :: structure_of_family, structure_neighbourhood, fly_structure, map_of_structure, why_not_varied, vary_section, &
-    start_of_structure
+    start_of_structure, advance_section, least_dimension
 
   !> Distance of the neighbours, as a share of the parameter's size.
   real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
@@ -82,6 +82,11 @@ contains
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
+    if (.not. allocated(moving%jointed)) then
+      call fail(error, exit_bad_case, 'body.law: variations are known of one body with a drive and of structures, not of two '// &
+                'bodies in their own form')
+      return
+    end if
     why = why_not_varied(moving%jointed)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, 'body: the variations of this structure are not known: '//why)
@@ -324,6 +329,40 @@ contains
       call vary_section(machines, structure, mode, point, events, sections, image, by_start, ok, by_parameter)
     end select
   end subroutine map_of_structure
+
+  !> Directions that a motion leaves of its start: a joint that sticks takes one, a closed contact two, a slider one, an event
+  !> section one.
+  pure integer function least_dimension(structure, mode, events) result(least)
+    type(structure_t), intent(in) :: structure
+    integer, intent(in) :: mode
+    type(event_t), intent(in) :: events(:)
+    integer :: k
+    least = dimension_in(mode)
+    do k = 1, size(events)
+      least = min(least, dimension_in(events(k)%after))
+    end do
+    if (.not. structure%has_clock) least = least - 1
+
+  contains
+
+    pure integer function dimension_in(number)
+      integer, intent(in) :: number
+      integer :: phase(most_joints), j
+      associate (machine => structure%frame%moving%machine)
+        phase = phases_in(machine, number)
+        dimension_in = structure%n
+        do j = 1, count_joints(machine)
+          associate (kind => machine%joints(j)%kind)
+            if (kind == joint_friction .and. phase(j) == 0) dimension_in = dimension_in - 1
+            if (kind == joint_contact .and. phase(j) /= 0) dimension_in = dimension_in - 2
+            if (kind == joint_elastic .and. phase(j) /= 0) dimension_in = dimension_in - 1
+          end associate
+        end do
+        dimension_in = max(dimension_in, 0)
+      end associate
+    end function dimension_in
+
+  end function least_dimension
 
   !> Derivatives of the map over so many sections along a motion with `events` from `point` to `image`: without a clock those of the
   !> flow, less what the section takes out of them.

@@ -44,16 +44,16 @@ module structure_flight
 
 contains
 
-  !> The flow of the mode with these phases.
-  pure subroutine flow_of(moving, phase, flow)
+  !> The number of the flow that is ready for the mode with these phases, or 0 and the flow itself, made for it.
+  pure subroutine flow_of(moving, phase, at, spare)
     type(jointed_motion_t), intent(in) :: moving
     integer, intent(in) :: phase(:)
-    type(mode_flow_t), intent(out) :: flow
-    integer :: key, at
+    integer, intent(out) :: at
+    type(mode_flow_t), intent(out) :: spare
+    integer :: key
     key = key_of(moving%machine, phase)
     at = ready(moving, key)
-    if (at > 0) flow = moving%flows(at)
-    if (at == 0) call build_flow(moving%machine, key, with_matrix(moving), flow)
+    if (at == 0) call build_flow(moving%machine, key, with_matrix(moving), spare)
   end subroutine flow_of
 
   !> From `state`, whose coordinates are `y0`, to `t1` [s]: `y1`, and its derivative by `y0`. `sizes` are those of the coordinates.
@@ -63,14 +63,30 @@ contains
     type(jointed_state_t), intent(in) :: state
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
-    type(mode_flow_t) :: flow
-    call flow_of(frame%moving, state%phase, flow)
+    type(mode_flow_t) :: spare
+    integer :: at
+    call flow_of(frame%moving, state%phase, at, spare)
+    if (at > 0) then
+      call fly_flow(frame, frame%moving%flows(at), sizes, state, y0, t1, y1, flight)
+    else
+      call fly_flow(frame, spare, sizes, state, y0, t1, y1, flight)
+    end if
+  end subroutine fly_mode
+
+  !> The same, by its flow.
+  pure subroutine fly_flow(frame, flow, sizes, state, y0, t1, y1, flight)
+    type(frame_t), intent(in) :: frame
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: sizes(:), y0(:), t1
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(out) :: y1(:)
+    real(wp), intent(out), optional :: flight(:, :)
     if (frame%moving%options%flight == flight_adaptive .or. is_marched(frame%moving%machine, state%phase)) then
       call march(frame, flow, sizes, state, y0, t1, y1, flight)
     else
       call fly_closed(frame, flow, state, y0, t1, y1, flight)
     end if
-  end subroutine fly_mode
+  end subroutine fly_flow
 
   !> In closed form: the difference of two motions is a motion that nothing drives.
   pure subroutine fly_closed(frame, flow, state, y0, t1, y1, flight)

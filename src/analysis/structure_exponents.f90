@@ -1,0 +1,233 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Lyapunov spectrum of a motion of a structure, by orthogonal directions carried from section to section (Benettin et al. 1980).
+module structure_exponents
+  use elementary, only: logarithm
+  use exponents, only: batches, error_of, lyapunov_exponents, period_of_section, spectrum_t
+  use hybrid_machine, only: event_t
+  use jointed, only: joint_contact, joint_soft
+  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use jointed_section, only: start_of_jointed
+  use kinds, only: int64, wp
+  use motion, only: start_state
+  use motion_state, only: event_impact_lower, event_impact_upper, event_turning_point, state_t, tally_t
+  use one_body, only: one_body_t
+  use structure, only: coordinates_of, mode_number, state_in, structure_t
+  use structure_family, only: advance_section, least_dimension, vary_section
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: exponents_of_structure, exponents_of_machine
+
+  !> Section points within this share of the natural size are one; they come back within this share of their range.
+  real(wp), parameter :: fixed = 1e-9_wp, same = 1e-7_wp
+
+contains
+
+  !> Exponents of the motion of a machine, of whatever kind, that starts as `start` says (see `start_strobe`): those of module
+  !> `exponents` for one body.
+  subroutine exponents_of_machine(machines, start, transient, sections, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: start(:)
+    integer, intent(in) :: transient, sections
+    type(spectrum_t), intent(out) :: spectrum
+    real(wp), intent(out) :: series(:)
+    type(state_t) :: state
+    type(jointed_state_t) :: jointed
+    select type (machine => machines%centre)
+    type is (one_body_t)
+      state = start_state(machine%moving, start(1), start(2), start(3))
+      call lyapunov_exponents(machines, state, transient, sections, spectrum, series)
+    type is (structure_t)
+      jointed = start_of_jointed(machine%frame%moving, start(1), start(2), start(3), start(4:))
+      call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
+    end select
+  end subroutine exponents_of_machine
+
+  !> Exponents of the motion that starts at `state`, after `transient` sections, over `sections` (at least 32). `series` has the
+  !> watched position on the section. Without a clock they are those across the motion: the trivial 0 is left out.
+  subroutine exponents_of_structure(machines, structure, state, transient, sections, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    type(structure_t), intent(in) :: structure
+    type(jointed_state_t), intent(inout) :: state
+    integer, intent(in) :: transient, sections
+    type(spectrum_t), intent(out) :: spectrum
+    real(wp), intent(out) :: series(:)
+    real(wp) :: frame(structure%n, structure%n), by_start(structure%n, structure%n), batch(batches, structure%n)
+    real(wp) :: point(structure%n), growth(structure%n), duration, lasted
+    type(event_t), allocatable :: events(:)
+    type(tally_t) :: tally
+    integer :: i, k, n, part, mode, count_events, left
+    logical :: smooth
+    n = structure%n
+    series = 0
+    batch = 0
+    duration = 0
+    left = n
+    frame = 0
+    do k = 1, n
+      frame(k, k) = 1
+    end do
+    spectrum%has_sum = has_exact_sum(structure)
+    allocate (spectrum%exponents(n), spectrum%errors(n), source=0.0_wp)
+    allocate (events(8))
+    ! To the first section.
+    lasted = 0
+    count_events = 0
+    call advance_section(structure, state, lasted, events, count_events, tally, spectrum%known, smooth)
+    if (.not. spectrum%known) return
+    do i = 1 - transient, sections
+      point = coordinates_of(structure, state)
+      mode = mode_number(structure%frame%moving%machine, state%phase)
+      count_events = 0
+      lasted = 0
+      smooth = .true.
+      call advance_section(structure, state, lasted, events, count_events, tally, spectrum%known, smooth)
+      spectrum%known = spectrum%known .and. smooth
+      if (spectrum%known) call vary_section(machines, structure, mode, point, events(:count_events), 1, &
+                                            coordinates_of(structure, state), by_start, spectrum%known)
+      if (.not. spectrum%known) return
+      do k = 1, n
+        by_start(:, k) = by_start(:, k)*structure%size_of(k)/structure%size_of
+      end do
+      frame = matmul(by_start, frame)
+      call orthogonalise(frame, growth)
+      if (i < 1) cycle
+      left = min(left, least_dimension(structure, mode, events(:count_events)))
+      duration = duration + lasted
+      part = 1 + int((int(i - 1, int64)*batches)/sections)
+      where (growth > 0) batch(part, :) = batch(part, :) + log_of(growth)
+      call note_events(structure, events(:count_events), spectrum)
+      if (i > size(series)) cycle
+      ! What may be anywhere is watched by what does not run away.
+      series(i) = state%q(structure%frame%moving%machine%watched)
+      point = coordinates_of(structure, state)
+      if (structure%places < structure%frame%moving%machine%n) series(i) = point(1)
+    end do
+    ! Of a fixed point only the rounding moves.
+    if (maxval(series) - minval(series) <= fixed*structure%size_of(1)) series = series(1)
+    spectrum%returns = period_of_section(series, same) > 0
+    batch = batch*batches/duration
+    do k = 1, n
+      spectrum%exponents(k) = sum(batch(:, k))/batches
+      spectrum%errors(k) = error_of(batch(:, k))
+      if (k > left) spectrum%exponents(k) = -huge(1.0_wp)
+    end do
+    if (.not. structure%has_clock) then
+      spectrum%exponents = spectrum%exponents(:n - 1)
+      spectrum%errors = spectrum%errors(:n - 1)
+    end if
+    spectrum%halves = 2*[sum(batch(:batches/2, 1)), sum(batch(batches/2 + 1:, 1))]/batches
+    spectrum%sum_found = sum(batch)/batches
+    spectrum%sum_exact = spectrum%sum_exact/duration - damping_rate(structure)
+    spectrum%has_sum = spectrum%has_sum .and. left == n
+    spectrum%periods = sections
+    spectrum%mean_period = duration/sections
+  end subroutine exponents_of_structure
+
+  !> Orthonormal columns that span what the first columns of `frame` do, and how long they were.
+  pure subroutine orthogonalise(frame, growth)
+    real(wp), intent(inout) :: frame(:, :)
+    real(wp), intent(out) :: growth(:)
+    real(wp) :: rest
+    integer :: k, i, pass, unit
+    do k = 1, size(growth)
+      growth(k) = 0
+      unit = 0
+      do
+        rest = norm2(frame(:, k))
+        do pass = 1, 2
+          do i = 1, k - 1
+            frame(:, k) = frame(:, k) - frame(:, i)*sum(frame(:, i)*frame(:, k))
+          end do
+        end do
+        if (unit == 0) growth(k) = norm2(frame(:, k))
+        if (norm2(frame(:, k)) > 1e-12_wp*rest) exit
+        ! A direction that is lost: any other goes on in its place.
+        unit = unit + 1
+        frame(:, k) = 0
+        frame(min(unit, size(growth)), k) = 1
+        if (unit > size(growth)) exit
+      end do
+      frame(:, k) = frame(:, k)/norm2(frame(:, k))
+    end do
+  end subroutine orthogonalise
+
+  pure elemental real(wp) function log_of(x)
+    real(wp), intent(in) :: x
+    log_of = 0
+    if (x > 0) log_of = logarithm(x)
+  end function log_of
+
+  !> Whether volumes change by a formula: linear damping, constant restitutions, friction that does not depend on the speed; no
+  !> contact that is a spring.
+  pure logical function has_exact_sum(structure)
+    type(structure_t), intent(in) :: structure
+    associate (machine => structure%frame%moving%machine)
+      has_exact_sum = machine%linear .and. structure%has_clock .and. structure%places == machine%n .and. &
+                      .not. any(machine%joints%kind == joint_soft) .and. size(structure%frame%elastic) == 0
+      if (size(machine%joints) > 0) has_exact_sum = has_exact_sum .and. &
+        .not. any(machine%joints%kind == joint_contact .and. machine%joints%contact%kind /= 0)
+    end associate
+  end function has_exact_sum
+
+  !> Trace of the damping over the masses [1/s].
+  pure real(wp) function damping_rate(structure)
+    type(structure_t), intent(in) :: structure
+    integer :: i
+    damping_rate = 0
+    associate (machine => structure%frame%moving%machine)
+      do i = 1, machine%n
+        damping_rate = damping_rate + sum(machine%mobility(i, :)*machine%damping(:, i))
+      end do
+    end associate
+  end function damping_rate
+
+  !> Adds the logarithms by which the events of a section change volumes; what is neither an impact nor a turning point has no
+  !> formula.
+  subroutine note_events(structure, events, spectrum)
+    type(structure_t), intent(in) :: structure
+    type(event_t), intent(in) :: events(:)
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp) :: e
+    integer :: k
+    do k = 1, size(events)
+      associate (event => events(k))
+        select case (event%kind)
+        case (event_impact_upper, event_impact_lower)
+          spectrum%impacts = spectrum%impacts + 1
+          e = structure%frame%moving%machine%joints(event%joint)%contact%restitution
+          if (e > 0) spectrum%sum_exact = spectrum%sum_exact + 2*logarithm(e)
+          if (.not. e > 0) spectrum%has_sum = .false.
+          spectrum%has_sum = spectrum%has_sum .and. event%before == event%after
+        case (event_turning_point)
+          spectrum%sum_exact = spectrum%sum_exact &
+            + logarithm(abs(slide_rate(structure, event, event%after, event%departure)/ &
+                            slide_rate(structure, event, event%before, event%arrival)))
+        case default
+          spectrum%has_sum = .false.
+        end select
+      end associate
+    end do
+  end subroutine note_events
+
+  !> Acceleration of the joint of an event in a mode [m/s^2].
+  pure real(wp) function slide_rate(structure, event, mode, y)
+    type(structure_t), intent(in) :: structure
+    type(event_t), intent(in) :: event
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: y(:)
+    type(jointed_state_t) :: state
+    real(wp) :: slope(structure%n), s, u, given
+    associate (machine => structure%frame%moving%machine, p => structure%places)
+      state = state_in(structure, mode, event%time, y(:structure%n))
+      slope = structure%slope(mode, event%time, y(:structure%n))
+      call joint_motion(machine, event%joint, state%q, state%v, event%time, &
+                        turning_at(machine%frequency, event%time, structure%frame%moving%harmonics), s, u, given)
+      slide_rate = sum(machine%joints(event%joint)%row*slope(p + 1:p + machine%n)) + given
+    end associate
+  end function slide_rate
+
+end module structure_exponents

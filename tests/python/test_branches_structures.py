@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`branches` and `stability` of structures and of machines without a clock, against closed forms."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import run, succeed
+from separatrix.open import decode_flags, open_result
+
+
+@pytest.fixture
+def follow(separatrix: Path, source_dir: Path, tmp_path: Path):
+    """Follows the orbits of an example over a parameter; returns the labelled points and the file."""
+
+    def follow_it(case: str, name: str, start: float, end: float, *more: str) -> tuple[list[dict], Path]:
+        out = tmp_path / "out.h5"
+        words = ("--parameter", name, "--from", start, "--to", end, "--json", "-o", out, *more)
+        said = succeed(separatrix, "branches", source_dir / "examples" / case, *words, folder=tmp_path).out
+        lines = map(json.loads, said.splitlines())
+        return [line for line in lines if line["event"] == "point"], out
+
+    return follow_it
+
+
+def amplitude(frequency: float) -> float:
+    """Largest place of the second of two masses without the stop."""
+    coupled = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    system = coupled - frequency**2 * np.eye(2) + 0.04j * frequency * coupled
+    return abs(np.linalg.solve(system, [1, 0])[1])
+
+
+def test_two_masses_with_a_stop(follow):
+    """Fold and Neimark-Sacker point with one impact a period in closed form; the graze by its amplitude."""
+    points, out = follow("structure_two_masses.toml", "drive.force.frequency", 0.9, 1.2, "--searches", "4")
+    found = {point["label"]: point for point in points}
+    assert found["NS"]["parameter"] == pytest.approx(0.909658534285, abs=1e-11)
+    assert found["SN"]["parameter"] == pytest.approx(1.144117503720, abs=1e-11)
+    assert amplitude(found["GR-fold"]["parameter"]) == pytest.approx(1, abs=1e-10)
+    assert found["SN"]["multipliers"][:2] == pytest.approx([1, 0], abs=1e-8)
+    assert np.hypot(*found["NS"]["multipliers"][:2]) == pytest.approx(1, abs=1e-8)
+    with open_result(out) as result:
+        assert result.sizes["multiplier"] == 4
+        multipliers = result["multiplier_real"].values + 1j * result["multiplier_imag"].values
+        # next to a graze one multiplier is beyond what rounding leaves of the others
+        plain = (decode_flags(result["label"]).values == "none") & (abs(multipliers[:, 0]) < 100)
+        # what damping and an impact change of volumes
+        drive, hits = result["parameter"].values[plain], result["impacts"].values[plain]
+        expected = np.exp(-0.12 * 2 * np.pi / drive) * 0.64**hits
+        assert np.prod(multipliers[plain], axis=1).real == pytest.approx(expected, rel=1e-6)
+
+
+def test_two_blocks_on_a_belt(follow):
+    """A limit cycle whose time is an unknown, one multiplier less, and the doublings of another."""
+    points, out = follow(
+        "structure_blocks_on_a_belt.toml", "friction.first.velocity", 0.19, 0.25, "--searches", "2"
+    )
+    with open_result(out) as result:
+        assert result.sizes["multiplier"] == 3
+        branch = result["branch"].values == result["branch"].values[np.argmin(result["cycle_time"].values)]
+        cycle = np.interp(0.2, result["parameter"].values[branch], result["cycle_time"].values[branch])
+        assert cycle == pytest.approx(3.8037379614, abs=1e-4)
+    doubled = [point for point in points if point["label"] == "PD" and point["multipliers"][0] < 0]
+    assert len(doubled) == 1
+    assert doubled[0]["multipliers"][0] == pytest.approx(-1, abs=1e-8)
+
+
+def test_stick_slip_ends_where_the_slide_just_comes_back(follow):
+    """The slide in closed form: its fastest moment has the velocity of the belt."""
+    case = "validation/structures/belt_coulomb.toml"
+    points, _ = follow(case, "friction.belt.velocity", 0.6, 1, "--searches", "2")
+    end = [point for point in points if point["label"] == "stick_onset"]
+    assert len(end) == 1
+    belt, decay = end[0]["parameter"], 0.025
+    turning = np.sqrt(1 - decay**2)
+    time = np.linspace(3, 9, 600_001)
+    cosine = 1.5 - 0.05 * belt - 1
+    sine = (belt + decay * cosine) / turning
+    amplitude, rate = cosine - 1j * sine, -decay + 1j * turning
+    fastest = np.max((amplitude * rate * np.exp(rate * time)).real)
+    assert fastest == pytest.approx(belt, abs=1e-9)
+
+
+def test_spectrum_of_an_impact_damper(separatrix: Path, source_dir: Path, tmp_path: Path):
+    """Four exponents, whose sum is exact; those of a cycle come in pairs."""
+    case = source_dir / "examples" / "structure_impact_damper.toml"
+    said = succeed(separatrix, "stability", case, "--periods", 1000, "--json", folder=tmp_path).out
+    lines = [json.loads(line) for line in said.splitlines()]
+    values = [line["value"] for line in lines if line["event"] == "exponent"]
+    total = next(line for line in lines if line["event"] == "sum")
+    assert len(values) == 4
+    assert total["found"] == pytest.approx(total["exact"], abs=1e-9)
+    # moduli of the half-map 0.8678247 and 0.7878421, each of a pair (Masri and Caughey 1966)
+    assert sum(values[:2]) == pytest.approx(2 * np.log(0.8678247) / np.pi, abs=1e-3)
+    assert sum(values[2:]) == pytest.approx(2 * np.log(0.7878421) / np.pi, abs=1e-3)
+    assert next(line for line in lines if line["event"] == "motion")["type"] == "periodic"
+
+
+def test_what_is_not_known_of_structures(separatrix: Path, source_dir: Path, tmp_path: Path):
+    """Two parameters at once are for one body; a contact whose damping each impact sets has no variation."""
+    case = source_dir / "examples" / "structure_two_masses.toml"
+    words = ("--parameter", "drive.force.frequency", "--from", 0.9, "--to", 1.2)
+    free = ("--free", "contact.stop.restitution", "--free-from", 0.5, "--free-to", 0.9)
+    ended = run(separatrix, "branches", case, *words, *free, folder=tmp_path)
+    assert (
+        ended.code == 65
+        and "--free: labels are followed over two parameters for machines of one body" in ended.err
+    )
+    assert not list(tmp_path.glob("*.h5"))
