@@ -10,7 +10,7 @@ from validation_rows import CASES, Program, Row
 
 
 def resonant_grazes(program: Program) -> list[Row]:
-    """Where the folds of the impact oscillator end on its grazes, over amplitude and frequency of the drive."""
+    """Where the folds of the impact oscillator end on its grazes, over two parameters of the drive."""
     return [
         _fold_on_graze(program, "coco.resonant.2", (0.08, 0.12), 1.0, (0.95, 1.05)),
         _fold_on_graze(program, "coco.resonant.1", (1.0, 4.0), 1.95, (1.9, 2.1)),
