@@ -14,6 +14,7 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
+import validation_curves
 import validation_measures
 import validation_rows as rows
 import validation_structures
@@ -90,7 +91,7 @@ def main() -> int:
     os.environ["SEPARATRIX_LIBRARY"] = str(build / "lib" / "libseparatrix.so")
     program = Program(build, folder)
     found = []
-    for compute in rows.COMPUTED:
+    for compute in (*rows.COMPUTED, *validation_curves.COMPUTED):
         print(f"validation: {compute.__name__}", flush=True)
         found += compute(program)
     print("validation: structures", flush=True)

@@ -86,6 +86,7 @@ FOLLOWED = (
     *("coco.curve.0.95", "coco.doubling.0.95", "coco.curve.1.05", "coco.fold.1.05"),
     *("coco.curve.1.9", "coco.fold.1.9", "hartog.low", "hartog.high", "hartog.plain_low"),
     *("hartog.plain_high", "hartog.undamped_low", "hartog.undamped_high", "soft.graze"),
+    *("coco.resonant.1", "coco.resonant.2"),
 )
 THEIRS = {
     name: row
