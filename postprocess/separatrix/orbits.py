@@ -72,7 +72,7 @@ def branches(
     Parameters
     ----------
     case
-        The machine, as a Case or the file of one; one body.
+        The machine, as a Case or the file of one; one body or a structure.
     parameter, start, stop
         The path of the parameter and its range; without one that of the sweep or the axis of the case.
     searches
@@ -129,7 +129,7 @@ def stability(
     Parameters
     ----------
     case
-        The machine, as a Case or the file of one; one body.
+        The machine, as a Case or the file of one; one body or a structure.
     x0, v0, crank_angle
         The start [m, m/s, rad]; what is not given is that of the case.
     periods

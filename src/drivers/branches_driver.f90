@@ -6,7 +6,8 @@ module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
   use build_jointed, only: is_jointed
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
-  use branch_point, only: branch_t, is_stable, label_bp, label_names, label_range, last_label, no_label, point_t
+  use branch_point, only: branch_t, is_stable, label_bp, label_crisis, label_homoclinic, label_names, label_range, last_label, &
+                          no_label, point_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
   use case_setup, only: options_of, output_path
@@ -227,7 +228,8 @@ contains
     real(wp) :: at(2)
     at = matmul(search%watch, point%orbit%y)
     associate (orbit => point%orbit)
-      shown = to_text(orbit%parameter, 13)
+      ! A contact is known to its bracket, which stands below it.
+      shown = to_text(orbit%parameter, merge(6, 13, any(point%label == [label_crisis, label_homoclinic])))
       if (unit /= '1') shown = shown//' '//unit
       call session%journal%line('point', '  '//replace_all(trim(label_names(point%label)), '_', ' ')//' at '//search%family%path// &
         ' = '//shown//', '//word_text(word_of(orbit, search))//multipliers_text(orbit, search%has_clock), &
