@@ -6,7 +6,7 @@ import subprocess
 
 from separatrix import open_result
 from separatrix.open import decode_flags
-from validation_rows import CASES, Program, Row
+from validation_program import CASES, Program, Row
 
 
 def resonant_grazes(program: Program) -> list[Row]:
