@@ -344,7 +344,9 @@ def start(source_dir, folder, pause: float) -> subprocess.Popen:
         "verdicts = lambda *_: {'STLSQ': 'none', 'ensemble SINDy': 'none'}\n"
     )
     program = source_dir / "scripts" / "campaign" / "campaign.py"
-    code = f"import sys, runpy; sys.path.insert(0, {str(folder / 'stand_in')!r}); import baselines; "
+    # the finder of an editable installation comes before the path
+    code = "import sys, runpy, importlib.machinery as m; sys.meta_path.insert(0, m.PathFinder); "
+    code += f"sys.path.insert(0, {str(folder / 'stand_in')!r}); import baselines; "
     code += (
         f"sys.path.insert(1, {str(program.parent)!r}); runpy.run_path({str(program)!r}, run_name='__main__')"
     )
@@ -379,6 +381,7 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
         assert start(source_dir, folder, 0.0).wait(timeout=300) == 0
         results[name] = (folder / "page.md").read_text()
         found = sorted((folder / "out" / f"seed_{SEED}" / "results").glob("*.json"))
+        assert all(json.loads(path.read_text())["verdict"]["effects"] == ["cubic_spring"] for path in found)
         assert [json.loads(path.read_text())["number"] for path in found] == list(range(CASES))
         assert (folder / "figures" / "discovery_confusion.png").is_file()
     # one sentence tells a measured time
