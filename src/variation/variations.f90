@@ -71,13 +71,13 @@ contains
     call machines%centre%fly(now, time, state, time, reached, change(:, :n))
     do i = 1, size(events) + 1
       if (i <= size(events)) then
-        call cross_flight(machines, now, state, time, min(events(i)%time, t_end), change, reached, present(by_parameter))
+        call cross_flight(machines, now, state, time, events(i)%time, change, reached, present(by_parameter))
         call salt(machines, events(i), change, present(by_parameter), forgets, ok)
         ! What is forgotten need not be followed.
         ok = ok .and. (forgets .or. all(abs(reached - events(i)%arrival(:n)) <= tolerance))
         if (.not. ok) return
         state = events(i)%departure(:n)
-        time = min(events(i)%time, t_end)
+        time = events(i)%time
         now = events(i)%after
       else
         call cross_flight(machines, now, state, time, t_end, change, reached, present(by_parameter))

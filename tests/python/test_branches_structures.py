@@ -52,6 +52,25 @@ def test_two_masses_with_a_stop(follow):
         assert np.prod(multipliers[plain], axis=1).real == pytest.approx(expected, rel=1e-6)
 
 
+def test_an_impact_may_pass_the_section(follow):
+    """The orbit of one impact a period is stable all along, also where the impact comes at the section's own phase."""
+    setting = {
+        "body.first.mass": 1.3, "body.second.mass": 0.7, "spring.frame.stiffness": 2.1, "spring.frame.damping": 0.11,
+        "spring.coupling.stiffness": 1.7, "spring.coupling.damping": 0.05,
+        "contact.stop.restitution": 0.72, "drive.force.amplitude": 1.375,
+    }  # fmt: skip
+    words = [word for name, value in setting.items() for word in ("--set", f"{name}={value}")]
+    name = "drive.force.frequency"
+    points, out = follow("structure_two_masses.toml", name, 0.85, 0.95, "--searches", "3", *words)
+    assert {point["label"] for point in points} == {"end_of_range"}
+    with open_result(out) as result:
+        x = result["x"].values[result["parameter"].argsort()]
+        assert (np.diff(np.sign(np.diff(x))) != 0).any()
+        assert result["stable"].values.all()
+        multipliers = result["multiplier_real"].values + 1j * result["multiplier_imag"].values
+        assert abs(multipliers).max() < 0.9
+
+
 def test_two_blocks_on_a_belt(follow):
     """A limit cycle whose time is an unknown, one multiplier less, and the doublings of another."""
     points, out = follow(
