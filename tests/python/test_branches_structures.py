@@ -53,9 +53,10 @@ def test_two_masses_with_a_stop(follow):
 
 
 def test_an_impact_may_pass_the_section(follow):
-    """The orbit of one impact a period is stable all along, also where the impact comes at the section's own phase."""
+    """The orbit of one impact a period is stable, also where the impact comes at the section's phase."""
     setting = {
-        "body.first.mass": 1.3, "body.second.mass": 0.7, "spring.frame.stiffness": 2.1, "spring.frame.damping": 0.11,
+        "body.first.mass": 1.3, "body.second.mass": 0.7,
+        "spring.frame.stiffness": 2.1, "spring.frame.damping": 0.11,
         "spring.coupling.stiffness": 1.7, "spring.coupling.damping": 0.05,
         "contact.stop.restitution": 0.72, "drive.force.amplitude": 1.375,
     }  # fmt: skip
