@@ -9,10 +9,8 @@ number of coordinates, which gives twelve digits.
 """
 
 import argparse
-import subprocess
 import sys
-from dataclasses import dataclass
-from math import cos, sin
+from math import sin
 from pathlib import Path
 
 import h5py
@@ -21,81 +19,13 @@ from markdown import table
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from validation_structures_program import SOURCE, Number, Program, text
+from validation_structures_steps import simulated
 
-SOURCE = Path(__file__).resolve().parents[1]
-CASES = SOURCE / "examples" / "validation" / "structures"
 sys.path.insert(0, str(SOURCE / "tests" / "referee"))
-from structures import Friction, Rigid, Structure  # noqa: E402
+from structures import Friction, Structure  # noqa: E402
 
 CLOSED = "closed form"
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number of theirs beside ours; `bar` is half a unit of their last digit, or 1e-9."""
-
-    source: str
-    what: str
-    theirs: float
-    ours: float
-    bar: float
-
-    @property
-    def verdict(self) -> str:
-        """Whether the difference is within the bar."""
-        return "agrees" if abs(self.ours - self.theirs) <= self.bar else "DIFFERS"
-
-
-def text(value: str | bytes) -> str:
-    """An attribute as text."""
-    return value.decode() if isinstance(value, bytes) else value
-
-
-class Program:
-    """Runs of the program; files go to a folder."""
-
-    def __init__(self, build: Path, folder: Path) -> None:
-        self.path, self.folder = build / "bin" / "separatrix", folder
-        folder.mkdir(parents=True, exist_ok=True)
-
-    def run(self, command: str, case: Path | str, **settings: str | float) -> Path:
-        """Run a command on a case; return its file. Settings have `__` for dots."""
-        case = case if isinstance(case, Path) else CASES / f"{case}.toml"
-        output = self.folder / f"{case.stem}_{command}.h5"
-        changes = [
-            word for key, value in settings.items() for word in ("--set", f"{key.replace('__', '.')}={value}")
-        ]
-        subprocess.run([self.path, command, case, "-q", "--force", "-o", output, *changes], check=True)
-        return output
-
-    def events(self, case: Path | str, kind: str, joint: str, **settings: str | float) -> np.ndarray:
-        """Time, coordinate, rate before and after of the events of a kind at a joint, a row each."""
-        with h5py.File(self.run("trajectory", case, **settings)) as file:
-            kinds = text(file["event_kind"].attrs["flag_meanings"]).split()
-            joints = text(file["event_joint"].attrs["flag_meanings"]).split()
-            wanted = (file["event_kind"][:] == file["event_kind"].attrs["flag_values"][kinds.index(kind)]) & (
-                file["event_joint"][:] == joints.index(joint) + 1
-            )
-            names = ("event_time", "event_joint_x", "event_joint_v_before", "event_joint_v_after")
-            return np.column_stack([file[name][:][wanted] for name in names])
-
-    def labels(self, case: str, name: str, low: float, high: float) -> dict[str, float]:
-        """Values of a parameter at the labels of the branches over it, the last of each name."""
-        output = self.folder / f"{case}_branches.h5"
-        words = ["--parameter", name, "--from", str(low), "--to", str(high), "-q", "--force", "-o", output]
-        subprocess.run([self.path, "branches", CASES / f"{case}.toml", *words], check=True)
-        with h5py.File(output) as file:
-            names = text(file["label"].attrs["flag_meanings"]).split()
-            return dict(zip((names[k] for k in file["label"][:]), file["parameter"][:], strict=True))
-
-    def multipliers(self, case: str, **settings: str | float) -> np.ndarray:
-        """Multipliers of the impacting cycle in the catalogue of a map, the largest first."""
-        with h5py.File(self.run("basin", case, **settings)) as file:
-            entry = int(np.argmax(file["catalogue/impacts_per_period"][:]))
-            found = (
-                file["catalogue/multiplier_real"][entry] + 1j * file["catalogue/multiplier_imaginary"][entry]
-            )
-        return np.sort_complex(found[np.isfinite(found)])
 
 
 def crossing(function, places: list[float], level: float) -> float:
@@ -449,83 +379,6 @@ def belt_by_steps(file: h5py.File, rests: np.ndarray) -> list[Number]:
     )
     what = f"the same: labels of {len(starts)} starts that differ"
     return [*found, Number(source, what, 0, other, 0)]
-
-
-def pulled(q, first: float, coupling: float, second: float = 0.0) -> np.ndarray:
-    """Springs of two masses: ground to first, first to second, ground to second."""
-    pull = coupling * (q[1] - q[0])
-    return np.array([-first * q[0] + pull, -second * q[1] - pull])
-
-
-def two_masses_by_steps() -> Structure:
-    """The equations of two_masses.toml."""
-    return Structure(
-        [1, 1],
-        lambda t, q, v: pulled(q, 1, 1) + 0.04 * pulled(v, 1, 1) + [cos(0.6 * t), 0],
-        rigid=[Rigid([0, 1], 1, 1, lambda u: 0.8)],
-    )
-
-
-def damper_by_steps() -> Structure:
-    """The equations of impact_damper.toml."""
-    return Structure(
-        [1, 0.1],
-        lambda t, q, v: np.array([-q[0] - 0.1 * v[0] + sin(t), 0]),
-        rigid=[Rigid([-1, 1], 10, 1, lambda u: 0.8), Rigid([-1, 1], -10, -1, lambda u: 0.8)],
-    )
-
-
-def pounding_by_steps() -> Structure:
-    """The equations of pounding.toml."""
-    return Structure(
-        [1, 2],
-        lambda t, q, v: np.array(
-            [-q[0] - 0.1 * v[0] - cos(1.2 * t), -5.12 * q[1] - 0.32 * v[1] - 2 * cos(1.2 * t)]
-        ),
-        rigid=[Rigid([1, -1], 0.5, 1, lambda u: 0.65)],
-    )
-
-
-def blocks_by_steps(kinetic, static) -> Structure:
-    """The equations of blocks.toml and blocks_hyperbolic.toml; `kinetic` are functions of the speed."""
-    rows = ([1, 0], [0, 1])
-    return Structure(
-        [1, 1],
-        lambda t, q, v: pulled(q, 1, 1.2, 1),
-        [Friction(row, law, level, 0.2) for row, law, level in zip(rows, kinetic, static, strict=True)],
-    )
-
-
-SIMULATED = {
-    "two_masses": (two_masses_by_steps, ([0, 0], [0, 0]), 40.0),
-    "impact_damper": (damper_by_steps, ([1.126, 0], [0, 3]), 30.0),
-    "pounding": (pounding_by_steps, ([0, 0], [0, 0]), 25.0),
-    "blocks": (
-        lambda: blocks_by_steps((lambda u: 0.6, lambda u: 0.78), (1.0, 1.3)),
-        ([0.3, 0.1], [0, 0]),
-        15.0,
-    ),
-    "blocks_hyperbolic": (
-        lambda: blocks_by_steps((lambda u: 1 / (1 + 3 * u), lambda u: 1.3 / (1 + 3 * u)), (1.0, 1.3)),
-        ([0.3, 0.1], [0, 0]),
-        15.0,
-    ),
-}
-
-
-def simulated(program: Program) -> list[Number]:
-    """Times of all events from the start of a case, by scipy's steps and by the program."""
-    found = []
-    for case, (build, (q, v), until) in SIMULATED.items():
-        machine = build()
-        machine.run(q, v, until)
-        with h5py.File(program.run("trajectory", case, run__duration=until, run__window=until / 2)) as file:
-            ours = np.unique(file["event_time"][:])
-        theirs = np.array([at for _, _, at in machine.events])
-        miss = np.max(abs(ours - theirs)) if ours.shape == theirs.shape else np.inf
-        what = f"{case}: largest difference in time of {len(theirs)} events in {until:g} s"
-        found.append(Number("`tests/referee/structures.py`", what, 0.0, miss, 1e-9))
-    return found
 
 
 #: What has no number beside it yet, and why.

@@ -10,6 +10,7 @@ module orbit_margins
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point
   use one_body, only: direction_in, one_body_t, rests_on_barrier, slips_in, turns_smoothly
   use periodic_orbit, only: orbit_t
+  use secant_bracket, only: bracket_t, narrow, next_trial
   implicit none
   private
 
@@ -219,34 +220,19 @@ contains
     integer, intent(in) :: mode, row
     real(wp), intent(in) :: start(states), low, high
     real(wp), intent(out) :: t, y(states)
-    real(wp) :: a, b, f_a, f_b, f, slope(states)
-    integer :: i, side
-    a = low
-    b = high
-    slope = machine%slope(mode, a, start)
-    f_a = slope(row)
-    call machine%fly(mode, low, start, b, y)
-    slope = machine%slope(mode, b, y)
-    f_b = slope(row)
-    side = 0
+    type(bracket_t) :: bracket
+    real(wp) :: first(states), last(states), slope(states)
+    integer :: i
+    first = machine%slope(mode, low, start)
+    call machine%fly(mode, low, start, high, y)
+    last = machine%slope(mode, high, y)
+    bracket = bracket_t(low, high, first(row), last(row))
     do i = 1, most_secants
-      t = b - f_b*((b - a)/(f_b - f_a))
-      if (.not. (t > a .and. t < b)) t = a + (b - a)/2
+      t = next_trial(bracket)
       call machine%fly(mode, low, start, t, y)
       slope = machine%slope(mode, t, y)
-      f = slope(row)
-      if (f*f_b > 0) then
-        b = t
-        f_b = f
-        if (side < 0) f_a = f_a/2
-        side = -1
-      else
-        a = t
-        f_a = f
-        if (side > 0) f_b = f_b/2
-        side = 1
-      end if
-      if (.not. abs(f) > 0 .or. b - a <= 2*spacing(b)) exit
+      call narrow(bracket, t, slope(row))
+      if (.not. abs(slope(row)) > 0 .or. bracket%high - bracket%low <= 2*spacing(bracket%high)) exit
     end do
   end subroutine find_zero
 

@@ -14,6 +14,7 @@ module structure_margins
   use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_press, of_release, of_slip, of_stick, &
     of_turning
   use periodic_orbit, only: closing_time, orbit_t
+  use secant_bracket, only: bracket_t, narrow, next_trial
   use structure, only: mode_number, phases_in, state_in, structure_t
   use structure_flight, only: flow_of
   implicit none
@@ -201,30 +202,16 @@ contains
     type(event_t), intent(in) :: probe
     real(wp), intent(in) :: start(:), low, high, rate_low, rate_high
     real(wp), intent(out) :: t, value
-    real(wp) :: a, b, f_a, f_b, f, y(machine%n)
-    integer :: i, side
-    a = low
-    b = high
-    f_a = rate_low
-    f_b = rate_high
-    side = 0
+    type(bracket_t) :: bracket
+    real(wp) :: rate, y(machine%n)
+    integer :: i
+    bracket = bracket_t(low, high, rate_low, rate_high)
     do i = 1, most_secants
-      t = b - f_b*((b - a)/(f_b - f_a))
-      if (.not. (t > a .and. t < b)) t = a + (b - a)/2
+      t = next_trial(bracket)
       call machine%fly(probe%before, low, start, t, y)
-      call value_and_rate(machine, probe, t, y, value, f)
-      if (f*f_b > 0) then
-        b = t
-        f_b = f
-        if (side < 0) f_a = f_a/2
-        side = -1
-      else
-        a = t
-        f_a = f
-        if (side > 0) f_b = f_b/2
-        side = 1
-      end if
-      if (.not. abs(f) > 0 .or. b - a <= 4*spacing(b)) exit
+      call value_and_rate(machine, probe, t, y, value, rate)
+      call narrow(bracket, t, rate)
+      if (.not. abs(rate) > 0 .or. bracket%high - bracket%low <= 4*spacing(bracket%high)) exit
     end do
   end subroutine find_least
 

@@ -17,12 +17,15 @@ module body_family
   implicit none
   private
 
-  public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, size_of_motion, vary_period
+  public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, place_neighbour, size_of_motion, vary_period
 
   !> Distance of the neighbours, as a share of the parameter's size, and at least.
-  real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp), smallest_share = 1e-9_wp
+  real(wp), parameter, public :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
+  real(wp), parameter :: smallest_share = 1e-9_wp
   !> The flights lead from event to event to this share of the size of the motion, or the variation is not known.
-  real(wp), parameter :: likeness = 1e-6_wp
+  real(wp), parameter, public :: likeness = 1e-6_wp
+  !> Neighbours on both sides; where there is no such machine, above or below.
+  integer, parameter, public :: sides_tried(3) = [0, 1, -1]
 
   !> A machine whose parameter `path` of the laws may be changed; no path: it has none.
   type, public :: family_t
@@ -80,24 +83,19 @@ contains
     type(neighbourhood_t), intent(out) :: machines
     type(error_t), allocatable, intent(out) :: error
     type(one_body_t) :: centre, near(4)
-    integer :: i, side, sides(3)
+    real(wp) :: there
+    integer :: i, side
     call body_of_family(family, value, centre, error)
     if (allocated(error)) return
     allocate (machines%centre, source=centre)
     if (.not. allocated(family%path)) return
     machines%step = share_for(centre)*max(abs(value), family%parameter_size)
-    sides = [0, 1, -1]
     do side = 1, 3
-      machines%side = sides(side)
+      machines%side = sides_tried(side)
       if (allocated(error)) deallocate (error)
       do i = 1, 4
-        associate (there => value + stencil_offset(machines%side, i)*machines%step)
-          if (there < family%lowest .or. there > family%highest) then
-            call fail(error, exit_bad_case, 'parameter out of its range')
-          else
-            call body_of_family(family, there, near(i), error)
-          end if
-        end associate
+        call place_neighbour(family, value, machines, i, there, error)
+        if (.not. allocated(error)) call body_of_family(family, there, near(i), error)
         if (allocated(error)) exit
         ! The same difference steps in all.
         near(i)%size_of = centre%size_of
@@ -108,6 +106,18 @@ contains
     if (allocated(error)) return
     allocate (machines%near, source=near)
   end subroutine body_neighbourhood
+
+  !> Where the neighbour `i` of the machine at `value` is; code 65 if that is out of the parameter's range.
+  pure subroutine place_neighbour(family, value, machines, i, there, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: i
+    real(wp), intent(out) :: there
+    type(error_t), allocatable, intent(out) :: error
+    there = value + stencil_offset(machines%side, i)*machines%step
+    if (there < family%lowest .or. there > family%highest) call fail(error, exit_bad_case, 'parameter out of its range')
+  end subroutine place_neighbour
 
   !> Distance of the neighbours of a machine, as a share of the parameter's size: events of theirs must stay within a thin
   !> Stribeck layer.

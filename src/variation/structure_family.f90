@@ -4,7 +4,7 @@
 !> A structure over a parameter of its laws, and the map from one section to the next with derivatives by the start and by the
 !> parameter. Of a machine without a clock the section is an event, and the time to it changes with both.
 module structure_family
-  use body_family, only: family_t
+  use body_family, only: family_t, likeness, place_neighbour, share, sides_tried
   use build_motion, only: machine_of
   use errors, only: error_t, fail
   use guards, only: leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
@@ -21,17 +21,13 @@ module structure_family
   use status, only: exit_bad_case
   use structure, only: coordinates_of, count_joints, mode_number, phases_in, settle, state_in, structure_of, structure_t
   use transition_list, only: transition_t, transitions_t
-  use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
+  use variations, only: neighbourhood_t, period_slope, vary
   implicit none
   private
 
   public :: structure_of_family, structure_neighbourhood, fly_structure, map_of_structure, why_not_varied, vary_section, &
     start_of_structure, advance_section, least_dimension
 
-  !> Distance of the neighbours, as a share of the parameter's size.
-  real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
-  !> The flights lead from event to event to this share of the size of the motion, or the variation is not known.
-  real(wp), parameter :: likeness = 1e-6_wp
   !> A section point as near as this, in natural sizes, to what a joint holds is held.
   real(wp), parameter :: held_within = 1e-10_wp
   !> Longest return to an event section, in periods of the slowest mode.
@@ -107,24 +103,19 @@ contains
     type(neighbourhood_t), intent(out) :: machines
     type(error_t), allocatable, intent(out) :: error
     type(structure_t) :: centre, near(4)
-    integer :: i, side, sides(3)
+    real(wp) :: there
+    integer :: i, side
     call structure_of_family(family, value, centre, error)
     if (allocated(error)) return
     allocate (machines%centre, source=centre)
     if (.not. allocated(family%path)) return
     machines%step = share*max(abs(value), family%parameter_size)
-    sides = [0, 1, -1]
     do side = 1, 3
-      machines%side = sides(side)
+      machines%side = sides_tried(side)
       if (allocated(error)) deallocate (error)
       do i = 1, 4
-        associate (there => value + stencil_offset(machines%side, i)*machines%step)
-          if (there < family%lowest .or. there > family%highest) then
-            call fail(error, exit_bad_case, 'parameter out of its range')
-          else
-            call structure_of_family(family, there, near(i), error)
-          end if
-        end associate
+        call place_neighbour(family, value, machines, i, there, error)
+        if (.not. allocated(error)) call structure_of_family(family, there, near(i), error)
         if (allocated(error)) exit
         near(i)%size_of = centre%size_of
       end do

@@ -142,14 +142,14 @@ def _pairs(
     directions = random.standard_normal(points.shape)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     pairs = _Pairs(points, label_all(labels, points), directions, np.zeros(len(points), int))
-    todo = np.flatnonzero(pairs.here > 0)
+    same_so_far = np.flatnonzero(pairs.here > 0)
     # From the smallest size up: the first that differs decides.
     for level in range(sizes.size - 1, first - 1, -1):
-        if not len(todo):
+        if not len(same_so_far):
             break
-        differs = _differ(labels, pairs.take(todo), sizes[level])
-        pairs.depth[todo[differs]] = level + 1
-        todo = todo[~differs]
+        differs = _differ(labels, pairs.take(same_so_far), sizes[level])
+        pairs.depth[same_so_far[differs]] = level + 1
+        same_so_far = same_so_far[~differs]
     return pairs
 
 
