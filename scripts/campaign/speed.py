@@ -61,7 +61,7 @@ def main() -> int:
     parser.add_argument("--before", type=Path, help="such a file of another version, to compare with")
     options = parser.parse_args()
     first, colon, end = options.cases.partition(":")
-    numbers = range(int(first), int(end)) if colon else [int(one) for one in options.cases.split(",")]
+    numbers = range(int(first), int(end)) if colon else [int(one) for one in options.cases.split(",") if one]
     kept = _read(options.keep)
     before = _read(options.before)
     for number in numbers:
