@@ -92,7 +92,7 @@ def test_a_spring_that_small_swings_suggest_is_refuted_by_large_ones(records):
 
 
 def test_half_swings_alone_foretell_the_small_pendulum_no_better(records):
-    """Constant friction misses by more than the scatter explains; friction that may change is hardly known."""
+    """Constant friction misses by more than the scatter; friction that may change is hardly known."""
     figures = runpy.run_path(str(ROOT / "scripts" / "measured_figures"))
     swings = [figures["half_swings"](records, name) for name in ("pendulum_small", "pendulum_small_low")]
     own, held_out, error = figures["swings_alone"](*swings[0], *swings[1], 0)
