@@ -11,7 +11,7 @@ from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_r
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.refit import Fitted, refit
+from separatrix.discovery.fitting.refit import Fitted, hopeless, refit
 from separatrix.discovery.fitting.screen import screen, signature
 
 _PAIRS = 6
@@ -45,7 +45,10 @@ def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, 
 def _grown(bench: Bench, rounds: list[Round], found: Judged) -> list[Judged]:
     """Sets of effects with one more than `found`; pairs of any two as well."""
     first = rounds[0]
-    rounds.append(run_round(bench, found.fitted, found.prediction, 0.8, 0.9))
+    limit = hopeless(first.base)
+    # what comes nowhere near the records alone, as a soft barrier where impacts are hard, is no second effect
+    lost = frozenset(one.name for one in first.judged if one.fitted.fit.far_off(limit))
+    rounds.append(run_round(bench, found.fitted, found.prediction, 0.8, 0.9, without=lost))
     sets = [over_base(bench, first.base, first.foretold, one) for one in rounds[-1].judged]
     if len(found.fitted.names) > 1:
         return sets

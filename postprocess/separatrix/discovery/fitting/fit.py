@@ -38,6 +38,7 @@ _FALLS = 10.0
 _HEARD = 3
 _LOST = 100.0
 _OVER = 5.0
+_SPARED = 3
 
 
 @dataclass
@@ -58,6 +59,8 @@ class Fit:
     caught: bool = False
     # whether steps of every length were tried from there and gained next to nothing
     exhausted: bool = False
+    # whether it was given up behind what it had to beat
+    given_up: bool = False
     # what condensed stretches leave over, and its degrees of freedom
     left_over: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -153,13 +156,14 @@ def minimise(
     tolerance = max(tolerance, _ROUGH) if rough else tolerance
     descent = _Descent(problem, values, starts, movable, robust, begun)
     iterations = stalled = 0
-    begun_anew = exhausted = False
+    begun_anew = exhausted = given_up = False
     most_stalls = _PATIENT_STALLS if patient else _STALLS
     while iterations < most:
         iterations += 1
         if not descent.look(tolerance, rough):
             break
-        if beat is not None and iterations > _HEARD and descent.behind(beat):
+        given_up = beat is not None and iterations > _HEARD and descent.behind(beat)
+        if given_up:
             break
         mild = descent.damping <= _MILD
         if not descent.step():
@@ -182,7 +186,7 @@ def minimise(
     if not rough:
         descent.renew()
     found = _finished(problem, descent.values, descent.starts, descent.current, movable, iterations)
-    return replace(found, exhausted=exhausted)
+    return replace(found, exhausted=exhausted, given_up=given_up)
 
 
 class _Descent:
@@ -277,9 +281,12 @@ class _Descent:
             self.current, self.kept = self.problem.evaluate(values, starts), None
 
     def behind(self, beat: float) -> bool:
-        """Whether the squares are above `beat` by far more than the next steps may gain."""
-        squares = _cost(self.current, self.inside, self.scale, robust=False)
-        return squares - beat > max(_LOST, _OVER * self.decrement)
+        """Whether the squares are above `beat` by far more than the next steps may gain.
+
+        A few segments may be caught in a wrong minimum and are left out.
+        """
+        squares = np.sort(_costs(self.current, self.scale, robust=False)[self.inside.any(axis=1)])
+        return bool(squares[:-_SPARED].sum() - beat > max(_LOST, _OVER * self.decrement))
 
     def hopeless(self, limit: float) -> bool:
         """Whether steps gain little far above the wanted chi^2."""
