@@ -33,7 +33,7 @@ module saddle_search
     real(wp), allocatable :: points(:, :)
     !> Of each of them the place [m] and the speed [m/s] of what is watched.
     real(wp), allocatable :: watched(:, :)
-    !> Over the period of the orbit, the largest modulus first, and the derivative of the map that they belong to, at the first point.
+    !> Over the period of the orbit, the largest modulus first, and the derivative of the map they belong to, at the first point.
     complex(wp), allocatable :: multipliers(:)
     real(wp), allocatable :: matrix(:, :)
     integer(int64) :: word = 0

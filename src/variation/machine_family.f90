@@ -68,8 +68,8 @@ contains
     end if
   end subroutine machine_neighbourhood
 
-  !> Flies a machine from a start as `start_strobe` has it to its first section: where it then is, and the events on the way. `ok` is
-  !> false for a start beyond a stop, and if the trajectory had to be given up.
+  !> Flies a machine from a start as `start_strobe` has it to its first section: where it then is, and the events on the way.
+  !> `ok` is false for a start beyond a stop, and if the trajectory had to be given up.
   pure subroutine fly_to_section(machine, start, point, events, ok)
     class(hybrid_t), intent(in) :: machine
     real(wp), intent(in) :: start(:)
