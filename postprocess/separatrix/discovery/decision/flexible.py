@@ -58,11 +58,13 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
     one, a table that cannot become adequate is given up, and one that was fitted on this base stands.
     """
     known = _begun(found, member.family)
-    for effect, begun, how, best in found.tables:
-        if (effect, how) == (member.effect, strict) and begun is known:
-            break
-    else:
-        best = _fit_table(bench, found, member, known, strict)
+    same = [
+        one
+        for effect, begun, how, one in found.tables
+        if (effect, how) == (member.effect, strict) and begun is known
+    ]
+    best = same[0] if same else _fit_table(bench, found, member, known, strict)
+    if not same:
         found.tables.append((member.effect, known, strict, best))
     if best is not None:
         yield found.judge(best.fitted, best.prediction)
