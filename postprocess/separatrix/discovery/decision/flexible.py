@@ -10,7 +10,6 @@ from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.members import MEMBERS, Member
 from separatrix.discovery.fitting.refit import WORSE, Fitted
-from separatrix.discovery.options import Options
 from separatrix.library import effects
 
 # share of the best evidence, or of what free forces explain, from which on a family is tried
@@ -54,8 +53,8 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
 def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) -> Iterator[Judged]:
     """The table of a family on as many knots as the evidence pays for; nothing where none converges.
 
-    What is no name need not converge where not `strict`: what it foretells is its proof. Where it is to be
-    one, a table that cannot become adequate is given up, and one that was fitted on this base stands.
+    What is no name need not converge where not `strict`: what it foretells is its proof. One that was fitted
+    on this base stands.
     """
     known = _begun(found, member.family)
     same = [
@@ -70,25 +69,16 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
         yield found.judge(best.fitted, best.prediction)
 
 
-def _enough(base: Fitted, options: Options) -> float:
-    """Sum of squares that an adequate machine leaves."""
-    fit = base.fit
-    squares, freedom = fit.condensed(fit.good)
-    closed = fit.freedom + options.remaining * max(0.0, fit.excess)
-    return max(closed, options.adequate_chi2 * (fit.freedom + freedom) - squares)
-
-
 def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict: bool) -> Judged | None:
     """The table of a family, from a `known` machine."""
     best = None
     seen = member.seen(known)
-    beat = _enough(found.base, bench.options) if strict else None
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in KNOTS:
             knots = knots_at(member, seen, count)
-            made = None
-            if knots is not None:
-                made = fit_member(bench.training, found.base, member, known, knots, alike, beat)
+            made = (
+                None if knots is None else fit_member(bench.training, found.base, member, known, knots, alike)
+            )
             if made is None:
                 break
             bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)

@@ -82,18 +82,11 @@ def knots_at(member: Member, seen: np.ndarray, count: int) -> np.ndarray | None:
 
 
 def fit_member(
-    data: Data,
-    base: Fitted,
-    member: Member,
-    known: Fitted,
-    knots: np.ndarray,
-    alike: bool,
-    beat: float | None = None,
+    data: Data, base: Fitted, member: Member, known: Fitted, knots: np.ndarray, alike: bool
 ) -> Fitted | None:
     """The base machine with a table in place of an effect, fitted from a `known` machine; None if none.
 
-    Where the table has values of both directions and they are `alike`, they are fitted as one. A fit that
-    cannot come near the sum of squares `beat` is given up.
+    Where the table has values of both directions and they are `alike`, they are fitted as one.
     """
     begun = member.known(known, base, knots)
     if begun is None:
@@ -122,9 +115,8 @@ def fit_member(
     if member.anchor:
         values[paths.index(member.anchor)] = begun[0][0]
     problem = Problem(extended, data.prepared, data.stages[data.last], [*free, *added])
-    fit = minimise(problem, values, known.fit.starts, most=40, patient=True, beat=beat)
-    if not fit.given_up:
-        fit = polished(data, problem, fit, data.last, 40)
+    fit = minimise(problem, values, known.fit.starts, most=40, patient=True)
+    fit = polished(data, problem, fit, data.last, 40)
     return Fitted(names, extended, problem, fit, place)
 
 

@@ -59,8 +59,6 @@ class Fit:
     caught: bool = False
     # whether steps of every length were tried from there and gained next to nothing
     exhausted: bool = False
-    # whether it was given up behind what it had to beat
-    given_up: bool = False
     # what condensed stretches leave over, and its degrees of freedom
     left_over: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -156,14 +154,13 @@ def minimise(
     tolerance = max(tolerance, _ROUGH) if rough else tolerance
     descent = _Descent(problem, values, starts, movable, robust, begun)
     iterations = stalled = 0
-    begun_anew = exhausted = given_up = False
+    begun_anew = exhausted = False
     most_stalls = _PATIENT_STALLS if patient else _STALLS
     while iterations < most:
         iterations += 1
         if not descent.look(tolerance, rough):
             break
-        given_up = beat is not None and iterations > _HEARD and descent.behind(beat)
-        if given_up:
+        if beat is not None and iterations > _HEARD and descent.behind(beat):
             break
         mild = descent.damping <= _MILD
         if not descent.step():
@@ -186,7 +183,7 @@ def minimise(
     if not rough:
         descent.renew()
     found = _finished(problem, descent.values, descent.starts, descent.current, movable, iterations)
-    return replace(found, exhausted=exhausted, given_up=given_up)
+    return replace(found, exhausted=exhausted)
 
 
 class _Descent:
