@@ -178,7 +178,7 @@ def minimise(
             descent.damping, stalled, begun_anew = _MILD, most_stalls - 1, True
         elif not stalled:
             begun_anew = False
-        if hopeless is not None and iterations >= _HEARD and descent.hopeless(hopeless):
+        if hopeless is not None and iterations > _HEARD and descent.hopeless(hopeless):
             break
     if not rough:
         descent.renew()
