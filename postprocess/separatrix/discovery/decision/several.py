@@ -19,27 +19,28 @@ _PAIRS = 6
 _CLOSES = 0.5
 
 
-def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, list[Judged]] | None:
-    """Several effects that close the gap together, and their rivals; None where none do.
+def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, list[Judged], bool]:
+    """The best several effects, their rivals, and whether they close the gap together.
 
     On top of the best effect a second is tried, and the pairs that the screen finds; then a third, and so on,
     as long as each is needed and closes most of what was left. The rounds are added to `rounds`.
     """
     first, found = rounds[0], best
+    close: list[Judged] = []
     while len(found.fitted.names) < bench.options.most_effects:
         grown = [one for one in _grown(bench, rounds, found) if admissible(one, first.base, bench.options)[0]]
         if not grown:
-            return None
+            break
         larger, close = choice(bench, first.base, first.foretold, grown, foremost)
         pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
         judge_ceiling(bench, larger)
         larger.gates["drop"] = _all_needed(bench, first, larger, found)
         if larger.gates["adequate"] and larger.gates["drop"]:
-            return larger, close
+            return larger, close, True
         if not (larger.gates["drop"] and larger.fitted.fit.converged and _closes_most(found, larger)):
-            return None
+            break
         found = larger
-    return None
+    return found, close, False
 
 
 def _grown(bench: Bench, rounds: list[Round], found: Judged) -> list[Judged]:
