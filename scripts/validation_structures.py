@@ -18,6 +18,7 @@ import numpy as np
 from markdown import table
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from validation_structures_bouncing import bouncing, rattle
 from validation_structures_orbits import orbits
 from validation_structures_others import COMPUTED as BENCHMARKS
 from validation_structures_program import SOURCE, Number, Program, text
@@ -384,6 +385,8 @@ COMPUTED = (
     two_masses,
     fold,
     ball,
+    bouncing,
+    rattle,
     nonsmooth_modes,
     dampers,
     others,
