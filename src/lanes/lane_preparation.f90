@@ -39,8 +39,8 @@ module lane_preparation
 
 contains
 
-  !> Lanes for a jointed structure or one body, if its options ask for lanes. One body: in closed form where its equation is linear in every mode of slip, or
-  !> has a thin Stribeck layer, without a harmonic at resonance; else in series where all forces have one.
+  !> Lanes for a jointed structure or one body, if its options ask for lanes. One body: in closed form where its equation is linear
+  !> in every mode of slip, or has a thin Stribeck layer, without a harmonic at resonance; else in series where all forces have one.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow

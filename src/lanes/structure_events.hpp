@@ -79,15 +79,8 @@ template <class size>
 inline mask set_off(const structure_machine &m, const size &z, mask fresh, structure_group &g) {
   mask wrong = set_amplitudes(m, z, fresh, g);
   enter_modes(m, z, fresh & ~wrong, g);
-  structure_bases b;
-  outlook o;
-  vec f3[most_joints], f4[most_joints];
-  for (int k = 0; k < z.terms; k++) {
-    b.re[k] = 1;
-    b.im[k] = {};
-  }
-  harmonics_at(m, z, g.s.start, b);
-  functions_at<true>(m, z, g, b, o, f3, f4);
+  look_from_start(m, z, fresh, g);
+  const outlook &o = g.first;
   for (int j = 0; j < z.joints; j++) {
     const structure_joint &joint = m.joint[j];
     mask above = g.s.left == double(j + 1), below = g.s.left == -double(j + 1);
@@ -102,8 +95,8 @@ inline mask set_off(const structure_machine &m, const size &z, mask fresh, struc
       wrong = wrong | (fresh & ~clear_above);
     if (joint.slides > 0.5)
       continue;
-    wrong = wrong | (fresh & above & chatters_out(m, joint, -o.f1[j], -o.f2[j], f3[j]));
-    wrong = wrong | (fresh & below & chatters_out(m, joint, o.f1[j], o.f2[j], f3[j]));
+    wrong = wrong | (fresh & above & chatters_out(m, joint, -o.f1[j], -o.f2[j], o.f3[j]));
+    wrong = wrong | (fresh & below & chatters_out(m, joint, o.f1[j], o.f2[j], o.f3[j]));
   }
   return wrong;
 }

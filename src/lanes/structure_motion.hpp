@@ -52,7 +52,7 @@ struct any_size {
 
 // A function of each joint, and its derivatives.
 struct outlook {
-  vec f[most_joints], f1[most_joints], f2[most_joints];
+  vec f[most_joints], f1[most_joints], f2[most_joints], f3[most_joints];
 };
 
 // Exponentials and harmonics at an instant.
@@ -69,8 +69,11 @@ struct structure_group {
   vec swing_re[most_joints][most_waves], swing_im[most_joints][most_waves];
   // Limits of the functions, bound on their sixth derivatives, mass that a joint feels.
   vec constant[most_joints], low[most_joints], high[most_joints], sixth[most_joints], felt_mass[most_joints];
-  // Length of the panels [s].
+  // Length of the panels [s], and what turns the exponentials and harmonics from one to the next.
   vec panel;
+  structure_bases step;
+  // The functions at the start.
+  outlook first;
 };
 
 // The lanes of `among` that are in mode number `key`.
@@ -137,10 +140,10 @@ inline void bases_at(const structure_machine &m, const size &z, const structure_
   harmonics_at(m, z, g.s.start + elapsed, b);
 }
 
-// The functions of the joints with two derivatives, or with `further` two more.
-template <bool further, class size>
+// The functions of the joints with three derivatives, or with `fourth` one more.
+template <class size>
 inline void functions_at(const structure_machine &m, const size &z, const structure_group &g,
-                         const structure_bases &b, outlook &o, vec *third = nullptr, vec *fourth = nullptr) {
+                         const structure_bases &b, outlook &o, vec *fourth = nullptr) {
   for (int j = 0; j < z.joints; j++) {
     vec f = g.constant[j], f1 = {}, f2 = {}, f3 = {}, f4 = {};
     for (int k = 0; k < z.terms; k++) {
@@ -151,11 +154,10 @@ inline void functions_at(const structure_machine &m, const size &z, const struct
       f += y;
       f1 += y1;
       f2 += y2;
-      if (further) {
-        vec y3 = -g.square[k] * y1 - twice * y2;
-        f3 += y3;
+      vec y3 = -g.square[k] * y1 - twice * y2;
+      f3 += y3;
+      if (fourth)
         f4 -= g.square[k] * y2 + twice * y3;
-      }
     }
     for (int n = 0; n < z.waves; n++) {
       double w = (n + 1) * m.drive_frequency, w2 = w * w;
@@ -164,18 +166,16 @@ inline void functions_at(const structure_machine &m, const size &z, const struct
       f += part;
       f1 -= w * slope;
       f2 -= w2 * part;
-      if (further) {
-        f3 += (w2 * w) * slope;
+      f3 += (w2 * w) * slope;
+      if (fourth)
         f4 += (w2 * w2) * part;
-      }
     }
     o.f[j] = f;
     o.f1[j] = f1;
     o.f2[j] = f2;
-    if (further) {
-      third[j] = f3;
+    o.f3[j] = f3;
+    if (fourth)
       fourth[j] = f4;
-    }
   }
 }
 
@@ -219,8 +219,6 @@ inline void place_at(const structure_machine &m, const size &z, mask among, cons
 // The coefficients of the flights of the lanes `changed`, from their amplitudes and phases.
 template <class size>
 inline void enter_modes(const structure_machine &m, const size &z, mask changed, structure_group &g) {
-  // Panels over which the quintic errs by no more than about 2 % of what a function swings.
-  const double coarse = 900;
   for (int key = 0; key < modes_of(m); key++) {
     mask in = in_mode(m, z, key, changed, g.s);
     if (!any(in))
@@ -263,11 +261,46 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       vec ratio = sixth / (swing + 1e-300);
       put(steepest, ratio > steepest, ratio);
     }
-    put(steepest, steepest < 1e-200, 1e-200);
-    vec panel = exponential((1.0 / 6) * logarithm(coarse / steepest));
-    put(panel, panel > m.longest, m.longest);
-    put(g.panel, in, panel);
+    // The longest that will do.
+    mask fits = in;
+    for (int l = panel_lengths - 1; l >= 0; l--) {
+      fits = fits & (steepest <= m.steepest[l]);
+      if (!any(fits))
+        break;
+      put(g.panel, fits, m.panel[l]);
+      for (int k = 0; k < z.terms; k++) {
+        put(g.step.re[k], fits, t.step_re[l][k]);
+        put(g.step.im[k], fits, t.step_im[l][k]);
+      }
+      for (int n = 0; n < z.waves; n++) {
+        put(g.step.cosine[n], fits, m.step_cosine[l][n]);
+        put(g.step.sine[n], fits, m.step_sine[l][n]);
+      }
+    }
   }
+}
+
+inline void put_outlook(int joints, mask where, const outlook &from, outlook &o) {
+  for (int j = 0; j < joints; j++) {
+    put(o.f[j], where, from.f[j]);
+    put(o.f1[j], where, from.f1[j]);
+    put(o.f2[j], where, from.f2[j]);
+    put(o.f3[j], where, from.f3[j]);
+  }
+}
+
+// The functions where the flights of the lanes `in` start.
+template <class size>
+inline void look_from_start(const structure_machine &m, const size &z, mask in, structure_group &g) {
+  structure_bases b;
+  outlook o;
+  for (int k = 0; k < z.terms; k++) {
+    b.re[k] = 1;
+    b.im[k] = {};
+  }
+  harmonics_at(m, z, g.s.start, b);
+  functions_at(m, z, g, b, o);
+  put_outlook(z.joints, in, o, g.first);
 }
 
 } // namespace

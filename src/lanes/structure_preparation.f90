@@ -6,6 +6,7 @@
 module structure_preparation
   use contact_law, only: contact_constant
   use eigen, only: modulus
+  use elementary, only: exponential, sine_cosine
   use flight_path, only: begin_change, force_powers, path_t
   use friction_law, only: falls
   use jointed, only: joint_contact, joint_friction, joint_t, jointed_t
@@ -14,8 +15,8 @@ module structure_preparation
   use lane_types, only: lane_flow_t
   use mode_flow, only: mode_flow_t
   use motion_state, only: flight_adaptive
-  use structure_types, only: lane_coordinates, lane_joints, lane_sliders, lane_terms, lane_waves, structure_joint_t, &
-    structure_machine_t, structure_mode_t
+  use structure_types, only: lane_coordinates, lane_joints, lane_sliders, lane_terms, lane_waves, panel_lengths, &
+    structure_joint_t, structure_machine_t, structure_mode_t
   implicit none
   private
 
@@ -23,6 +24,8 @@ module structure_preparation
 
   !> Over so many radians of the fastest part Taylor's remainder after four terms is below rounding.
   real(wp), parameter :: taylor_span = 2.5e-4_wp
+  !> Radians of a panel, and how much longer panels may be.
+  real(wp), parameter :: coarse = 3.0_wp, stretches(panel_lengths) = [4.0_wp, 2.5_wp, 1.6_wp, 1.0_wp]
   !> Shares of the sizes of forces and lengths within which a choice is left to the event loop.
   real(wp), parameter :: rounding = 1e-12_wp
   !> Longest end of a chatter that is completed, and shortest flight between impacts that are no burst, in periods; as in
@@ -48,7 +51,6 @@ contains
       m%drive_frequency = machine%frequency
       m%period = machine%period
       m%domain = moving%options%domain
-      m%longest = machine%period/2
       m%slowest = machine%negligible_speed
       m%chatter_share = moving%chatter_share
       m%chatter_time = longest_chatter*machine%period
@@ -62,9 +64,38 @@ contains
         call set_mode(moving, sliders, key, m%mode(key + 1), fastest)
       end do
       m%close = taylor_span/fastest
+      call set_panels(fastest, 2**size(sliders), m)
       flow%available = m%mode(1)%known > 0
     end associate
   end subroutine prepare_structure_lanes
+
+  !> Panels over which quintics err by no more than about 2 % of what a function swings: as the fastest exponent [rad/s] asks
+  !> for, and longer.
+  pure subroutine set_panels(fastest, modes, m)
+    real(wp), intent(in) :: fastest
+    integer, intent(in) :: modes
+    type(structure_machine_t), intent(inout) :: m
+    real(wp) :: sine, cosine, shrink
+    integer :: l, k, i
+    do l = 1, panel_lengths
+      m%panel(l) = coarse/fastest*stretches(l)
+      m%steepest(l) = (coarse/m%panel(l))**6
+      if (l == panel_lengths) m%steepest(l) = huge(1.0_wp)
+      do k = 1, nint(m%waves)
+        call sine_cosine(k*m%drive_frequency*m%panel(l), m%step_sine(k, l), m%step_cosine(k, l))
+      end do
+      do i = 1, modes
+        associate (mode => m%mode(i))
+          do k = 1, nint(mode%terms)
+            call sine_cosine(mode%turn(k)*m%panel(l), sine, cosine)
+            shrink = exponential(-mode%decay(k)*m%panel(l))
+            mode%step_re(k, l) = shrink*cosine
+            mode%step_im(k, l) = shrink*sine
+          end do
+        end associate
+      end do
+    end do
+  end subroutine set_panels
 
   !> Whether the structure is one that the kernel has room and laws for.
   pure logical function fits_lanes(moving) result(fits)

@@ -13,35 +13,68 @@
 
 namespace {
 
-enum { most_panels = 96, most_polishings = 8, most_tries = 24, most_newtons = 5 };
+enum { most_panels = 256, most_polishings = 8, most_tries = 24, most_newtons = 5 };
 
 // Is w > 0 strictly between two times `span` apart? Zero at an end is allowed, and a zero rate there.
-// `error`: bound on the sixth derivative times span^6/14400, the share of the middle coefficient.
+// `error`: bound on the sixth derivative times span^6/14400, the share of the middle coefficient. `halves`:
+// of both halves.
+template <bool halves>
 LANE_LEAF mask stays_positive(vec span, vec w0, vec rate0, vec curl0, vec w1, vec rate1, vec curl1,
                               vec error) {
   vec step = 0.2 * span, bend = 0.05 * span * span;
   vec b1 = w0 + step * rate0, b2 = w0 + 2 * step * rate0 + bend * curl0;
   vec b4 = w1 - step * rate1, b3 = w1 - 2 * step * rate1 + bend * curl1;
-  return (w0 >= 0.0) & (w0 + 5 * b1 >= 0.0) & (b1 + 2 * b2 > 0.0) & (0.5 * (b2 + b3) > error) &
-         (2 * b3 + b4 > 0.0) & (5 * b4 + w1 >= 0.0) & (w1 >= 0.0);
+  if (!halves)
+    return (w0 >= 0.0) & (w0 + 5 * b1 >= 0.0) & (b1 + 2 * b2 > 0.0) & (0.5 * (b2 + b3) > error) &
+           (2 * b3 + b4 > 0.0) & (5 * b4 + w1 >= 0.0) & (w1 >= 0.0);
+  vec d[7] = {w0,
+              (w0 + 5 * b1) * (1.0 / 6),
+              (b1 + 2 * b2) * (1.0 / 3),
+              0.5 * (b2 + b3) - error,
+              (2 * b3 + b4) * (1.0 / 3),
+              (5 * b4 + w1) * (1.0 / 6),
+              w1};
+  mask positive = (w0 >= 0.0) & (w1 >= 0.0);
+  for (int level = 1; level <= 6; level++) {
+    for (int i = 0; i <= 6 - level; i++)
+      d[i] = 0.5 * (d[i] + d[i + 1]);
+    positive = positive & (level == 1 ? (d[0] >= 0.0) & (d[5] >= 0.0) : (d[0] > 0.0) & (d[6 - level] > 0.0));
+  }
+  return positive;
 }
 
-// Do all functions stay within their limits between two times?
-template <class size>
+// Do all functions stay within their limits between two times? `fallen`: some are beyond them at the end.
+template <bool halves, class size>
 inline mask stays_within(const structure_machine &m, const size &z, const structure_group &g, mask asked,
-                         const outlook &here, const outlook &far, vec span) {
+                         const outlook &here, const outlook &far, vec span, mask &fallen) {
   vec cube = span * span * span, power = cube * cube * (1.0 / 14400);
   mask within = asked;
   for (int j = 0; j < z.joints; j++) {
     const structure_joint &joint = m.joint[j];
     vec error = g.sixth[j] * power;
-    if (joint.has_lower > 0.5)
-      within = within & stays_positive(span, here.f[j] - g.low[j], here.f1[j], here.f2[j],
-                                       far.f[j] - g.low[j], far.f1[j], far.f2[j], error);
-    if (joint.has_upper > 0.5 && (joint.slides < 0.5 || any(asked & (g.s.phase[j] == 0.0))))
-      within = within & stays_positive(span, g.high[j] - here.f[j], -here.f1[j], -here.f2[j],
-                                       g.high[j] - far.f[j], -far.f1[j], -far.f2[j], error);
+    if (joint.has_lower > 0.5) {
+      fallen = fallen | (far.f[j] < g.low[j]);
+      within = within & stays_positive<halves>(span, here.f[j] - g.low[j], here.f1[j], here.f2[j],
+                                               far.f[j] - g.low[j], far.f1[j], far.f2[j], error);
+    }
+    if (joint.has_upper > 0.5 && (joint.slides < 0.5 || any(asked & (g.s.phase[j] == 0.0)))) {
+      fallen = fallen | (far.f[j] > g.high[j]);
+      within = within & stays_positive<halves>(span, g.high[j] - here.f[j], -here.f1[j], -here.f2[j],
+                                               g.high[j] - far.f[j], -far.f1[j], -far.f2[j], error);
+    }
   }
+  return within;
+}
+
+// The same by both halves where that may help.
+template <class size>
+inline mask proven_within(const structure_machine &m, const size &z, const structure_group &g, mask asked,
+                          const outlook &here, const outlook &far, vec span) {
+  mask fallen = {}, none = {};
+  mask within = stays_within<false>(m, z, g, asked, here, far, span, fallen);
+  mask doubtful = asked & ~within & ~fallen;
+  if (any(doubtful))
+    within = within | stays_within<true>(m, z, g, doubtful, here, far, span, none);
   return within;
 }
 
@@ -50,18 +83,24 @@ struct structure_target {
   vec joint, side;
 };
 
+// A function and three derivatives of it.
+struct course {
+  vec w = {}, w1 = {}, w2 = {}, w3 = {};
+};
+
 // -side (f - limit) of the targets: positive before the event.
 template <class size>
-inline void target_values(const size &z, const structure_group &g, const structure_target &target,
-                          const outlook &o, vec &w, vec &w1, vec &w2) {
-  w = w1 = w2 = vec{};
+inline course course_of(const size &z, const structure_group &g, const structure_target &target,
+                        const outlook &o) {
+  course c;
   for (int j = 0; j < z.joints; j++) {
     mask is = target.joint == double(j + 1);
-    vec limit = pick(target.side > 0.0, g.high[j], g.low[j]);
-    put(w, is, -target.side * (o.f[j] - limit));
-    put(w1, is, -target.side * o.f1[j]);
-    put(w2, is, -target.side * o.f2[j]);
+    put(c.w, is, -target.side * (o.f[j] - pick(target.side > 0.0, g.high[j], g.low[j])));
+    put(c.w1, is, -target.side * o.f1[j]);
+    put(c.w2, is, -target.side * o.f2[j]);
+    put(c.w3, is, -target.side * o.f3[j]);
   }
+  return c;
 }
 
 // Makes the function of the target exactly its limit.
@@ -94,15 +133,21 @@ inline structure_target earliest_fallen(const structure_machine &m, const size &
   return target;
 }
 
-// Share of a panel at which the quintic through both ends of a function falls.
-inline vec quintic_root(vec h, vec w, vec w1, vec w2, vec v, vec v1, vec v2) {
-  vec a1 = h * w1, a2 = 0.5 * h * h * w2, d0 = v - w - a1 - a2, d1 = h * v1 - a1 - 2 * a2,
-      d2 = 0.5 * h * h * v2 - a2;
-  vec a3 = 10 * d0 - 4 * d1 + d2, a4 = -15 * d0 + 7 * d1 - 2 * d2, a5 = 6 * d0 - 3 * d1 + d2;
-  vec low = {}, high = 1, u = pick(w > 0.0, w / (w - v), 0.7);
+// Share of a panel of length h at which the polynomial of degree 7 through both ends of a function falls.
+inline vec falls_at(vec h, const course &a, const course &b) {
+  vec square = h * h, a1 = h * a.w1, a2 = 0.5 * square * a.w2, a3 = (1.0 / 6) * square * h * a.w3;
+  vec d0 = b.w - (a.w + a1 + a2 + a3), d1 = h * b.w1 - (a1 + 2 * a2 + 3 * a3),
+      d2 = square * b.w2 - (2 * a2 + 6 * a3), d3 = (1.0 / 6) * square * h * b.w3 - a3;
+  vec a4 = 35 * d0 - 15 * d1 + 2.5 * d2 - d3, a5 = -84 * d0 + 39 * d1 - 7 * d2 + 3 * d3,
+      a6 = 70 * d0 - 34 * d1 + 6.5 * d2 - 3 * d3, a7 = -20 * d0 + 10 * d1 - 2 * d2 + d3;
+  vec low = {}, high = 1, u = pick(a.w > 0.0, a.w / (a.w - b.w), 0.7);
   for (int i = 0; i < most_newtons; i++) {
-    vec p = w + u * (a1 + u * (a2 + u * (a3 + u * (a4 + u * a5))));
-    vec slope = a1 + u * (2 * a2 + u * (3 * a3 + u * (4 * a4 + u * (5 * a5))));
+    vec p = a6 + u * a7, slope = a7;
+    const vec rest[] = {a5, a4, a3, a2, a1, a.w};
+    for (const vec &c : rest) {
+      slope = p + u * slope;
+      p = c + u * p;
+    }
     put(low, p > 0.0, u);
     high = pick(p > 0.0, high, u);
     vec next = u - p / slope;
@@ -152,35 +197,27 @@ inline void put_bases(int terms, int waves, mask where, const structure_bases &f
   }
 }
 
-inline void put_outlook(int joints, mask where, const outlook &from, outlook &o) {
-  for (int j = 0; j < joints; j++) {
-    put(o.f[j], where, from.f[j]);
-    put(o.f1[j], where, from.f1[j]);
-    put(o.f2[j], where, from.f2[j]);
-  }
-}
-
 // Walks on panel by panel until the proof fails. Flights that last too long end without an event.
 template <class size>
-inline void walk(const structure_machine &m, const size &z, const structure_bases &turn, mask walking,
-                 mask &todo, structure_walk &p, structure_group &g) {
+inline void walk(const structure_machine &m, const size &z, mask walking, mask &todo, structure_walk &p,
+                 structure_group &g) {
   while (any(walking)) {
     structure_bases next;
     for (int k = 0; k < z.terms; k++) {
-      next.re[k] = p.b.re[k] * turn.re[k] - p.b.im[k] * turn.im[k];
-      next.im[k] = p.b.re[k] * turn.im[k] + p.b.im[k] * turn.re[k];
+      next.re[k] = p.b.re[k] * g.step.re[k] - p.b.im[k] * g.step.im[k];
+      next.im[k] = p.b.re[k] * g.step.im[k] + p.b.im[k] * g.step.re[k];
     }
     for (int n = 0; n < z.waves; n++) {
-      next.cosine[n] = p.b.cosine[n] * turn.cosine[n] - p.b.sine[n] * turn.sine[n];
-      next.sine[n] = p.b.cosine[n] * turn.sine[n] + p.b.sine[n] * turn.cosine[n];
+      next.cosine[n] = p.b.cosine[n] * g.step.cosine[n] - p.b.sine[n] * g.step.sine[n];
+      next.sine[n] = p.b.cosine[n] * g.step.sine[n] + p.b.sine[n] * g.step.cosine[n];
     }
     outlook there;
-    functions_at<false>(m, z, g, next, there);
+    functions_at(m, z, g, next, there);
     LANE_COUNT(panels, count(walking));
     put_bases(z.terms, z.waves, walking, next, p.b);
     put_outlook(z.joints, walking, there, p.far);
     put(p.end, walking, p.t + g.panel);
-    walking = stays_within(m, z, g, walking, p.here, p.far, g.panel);
+    walking = proven_within(m, z, g, walking, p.here, p.far, g.panel);
     mask over = walking & (p.panels >= double(most_panels));
     if (any(over)) {
       keep_end(z, over, p, {0, 0}, g);
@@ -197,22 +234,20 @@ inline void walk(const structure_machine &m, const size &z, const structure_base
 template <class size>
 inline mask polish(const structure_machine &m, const size &z, mask asked, structure_walk &p,
                    structure_group &g) {
-  vec w, w1, w2, v, v1, v2, low = p.t, high = p.end;
-  target_values(z, g, p.target, p.here, w, w1, w2);
-  target_values(z, g, p.target, p.far, v, v1, v2);
-  vec s = p.t + (p.end - p.t) * quintic_root(p.end - p.t, w, w1, w2, v, v1, v2);
+  vec low = p.t, high = p.end;
+  course a = course_of(z, g, p.target, p.here), c = course_of(z, g, p.target, p.far);
+  vec s = p.t + (p.end - p.t) * falls_at(p.end - p.t, a, c);
   for (int round = 0; round < most_polishings && any(asked); round++) {
     structure_bases b;
     outlook o;
-    vec f3[most_joints], f4[most_joints], w3 = {};
+    vec f4[most_joints];
     bases_at(m, z, g, s, b);
-    functions_at<true>(m, z, g, b, o, f3, f4);
-    target_values(z, g, p.target, o, w, w1, w2);
-    for (int j = 0; j < z.joints; j++)
-      put(w3, p.target.joint == double(j + 1), -p.target.side * f3[j]);
+    functions_at(m, z, g, b, o, f4);
+    c = course_of(z, g, p.target, o);
+    vec w = c.w, w1 = c.w1, w2 = c.w2;
     put(low, w > 0.0, s);
     high = pick(w > 0.0, high, s);
-    vec step = -w * (w1 * w1 - 0.5 * w * w2) / (w1 * (w1 * w1 - w * w2) + (1.0 / 6) * w * w * w3);
+    vec step = -w * (w1 * w1 - 0.5 * w * w2) / (w1 * (w1 * w1 - w * w2) + (1.0 / 6) * w * w * c.w3);
     vec next = s + step;
     mask guided = (w1 < 0.0) & (next >= low) & (next <= high) & (next > p.t);
     mask close = asked & guided & (magnitude(step) <= m.close) & (magnitude(w) <= -2 * m.close * w1);
@@ -229,10 +264,11 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
       }
       vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step;
       for (int j = 0; j < z.joints; j++) {
-        vec f = o.f[j] + step * (o.f1[j] + half * (o.f2[j] + third * (f3[j] + fourth * f4[j])));
+        vec f = o.f[j] + step * (o.f1[j] + half * (o.f2[j] + third * (o.f3[j] + fourth * f4[j])));
         put(p.far.f[j], close, f);
-        put(p.far.f1[j], close, o.f1[j] + step * (o.f2[j] + half * (f3[j] + third * f4[j])));
-        put(p.far.f2[j], close, o.f2[j] + step * (f3[j] + half * f4[j]));
+        put(p.far.f1[j], close, o.f1[j] + step * (o.f2[j] + half * (o.f3[j] + third * f4[j])));
+        put(p.far.f2[j], close, o.f2[j] + step * (o.f3[j] + half * f4[j]));
+        put(p.far.f3[j], close, o.f3[j] + step * f4[j]);
       }
       make_zero(z, g, p.target, close, p.far);
       put(p.end, close, next);
@@ -252,7 +288,7 @@ inline void halve(const structure_machine &m, const size &z, mask asked, structu
   outlook o;
   vec middle = 0.5 * (p.t + p.end);
   bases_at(m, z, g, middle, b);
-  functions_at<false>(m, z, g, b, o);
+  functions_at(m, z, g, b, o);
   put_bases(z.terms, z.waves, asked, b, p.b);
   put_outlook(z.joints, asked, o, p.far);
   put(p.end, asked, middle);
@@ -263,13 +299,12 @@ inline void halve(const structure_machine &m, const size &z, mask asked, structu
 template <class size>
 inline mask find_first(const structure_machine &m, const size &z, mask seek, structure_group &g) {
   structure_walk p;
-  structure_bases turn;
   for (int k = 0; k < z.terms; k++) {
     p.b.re[k] = 1;
     p.b.im[k] = {};
   }
   harmonics_at(m, z, g.s.start, p.b);
-  functions_at<false>(m, z, g, p.b, p.here);
+  p.here = g.first;
   p.target = {magnitude(g.s.left), pick(g.s.left > 0.0, 1, -1)};
   make_zero(z, g, p.target, seek & (g.s.left != 0.0), p.here);
   p.far = p.here;
@@ -278,13 +313,9 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
       put(p.here.f1[j], g.s.rising == double(j + 1), vec{});
   p.t = p.end = p.tries = p.panels = vec{};
   p.at_zero = mask{};
-  bases_at(m, z, g, g.panel, turn);
-  vec c, s;
-  sine_cosine(g.panel * m.drive_frequency, s, c);
-  set_waves(z, c, s, turn);
   mask todo = seek, walking = seek, lost = {};
   while (any(todo)) {
-    walk(m, z, turn, walking, todo, p, g);
+    walk(m, z, walking, todo, p, g);
     structure_target fallen = earliest_fallen(m, z, g, p.here, p.far);
     mask aims = todo & (fallen.joint > 0.0), failed = {};
     put(p.target.joint, aims, fallen.joint);
@@ -296,7 +327,7 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     mask blind = todo & ~aims;
     if (any(blind))
       halve(m, z, blind, p, g);
-    mask within = stays_within(m, z, g, todo, p.here, p.far, p.end - p.t) & ~failed;
+    mask within = proven_within(m, z, g, todo, p.here, p.far, p.end - p.t) & ~failed;
     mask found = within & p.at_zero;
     keep_end(z, found, p, p.target, g);
     walking = within & ~p.at_zero;

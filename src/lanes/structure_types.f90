@@ -10,7 +10,7 @@ module structure_types
 
   integer, parameter, public :: structure_lane_count = 16
   integer, parameter, public :: lane_coordinates = 8, lane_terms = 16, lane_joints = 4, lane_sliders = 2, &
-    lane_structure_modes = 4, lane_waves = 8
+    lane_structure_modes = 4, lane_waves = 8, panel_lengths = 4
   integer, parameter :: section = 2*lane_coordinates, metric_numbers = (section*(section + 1))/2
   integer, parameter, public :: structure_regions = 64
 
@@ -26,7 +26,9 @@ module structure_types
     real(c_double), dimension(lane_joints, lane_terms) :: part_re = 0, part_im = 0, part_size = 0
     real(c_double), dimension(lane_joints, lane_waves) :: swing_re = 0, swing_im = 0
     real(c_double) :: level(lane_joints) = 0, level_by_joint(lane_joints, lane_joints) = 0
-    real(c_double), dimension(lane_joints) :: steady = 0, steady_sixth = 0, felt_mass = 0
+    real(c_double), dimension(lane_joints) :: steady = 0, steady_sixth = 0
+    real(c_double), dimension(lane_terms, panel_lengths) :: step_re = 0, step_im = 0
+    real(c_double) :: felt_mass(lane_joints) = 0
   end type structure_mode_t
 
   !> Mirrors `structure_joint` of structure_types.hpp.
@@ -38,8 +40,10 @@ module structure_types
 
   !> Mirrors `structure_machine` of structure_types.hpp.
   type, bind(c), public :: structure_machine_t
-    real(c_double) :: coordinates = 0, joints = 0, waves = 0, drive_frequency = 0, period = 0, domain = 0, close = 0, &
-      longest = 0, slowest = 0, chatter_share = 0, chatter_time = 0, burst_gap = 0
+    real(c_double) :: coordinates = 0, joints = 0, waves = 0, drive_frequency = 0, period = 0, domain = 0, close = 0
+    real(c_double), dimension(panel_lengths) :: panel = 0, steepest = 0
+    real(c_double), dimension(lane_waves, panel_lengths) :: step_cosine = 0, step_sine = 0
+    real(c_double) :: slowest = 0, chatter_share = 0, chatter_time = 0, burst_gap = 0
     type(structure_joint_t) :: joint(lane_joints)
     type(structure_mode_t) :: mode(lane_structure_modes)
   end type structure_machine_t

@@ -15,6 +15,7 @@ enum {
   most_sliders = 2,
   most_structure_modes = 4,
   most_waves = 8,
+  panel_lengths = 4,
   most_section = 2 * most_coordinates,
   metric_numbers = most_section * (most_section + 1) / 2,
   most_structure_regions = 64
@@ -42,6 +43,8 @@ struct structure_mode {
   double level[most_joints], level_by_joint[most_joints][most_joints];
   // Bounds on what the waves have in the functions and their sixth derivatives.
   double steady[most_joints], steady_sixth[most_joints];
+  // The exponentials over panels.
+  double step_re[panel_lengths][most_terms], step_im[panel_lengths][most_terms];
   // Mass that a sliding joint feels with the others as they are [kg].
   double felt_mass[most_joints];
 };
@@ -67,8 +70,12 @@ struct structure_joint {
 struct structure_machine {
   double coordinates, joints, waves;
   double drive_frequency, period, domain;
-  // A step of the root search shorter than this [s] is the last; the longest panel [s].
-  double close, longest;
+  // A step of the root search shorter than this [s] is the last.
+  double close;
+  // Lengths of panels, longest first [s]; how large the sixth derivative of a function may be, in its own
+  // size [1/s^6]; the harmonics over them.
+  double panel[panel_lengths], steepest[panel_lengths];
+  double step_cosine[panel_lengths][most_waves], step_sine[panel_lengths][most_waves];
   // Sliding speeds below this are left to the scalar code [m/s].
   double slowest;
   // Share of the change of a gap's acceleration up to which its chatter is completed, and the longest end of
