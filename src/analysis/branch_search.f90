@@ -11,7 +11,7 @@ module branch_search
   use errors, only: error_t
   use kinds, only: wp
   use hybrid_machine, only: hybrid_t
-  use machine_family, only: machine_neighbourhood, machine_of_family, watched_rows
+  use machine_family, only: machine_neighbourhood, machine_of_family, nearest_copy, watched_rows
   use matrices, only: solve
   use orbit_search, only: find_orbits, found_t
   use orbit_sections, only: section_points
@@ -27,6 +27,8 @@ module branch_search
   real(wp), parameter :: doubled_at = 3e-3_wp
   !> Nearness to a doubling, in multiplier and as a share of the range, at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-3_wp
+  !> The same of section points, in natural sizes: they go with the root of the parameter.
+  real(wp), parameter :: near_doubling = 3e-2_wp
 
   type, public :: search_t
     type(family_t) :: family
@@ -146,35 +148,73 @@ contains
   !> singular there.
   pure subroutine join_doublings(search)
     type(search_t), intent(inout) :: search
-    type(orbit_t) :: nearest
-    real(wp) :: distance, least
-    integer :: b, c, i, k
+    type(orbit_t) :: doubling
+    integer :: b, k
+    logical :: found
     do b = 1, size(search%branches)
       do k = 1, 2
         if (search%branches(b)%ending(k) /= label_pd) cycle
-        least = at_doubling
         associate (ended => search%branches(b)%points(merge(1, size(search%branches(b)%points), k == 1))%orbit)
-          do c = 1, size(search%branches)
-            do i = 1, size(search%branches(c)%points)
-              associate (there => search%branches(c)%points(i))
-                if (2*there%orbit%periods /= ended%periods .or. there%label /= label_pd) cycle
-                if (minval(abs(there%orbit%multipliers + 1)) > at_doubling) cycle
-                distance = abs(ended%parameter - there%orbit%parameter)/search%family%parameter_size
-                if (distance >= least) cycle
-                least = distance
-                nearest = there%orbit
-              end associate
-            end do
-          end do
-          if (.not. least < at_doubling) cycle
-          ended%parameter = nearest%parameter
-          ended%y = nearest%y
-          ended%matrix = matmul(nearest%matrix, nearest%matrix)
-          ended%multipliers = nearest%multipliers**2
+          call nearest_doubling(search, ended, doubling, found)
+          if (.not. found) cycle
+          ended%parameter = doubling%parameter
+          ended%y = doubling%y
+          ended%multipliers = doubling%multipliers**2
         end associate
       end do
     end do
   end subroutine join_doublings
+
+  !> The doubling that an orbit ended in, of those of half its period nearby, with that section point in front that is nearest to
+  !> the orbit's: twins of a symmetric machine double at one value of the parameter.
+  pure subroutine nearest_doubling(search, ended, doubling, found)
+    type(search_t), intent(in) :: search
+    type(orbit_t), intent(in) :: ended
+    type(orbit_t), intent(out) :: doubling
+    logical, intent(out) :: found
+    real(wp) :: least, distance, point(size(ended%y))
+    integer :: c, i
+    least = near_doubling
+    do c = 1, size(search%branches)
+      do i = 1, size(search%branches(c)%points)
+        associate (there => search%branches(c)%points(i))
+          if (2*there%orbit%periods /= ended%periods .or. there%label /= label_pd) cycle
+          if (minval(abs(there%orbit%multipliers + 1)) > at_doubling) cycle
+          if (abs(ended%parameter - there%orbit%parameter) >= at_doubling*search%family%parameter_size) cycle
+          call nearest_section_point(search%family, there%orbit, ended%y, point, distance)
+          if (distance >= least) cycle
+          least = distance
+          doubling = there%orbit
+          doubling%y = point
+        end associate
+      end do
+    end do
+    found = least < near_doubling
+  end subroutine nearest_doubling
+
+  !> The section point of an orbit that is nearest to `y`, and its distance in natural sizes: huge if the machine is not to be had.
+  pure subroutine nearest_section_point(family, orbit, y, nearest, distance)
+    type(family_t), intent(in) :: family
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: y(:)
+    real(wp), intent(out) :: nearest(:), distance
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    real(wp) :: points(size(y), orbit%periods), there
+    integer :: k
+    distance = huge(distance)
+    nearest = y
+    call machine_neighbourhood(family, orbit%parameter, machines, error)
+    if (allocated(error)) return
+    points = section_points(machines, orbit)
+    do k = 1, orbit%periods
+      points(:, k) = nearest_copy(machines%centre, points(:, k), y)
+      there = norm2((points(:, k) - y)/machines%centre%size_of)
+      if (there >= distance) cycle
+      distance = there
+      nearest = points(:, k)
+    end do
+  end subroutine nearest_section_point
 
   !> The orbits at which a branch passes the values of the search.
   subroutine note_passages(search, found)
