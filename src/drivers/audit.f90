@@ -17,6 +17,8 @@ module audit
     integer :: inferred = 0, inferred_differing = 0
     !> Points whose label changes: flips, and what was inferred wrongly.
     integer :: changes = 0
+    !> Points of a boundary whose labels are right a little further from them than the file says.
+    integer :: wider = 0
     !> Every point was run again.
     logical :: whole = .false.
     real(wp) :: x_deviation = 0, v_deviation = 0

@@ -370,6 +370,8 @@ contains
                  unit_of('m/s', audit%is_angle)
     ! Of a boundary the labels on its two sides are all that is asked.
     if (kind == 'boundary') deviations = ''
+    if (audit%wider > 0) deviations = '; '//to_text(audit%wider)//' of the others lie further out than the file says, by no '// &
+                                      'more than a hundred times'
     if (audit%inferred > 0) write (output_unit, '(a)') &
       '  '//to_text(audit%inferred)//' inferred points computed: '//to_text(audit%inferred_differing)// &
       ' differ; so, with 95 % confidence, at most '// &
