@@ -5,8 +5,8 @@
 
     scripts/boundary_pairs.py [CASE ...] [--points 4096] [--step 16] [--distance 1e-8] [--referee 50]
 
-Computes the map of each case (default examples/basin_coulomb.toml) with POINTS points along each axis, refined
-from a lattice of STEP, and its boundary into a temporary folder. So many of the pairs are also judged by the
+Computes the map of each case (default examples/basin_coulomb.toml) with POINTS points along each axis, from a
+lattice of STEP, and its boundary into a temporary folder. So many of the pairs are also judged by the
 integrator of tests/referee/, which shares no code with the program: do its two motions end on two
 attractors?
 """
