@@ -135,8 +135,8 @@ module part_rows
                     'K'), &
     parameter_row_t('part', contacts(2), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
                     'D'), &
-    parameter_row_t('part', contacts(3), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .true., 0.0_wp, .false., &
-                    'that of the modes which structure.NAME.modes leaves out, if absent'), &
+    parameter_row_t('part', contacts(3), 'stiffness', 'N/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'that of the modes which structure.NAME.modes leaves out, if 0'), &
     parameter_row_t('part', contacts(2), 'tension', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
                     '1: the force may pull, 0: it ends where it would'), &
     (parameter_row_t('part', contacts(i), 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &

@@ -46,7 +46,8 @@ def test_a_record_is_its_harmonics(separatrix, tmp_path):
     """The same motion as that of the series which the record samples."""
     angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
     _write(tmp_path, 0.2 + np.cos(angle) - 0.5 * np.sin(2 * angle) + 0.25 * np.cos(7 * angle))
-    series = f"frequency = {2 * np.pi / (STEP * SAMPLES)!r}\nmean = 0.2\ncosine = [1, 0, 0, 0, 0, 0, 0.25]\nsine = [0, -0.5]"
+    series = f"frequency = {2 * np.pi / (STEP * SAMPLES)!r}\nmean = 0.2\n"
+    series += "cosine = [1, 0, 0, 0, 0, 0, 0.25]\nsine = [0, -0.5]"
     motions = []
     for drive in ('record = "force.csv"', series):
         (tmp_path / "case.toml").write_text(CASE.format(drive=drive))
@@ -68,7 +69,9 @@ def test_what_is_refused(separatrix, tmp_path):
         assert outcome.code in (65, 66)
         return outcome.err
 
-    assert "'drive.shaker.record': found a record of which 32 harmonics leave 4" in said('record = "force.csv"')
+    assert "'drive.shaker.record': found a record of which 32 harmonics leave 4" in said(
+        'record = "force.csv"'
+    )
     assert "'drive.shaker.mean': found beside a record" in said('record = "force.csv"\nmean = 1')
     assert "nowhere.csv" in said('record = "nowhere.csv"')
     (tmp_path / "case.toml").write_text(CASE.format(drive='record = "force.csv"\nharmonics = 8'))
