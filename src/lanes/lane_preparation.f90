@@ -44,6 +44,7 @@ contains
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
+    flow%gpu = moving%options%gpu
     if (flow%width <= 0 .or. .not. is_one_body(moving)) return
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
@@ -51,7 +52,7 @@ contains
       call prepare_modes(moving, flow)
     end if
     if (flow%available .or. moving%exact .and. .not. moving%layer > 0) return
-    flow = lane_flow_t(width=flow%width)
+    flow = lane_flow_t(width=flow%width, gpu=flow%gpu)
     call prepare_series(moving, flow)
   end subroutine prepare_lanes
 
