@@ -174,7 +174,12 @@ def tangency(model: Model, meeting: float, resonance: float) -> dict[str, float]
     grazes = graze_of(model, "drive.amplitude", 1e-3, 10, 1.0, drive__ratio=far)
     near = 0.1 - meeting
     distant = grazes - located_fold(model, far, (grazes + 0.01, grazes - 0.01), 1e-6)[0]
-    return {"coco.tangency": near / (1 - resonance) ** 2, "coco.ninefold": distant / near}
+    return {
+        "coco.tangency": near / (1 - resonance) ** 2,
+        "coco.ninefold": distant / near,
+        "coco.order": float(np.log(distant / near) / np.log(9)),
+        "coco.window": near,
+    }
 
 
 def swept(program: Program) -> list[Row]:

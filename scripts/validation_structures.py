@@ -19,6 +19,7 @@ from markdown import table
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from validation_structures_bouncing import bouncing, rattle
 from validation_structures_program import SOURCE, Number, Program, text
 from validation_structures_steps import simulated
 
@@ -403,6 +404,8 @@ COMPUTED = (
     two_masses,
     fold,
     ball,
+    bouncing,
+    rattle,
     nonsmooth_modes,
     dampers,
     others,

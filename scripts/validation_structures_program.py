@@ -71,6 +71,19 @@ class Program:
             names = text(file["label"].attrs["flag_meanings"]).split()
             return dict(zip((names[k] for k in file["label"][:]), file["parameter"][:], strict=True))
 
+    def branch_points(self, case: str, name: str, low: float, high: float, **settings: float) -> list[tuple]:
+        """Label, parameter, period and impacts of every point of the branches over a parameter."""
+        output = self.folder / f"{case}_branches.h5"
+        words = ["--parameter", name, "--from", str(low), "--to", str(high), "-q", "--force", "-o", output]
+        words += [
+            word for key, value in settings.items() for word in ("--set", f"{key.replace('__', '.')}={value}")
+        ]
+        subprocess.run([self.path, "branches", CASES / f"{case}.toml", *words], check=True)
+        with h5py.File(output) as file:
+            names = text(file["label"].attrs["flag_meanings"]).split()
+            columns = (file[name][:] for name in ("parameter", "period", "impacts"))
+            return list(zip((names[k] for k in file["label"][:]), *columns, strict=True))
+
     def multipliers(self, case: str, **settings: str | float) -> np.ndarray:
         """Multipliers of the impacting cycle in the catalogue of a map, the largest first."""
         with h5py.File(self.run("basin", case, **settings)) as file:

@@ -11,6 +11,7 @@ module branch
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use errors, only: error_t
+  use hybrid_machine, only: event_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
@@ -246,16 +247,21 @@ contains
     is_chatter = kind == event_chatter_upper .or. kind == event_chatter_lower
   end function is_chatter
 
-  !> Impacts in a row, turning points aside.
+  !> Impacts in a row on one side of a joint, turning points aside.
   pure integer function longest_run(orbit) result(longest)
     type(orbit_t), intent(in) :: orbit
+    type(event_t) :: last
     integer :: k, run
     run = 0
     longest = 0
     do k = 1, size(orbit%events)
-      if (orbit%events(k)%kind == event_turning_point) cycle
-      run = merge(run + 1, 0, is_impact(orbit%events(k)%kind))
-      longest = max(longest, run)
+      associate (event => orbit%events(k))
+        if (event%kind == event_turning_point) cycle
+        if (event%kind /= last%kind .or. event%joint /= last%joint) run = 0
+        run = merge(run + 1, 0, is_impact(event%kind))
+        longest = max(longest, run)
+        last = event
+      end associate
     end do
   end function longest_run
 
@@ -326,7 +332,7 @@ contains
     if (known) call enter_sequence(family, at, trace%step, beyond, known)
     if (known) then
       rise_before = at%now%tangent(size(at%now%tangent))
-      rise_after = beyond%now%orbit%parameter - at%now%orbit%parameter
+      rise_after = beyond%now%tangent(size(beyond%now%tangent))
       if (point%label == label_gr .and. rise_before*rise_after < 0) point%label = label_gr_fold
     end if
     ! Two events that change places are none, if the motion goes on.

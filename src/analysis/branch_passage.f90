@@ -5,10 +5,10 @@
 !> way on with another sequence of events.
 module branch_passage
   use body_family, only: family_t
+  use branch_crossing, only: locate_branch_point, no_test, test_circle, test_minus, test_plus, test_turn, test_value
   use branch_point, only: label_bp, label_gr, label_gr_fold, label_not_known, label_ns, label_pd, label_sn, label_stick, &
     label_stiction, no_label, point_t, set_point, step_to, trace_t
   use kinds, only: wp
-  use multipliers, only: shifted_determinant
   use one_body, only: one_body_t
   use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_release, of_slip, of_stick, &
     of_turning, same_meaning
@@ -28,9 +28,9 @@ module branch_passage
   !> First look beyond a point where the sequence changes, as a share of the largest step.
   real(wp), parameter :: first_look = 1e-4_wp
 
-  !> What is zero at a point that is looked for: the test of a label, or, without, a margin.
+  !> What is zero at a point that is looked for: a test, or, without, a margin.
   type :: target_t
-    integer :: label = no_label
+    integer :: test = no_test
     type(margin_t) :: margin
   end type target_t
 
@@ -105,7 +105,7 @@ contains
     f_low = value_of(target, trace)
     f_high = value_of(target, next)
     ! A margin that is not passed within rounding.
-    if (target%label == no_label) f_low = max(f_low, 0.0_wp)
+    if (target%test == no_test) f_low = max(f_low, 0.0_wp)
     there = next
     ok = .true.
     side = 0
@@ -136,10 +136,10 @@ contains
   pure real(wp) function value_of(target, trace) result(value)
     type(target_t), intent(in) :: target
     type(trace_t), intent(in) :: trace
-    if (target%label == no_label) then
+    if (target%test == no_test) then
       value = value_like(trace%margins, target%margin)
     else
-      value = test_value(target%label, trace)
+      value = test_value(target%test, trace)
     end if
   end function value_of
 
@@ -156,29 +156,52 @@ contains
     end do
   end function time_like
 
-  !> Folds, doublings and the like between two points of one sequence of events: located, and added to the points.
+  !> Folds, doublings and the like between two points of one sequence of events: located, and added to the points. In a fold the
+  !> parameter turns and a multiplier passes +1; where only one of these happens another branch crosses.
   subroutine note_bifurcations(family, trace, next, length, points)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: trace, next
     real(wp), intent(in) :: length
     type(point_t), allocatable, intent(inout) :: points(:)
-    type(trace_t) :: end_point, there
-    real(wp) :: distance
-    integer :: label, steps
-    logical :: ok, turns
+    type(trace_t) :: end_point
+    integer :: steps
+    logical :: ok, turns, passes
     call step_to(family, trace, length, end_point, ok, steps)
     if (.not. ok) end_point = next
-    turns = test_value(label_sn, trace)*test_value(label_sn, end_point) < 0
-    do label = label_sn, label_bp
-      if (label == label_bp .and. turns) cycle
-      if (.not. test_value(label, trace)*test_value(label, end_point) < 0) cycle
+    turns = changes(test_turn)
+    passes = changes(test_plus)
+    if (turns .and. passes) then
+      call add(label_sn, test_turn)
+    else if (turns) then
+      call add(label_bp, test_turn)
+    else if (passes) then
+      call add(label_bp, test_plus)
+    end if
+    if (changes(test_minus)) call add(label_pd, test_minus)
+    if (changes(test_circle)) call add(label_ns, test_circle)
+
+  contains
+
+    logical function changes(test)
+      integer, intent(in) :: test
+      changes = test_value(test, trace)*test_value(test, end_point) < 0
+    end function changes
+
+    subroutine add(label, test)
+      integer, intent(in) :: label, test
+      type(trace_t) :: there
+      real(wp) :: distance
       distance = length
-      call locate(family, trace, end_point, target_t(label), distance, there, ok)
-      if (.not. ok) cycle
-      if (.not. is_genuine(label, there%now%orbit)) cycle
+      if (label == label_bp) then
+        call locate_branch_point(family, trace, end_point, test, length, there, ok)
+      else
+        call locate(family, trace, end_point, target_t(test), distance, there, ok)
+      end if
+      if (.not. ok .or. .not. is_genuine(label, there%now%orbit)) return
       there%now%label = label
       points = [points, there%now]
-    end do
+    end subroutine add
+
   end subroutine note_bifurcations
 
   !> Whether a multiplier is where the label says; near a graze its rounding is large.
@@ -196,56 +219,6 @@ contains
       genuine = .true.
     end select
   end function is_genuine
-
-  !> What changes its sign where a label belongs.
-  pure real(wp) function test_value(label, trace) result(value)
-    integer, intent(in) :: label
-    type(trace_t), intent(in) :: trace
-    associate (m => trace%now%orbit%matrix)
-      if (size(m, 1) > 2) then
-        value = test_of_many(label, trace)
-        return
-      end if
-      associate (trace_of => m(1, 1) + m(2, 2), determinant => m(1, 1)*m(2, 2) - m(1, 2)*m(2, 1))
-        select case (label)
-        case (label_sn)
-          value = trace%now%tangent(size(trace%now%tangent))
-        case (label_pd)
-          value = 1 + trace_of + determinant
-        case (label_ns)
-          value = determinant - 1
-        case default
-          value = 1 - trace_of + determinant
-        end select
-      end associate
-    end associate
-  end function test_value
-
-  !> The same for more than two coordinates: NS where the product of two multipliers passes 1.
-  pure real(wp) function test_of_many(label, trace) result(value)
-    integer, intent(in) :: label
-    type(trace_t), intent(in) :: trace
-    complex(wp) :: all_pairs
-    integer :: i, k
-    associate (orbit => trace%now%orbit)
-      select case (label)
-      case (label_sn)
-        value = trace%now%tangent(size(trace%now%tangent))
-      case (label_pd)
-        value = shifted_determinant(orbit%matrix, 1.0_wp)
-      case (label_ns)
-        all_pairs = 1
-        do i = 2, size(orbit%multipliers)
-          do k = 1, i - 1
-            all_pairs = all_pairs*(orbit%multipliers(i)*orbit%multipliers(k) - 1)
-          end do
-        end do
-        value = real(all_pairs, wp)
-      case default
-        value = shifted_determinant(orbit%matrix, -1.0_wp)
-      end select
-    end associate
-  end function test_of_many
 
   !> Label of the place where a margin is zero.
   pure integer function label_of_margin(margin) result(label)

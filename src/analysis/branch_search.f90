@@ -7,7 +7,7 @@
 module branch_search
   use body_family, only: family_t
   use branch, only: trace_branch
-  use branch_point, only: branch_t, label_pd, plan_t, point_t, set_sizes
+  use branch_point, only: branch_t, label_bp, label_pd, plan_t, point_t, set_sizes
   use errors, only: error_t
   use kinds, only: wp
   use hybrid_machine, only: hybrid_t
@@ -15,7 +15,9 @@ module branch_search
   use matrices, only: solve
   use orbit_search, only: find_orbits, found_t
   use orbit_sections, only: section_points
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_sequence
+  use part_of_branch, only: lies_on
+  use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, is_admissible, move_along, &
+    orbit_of_motion, orbit_t, same_sequence, scales_of_orbit
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -25,6 +27,8 @@ module branch_search
   !> How far along the critical direction the doubled orbit is looked for, in natural sizes; largest number of drive periods of an
   !> orbit that is followed after a doubling.
   real(wp), parameter :: doubled_at = 3e-3_wp
+  !> The same of a branch that crosses.
+  real(wp), parameter :: crossed_at = 4e-3_wp
   !> Nearness to a doubling, in multiplier and as a share of the range, at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-3_wp
 
@@ -40,6 +44,8 @@ module branch_search
     !> Branches that are followed at most.
     integer :: most_branches = 60
     integer :: seeds = 0
+    !> Whether any orbit that was found depends on the parameter.
+    logical :: depends = .false.
     type(branch_t), allocatable :: branches(:)
     !> Rows that give place and speed of what is watched from a section point; whether the section is a time of the drive.
     real(wp), allocatable :: watch(:, :)
@@ -73,10 +79,14 @@ contains
     integer, intent(in) :: i
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
+    integer :: k
     allocate (search%found(i)%orbits(0))
     call machine_neighbourhood(search%family, search%values(i), machines, error)
     if (allocated(error)) return
     call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i))
+    do k = 1, size(search%found(i)%orbits)
+      search%depends = search%depends .or. depends_on_parameter(machines, search%found(i)%orbits(k))
+    end do
   end subroutine search_value
 
   !> Follows every seed that is on no branch yet, value by value, and the doubled orbits of what is found.
@@ -93,11 +103,29 @@ contains
     do i = 1, size(seeds)
       do k = 1, size(seeds(i)%orbits)
         if (size(search%branches) >= search%most_branches) exit
-        if (.not. is_known(search, i, seeds(i)%orbits(k))) call follow(search, seeds(i)%orbits(k))
+        if (.not. is_known(search, i, seeds(i)%orbits(k))) call follow_new(search, seeds(i)%orbits(k))
       end do
     end do
+    call leave_out_parts(search)
     call join_doublings(search)
   end subroutine follow_seeds
+
+  !> Leaves out branches that lie on another one: one may end, for want of points or of a sequence of events, where the other
+  !> goes on.
+  subroutine leave_out_parts(search)
+    type(search_t), intent(inout) :: search
+    logical :: kept(size(search%branches))
+    integer :: b, c
+    kept = .true.
+    do b = 1, size(kept)
+      do c = 1, size(kept)
+        if (c == b .or. .not. kept(c)) cycle
+        kept(b) = .not. lies_on(search%branches(b), search%branches(c), search%family)
+        if (.not. kept(b)) exit
+      end do
+    end do
+    search%branches = pack(search%branches, kept)
+  end subroutine leave_out_parts
 
   !> Whether an orbit at the value number `i` is on a branch.
   logical function is_known(search, i, orbit) result(known)
@@ -120,27 +148,70 @@ contains
     end do
   end function is_known
 
-  !> Follows one orbit, notes where its branch passes the values of the search, and follows what doubles.
+  !> Follows one orbit, notes where its branch passes the values of the search, and follows what doubles and what crosses.
   recursive subroutine follow(search, seed)
     type(search_t), intent(inout) :: search
     type(orbit_t), intent(in) :: seed
     type(branch_t) :: found
-    type(orbit_t) :: doubled
-    integer :: i
+    type(orbit_t) :: other
+    integer :: i, side
     logical :: ok
     call trace_branch(search%family, search%plan, seed, found)
     search%branches = [search%branches, found]
     call note_passages(search, found)
     do i = 1, size(found%points)
-      if (found%points(i)%label /= label_pd) cycle
-      if (2*seed%periods > search%longest_followed .or. size(search%branches) >= search%most_branches) cycle
-      ! The end of a branch in the doubling that it came from has a multiplier +1.
-      if (minval(abs(found%points(i)%orbit%multipliers + 1)) > 1e-3_wp) cycle
-      call double(search, found%points(i)%orbit, doubled, ok)
-      if (ok) ok = .not. on_branch(search, doubled)
-      if (ok) call follow(search, doubled)
+      select case (found%points(i)%label)
+      case (label_pd)
+        ! The end of a branch in the doubling that it came from has a multiplier +1.
+        if (minval(abs(found%points(i)%orbit%multipliers + 1)) > 1e-3_wp) cycle
+        if (2*seed%periods > search%longest_followed) cycle
+        call double(search, found%points(i)%orbit, other, ok)
+        if (ok) call follow_new(search, other)
+      case (label_bp)
+        do side = 1, -1, -2
+          call cross(search, found%points(i), side, other, ok)
+          if (ok) call follow_new(search, other)
+        end do
+      end select
     end do
   end subroutine follow
+
+  !> Follows an orbit that is on no branch yet.
+  recursive subroutine follow_new(search, orbit)
+    type(search_t), intent(inout) :: search
+    type(orbit_t), intent(in) :: orbit
+    if (size(search%branches) >= search%most_branches) return
+    if (.not. on_branch(search, orbit)) call follow(search, orbit)
+  end subroutine follow_new
+
+  !> An orbit of the branch that crosses at a branch point, on one side of it, corrected across its direction.
+  subroutine cross(search, point, side, other, ok)
+    type(search_t), intent(in) :: search
+    type(point_t), intent(in) :: point
+    integer, intent(in) :: side
+    type(orbit_t), intent(out) :: other
+    logical, intent(out) :: ok
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    real(wp) :: direction(size(point%tangent)), sizes(size(point%tangent))
+    integer :: tries
+    ok = .false.
+    call machine_neighbourhood(search%family, point%orbit%parameter, machines, error)
+    if (allocated(error)) return
+    do tries = 0, 2
+      other = point%orbit
+      call crossing_direction(machines, other, search%family%parameter_size, point%tangent, direction, ok)
+      if (.not. ok) return
+      sizes = scales_of_orbit(machines, other, search%family%parameter_size)
+      call move_along(other, side*crossed_at*4**tries*direction*sizes)
+      call machine_neighbourhood(search%family, other%parameter, machines, error)
+      if (allocated(error)) return
+      call correct_orbit(search%family, machines, other, direction, ok)
+      if (ok) ok = is_admissible(machines, other)
+      if (ok) return
+      call machine_neighbourhood(search%family, point%orbit%parameter, machines, error)
+    end do
+  end subroutine cross
 
   !> Puts the ends of branches that are in a doubling where it was located on the branch of half the period: the equations are
   !> singular there.
@@ -189,7 +260,6 @@ contains
       do i = 1, size(found%points) - 1
         associate (one => found%points(i)%orbit, next => found%points(i + 1)%orbit, value => search%values(k))
           if (.not. (one%parameter - value)*(next%parameter - value) <= 0) cycle
-          if (.not. same_sequence(one, next)) cycle
           orbit = one
           if (abs(next%parameter - value) < abs(one%parameter - value)) orbit = next
           orbit%parameter = value
@@ -211,7 +281,7 @@ contains
     type(error_t), allocatable :: error
     type(orbit_t) :: there
     real(wp) :: points(size(orbit%y), orbit%periods)
-    integer :: b, i, k
+    integer :: b, i, k, end_of
     logical :: ok
     known = .false.
     call machine_neighbourhood(search%family, orbit%parameter, machines, error)
@@ -222,15 +292,16 @@ contains
         if (line(1)%orbit%periods /= orbit%periods) cycle
         do i = 1, size(line) - 1
           if (.not. (line(i)%orbit%parameter - orbit%parameter)*(line(i + 1)%orbit%parameter - orbit%parameter) <= 0) cycle
-          if (.not. same_sequence(line(i)%orbit, line(i + 1)%orbit)) cycle
-          there = line(i)%orbit
-          there%parameter = orbit%parameter
-          call correct_orbit(search%family, machines, there, direct(there, 1), ok)
-          if (.not. ok) cycle
-          do k = 1, orbit%periods
-            known = known .or. norm2((points(:, k) - there%y)/machines%centre%size_of) < 1e-6_wp
+          do end_of = 0, 1
+            there = line(i + end_of)%orbit
+            there%parameter = orbit%parameter
+            call correct_orbit(search%family, machines, there, direct(there, 1), ok)
+            if (.not. ok) cycle
+            do k = 1, orbit%periods
+              known = known .or. norm2((points(:, k) - there%y)/machines%centre%size_of) < 1e-6_wp
+            end do
+            if (known) return
           end do
-          if (known) return
         end do
       end associate
     end do
@@ -245,7 +316,7 @@ contains
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
     real(wp), allocatable :: along(:), sizes(:), direction(:)
-    integer :: side
+    integer :: side, tries
     ok = .false.
     call machine_neighbourhood(search%family, orbit%parameter, machines, error)
     if (allocated(error)) return
@@ -253,17 +324,31 @@ contains
     along = doubling_direction(orbit%matrix)/sizes
     along = along/norm2(along)
     do side = 1, -1, -2
-      call orbit_of_motion(machines, orbit%parameter, orbit%y + side*doubled_at*along*sizes, 2*orbit%periods, doubled, ok)
-      if (.not. ok) cycle
-      allocate (direction(size(along) + size(doubled%events) + 1), source=0.0_wp)
-      direction(:size(along)) = along
-      call correct_orbit(search%family, machines, doubled, direction, ok)
-      deallocate (direction)
-      if (ok) ok = is_admissible(machines, doubled)
-      if (ok) ok = abs(doubled%parameter - orbit%parameter) < 0.1_wp*search%family%parameter_size
-      if (ok) return
+      do tries = 0, 2
+        ! Newton's method may have left the range of the parameter.
+        call machine_neighbourhood(search%family, orbit%parameter, machines, error)
+        call orbit_of_motion(machines, orbit%parameter, orbit%y + side*doubled_at/3**tries*along*sizes, 2*orbit%periods, &
+                             doubled, ok)
+        if (.not. ok) cycle
+        allocate (direction(size(along) + size(doubled%events) + 1), source=0.0_wp)
+        direction(:size(along)) = along
+        call correct_orbit(search%family, machines, doubled, direction, ok)
+        deallocate (direction)
+        if (ok) ok = is_admissible(machines, doubled) .and. .not. is_repeated(machines, doubled)
+        if (ok) ok = abs(doubled%parameter - orbit%parameter) < 0.1_wp*search%family%parameter_size
+        if (ok) return
+      end do
     end do
   end subroutine double
+
+  !> Whether the second half of an orbit is the first once more.
+  pure logical function is_repeated(machines, orbit)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(in) :: orbit
+    real(wp) :: points(size(orbit%y), orbit%periods)
+    points = section_points(machines, orbit)
+    is_repeated = norm2((points(:, 1 + orbit%periods/2) - points(:, 1))/machines%centre%size_of) < 1e-2_wp*doubled_at
+  end function is_repeated
 
   !> The direction e of (M + 1) e = 0: of two coordinates across the larger row of M + 1, of more by inverse iteration.
   pure function doubling_direction(m) result(along)

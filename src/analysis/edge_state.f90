@@ -6,16 +6,16 @@
 !> tracking by bisection: J. D. Skufca, J. A. Yorke, B. Eckhardt, Phys. Rev. Lett. 96 (2006).
 module edge_state
   use attractors, only: attractor_t
-  use body_events, only: events_of_body
-  use hybrid_machine, only: event_t
+  use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use motion, only: advance_period, start_state
-  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, log_t, &
-    open_log, state_t, tally_t
-  use one_body, only: one_body_t
+  use machine_family, only: fly_sections, fly_to_section, nearest_copy, strobe_of_section
+  use motion, only: motion_t
+  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
+    event_touch_lower, event_touch_upper, tally_t
   use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance
-  use start_label, only: label_start
-  use trajectory, only: span_t
+  use start_label, only: label_from, label_not_known, label_of
+  use strobe, only: strobe_t
+  use trajectory, only: outcome_t, run_trajectory, span_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -43,60 +43,70 @@ module edge_state
   !> It has come to a saddle at this distance; it has not where the distance grows so many times, or after so many periods.
   real(wp), parameter :: arrived = 1e-5_wp, moved_off = 20
   integer, parameter :: most_waiting = 60
+  !> Halvings of the way between two starts.
+  integer, parameter :: start_halvings = 10
   !> A pair leaves a saddle that it has come as near to as `near_saddle`, up to the distance `left_saddle`, on two sides.
   real(wp), parameter :: near_saddle = 3e-3_wp, left_saddle = 2e-2_wp
 
-  !> Two motions, one on either side of a boundary, on the section or at their starts.
+  !> What labels a motion: the machine, its trajectories, and the attractors that they may come to.
+  type, public :: labeller_t
+    type(motion_t) :: moving
+    type(attractor_t), allocatable :: catalogue(:)
+    type(span_t) :: span
+  end type labeller_t
+
+  !> Two motions, one on either side of a boundary: section points (columns), or, before the first section, starts as
+  !> `start_strobe` has them.
   type :: pair_t
-    type(state_t) :: states(2)
+    real(wp), allocatable :: points(:, :)
+    logical :: on_section = .false.
     integer :: labels(2) = 0
   end type pair_t
 
 contains
 
-  !> Follows the pair that starts at the columns of `starts` (x, v, crank angle) with `labels`, halving its distance by the labels
-  !> whenever it grows. `edge` is one of the codes above; `saddle` is the orbit where it is `edge_saddle`.
-  pure subroutine track_edge(machines, body, catalogue, span, starts, labels, edge, saddle)
+  !> Follows the pair that starts at the columns of `starts` with `labels`, halving its distance by the labels whenever it grows.
+  !> `edge` is one of the codes above; `saddle` is the orbit where it is `edge_saddle`.
+  pure subroutine track_edge(machines, labeller, starts, labels, edge, saddle)
     type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(span_t), intent(in) :: span
-    real(wp), intent(in) :: starts(3, 2)
+    type(labeller_t), intent(in) :: labeller
+    real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: labels(2)
     integer, intent(out) :: edge
     type(saddle_t), intent(out) :: saddle
     type(pair_t) :: pair, before
-    real(wp) :: past(2, most_periods), least, distance, first_distance
+    real(wp) :: past(machines%centre%n, most_periods), least, distance, first_distance, gap
     integer :: n, event, waiting
     logical :: ok
     edge = edge_not_known
     waiting = 0
-    pair%labels = labels
-    pair%states(1) = start_state(body%moving, starts(1, 1), starts(2, 1), starts(3, 1))
-    pair%states(2) = start_state(body%moving, starts(1, 2), starts(2, 2), starts(3, 2))
+    pair = pair_t(starts, .false., labels)
     least = huge(least)
     do n = 1, most_periods
-      if (n > 1 .and. gap_of(body, pair) > apart) then
-        call bring_together(body, catalogue, span, together, pair, ok)
+      if (n > 1) then
+        if (gap_of(machines%centre, pair) > apart) call bring_together(machines%centre, labeller, together, pair, ok)
         if (.not. ok) return
       end if
       before = pair
-      call advance_pair(body, pair, event, ok)
+      call advance_pair(machines%centre, pair, event, ok)
       if (.not. ok) return
-      if (gap_of(body, pair) > parted .or. (event /= 0 .and. gap_of(body, pair) > sudden*max(gap_of(body, before), together))) then
-        call look_closer(body, catalogue, span, before, pair, event, ok)
+      gap = gap_of(machines%centre, pair)
+      if (gap > parted .or. (event /= 0 .and. gap > sudden*gap_before(machines%centre, before))) then
+        call look_closer(machines%centre, labeller, before, pair, event, ok)
         if (ok) edge = edge_of_event(event)
-        if (ok .or. gap_of(body, pair) > parted) return
+        if (ok .or. gap_of(machines%centre, pair) > parted) return
+        ok = .true.
       end if
-      past(:, n) = (point_of(pair, 1) + point_of(pair, 2))/2
+      past(:, n) = pair%points(:, 1) + (nearest_copy(machines%centre, pair%points(:, 2), pair%points(:, 1)) - pair%points(:, 1))/2
       if (waiting == 0) then
-        call try_returns(machines, body, past(:, :n), least, saddle, ok)
-        if (.not. ok) cycle
-        waiting = n
-        first_distance = distance_to_saddle(body, saddle, past(:, n))
+        call try_returns(machines, past(:, :n), least, saddle, ok)
+        if (ok) first_distance = distance_to_saddle(machines%centre, saddle, past(:, n))
+        if (ok) waiting = n
+        ok = .true.
       end if
+      if (waiting == 0) cycle
       ! Near to a saddle once is not enough: the pair has to come to it.
-      distance = distance_to_saddle(body, saddle, past(:, n))
+      distance = distance_to_saddle(machines%centre, saddle, past(:, n))
       if (distance < arrived) edge = edge_saddle
       if (edge == edge_saddle) return
       if (distance > moved_off*first_distance .or. n > waiting + most_waiting) waiting = 0
@@ -104,35 +114,38 @@ contains
     if (least > far) edge = edge_recurrent
   end subroutine track_edge
 
+  !> Distance from which a pair has grown; of starts the least that is looked at.
+  pure real(wp) function gap_before(machine, pair) result(gap)
+    class(hybrid_t), intent(in) :: machine
+    type(pair_t), intent(in) :: pair
+    gap = together
+    if (pair%on_section) gap = max(gap, gap_of(machine, pair))
+  end function gap_before
+
   !> A pair has parted within one period: with its distance before made a thousandth, or less, does it part as much? Then the map is
   !> discontinuous there, and `event` is what only one of the two has.
-  pure subroutine look_closer(body, catalogue, span, before, pair, event, discontinuous)
-    type(one_body_t), intent(in) :: body
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(span_t), intent(in) :: span
+  pure subroutine look_closer(machine, labeller, before, pair, event, discontinuous)
+    class(hybrid_t), intent(in) :: machine
+    type(labeller_t), intent(in) :: labeller
     type(pair_t), intent(in) :: before
     type(pair_t), intent(inout) :: pair
     integer, intent(inout) :: event
     logical, intent(out) :: discontinuous
     type(pair_t) :: closer
     real(wp) :: gap
-    discontinuous = .false.
-    ! Only pairs on the section can be halved.
-    if (before%states(1)%time > 0) return
     closer = before
-    call bring_together(body, catalogue, span, closest, closer, discontinuous)
+    call bring_together(machine, labeller, closest, closer, discontinuous)
     if (.not. discontinuous) return
-    gap = gap_of(body, pair)
-    call advance_pair(body, closer, event, discontinuous)
+    gap = gap_of(machine, pair)
+    call advance_pair(machine, closer, event, discontinuous)
     if (.not. discontinuous) return
-    discontinuous = event /= 0 .and. gap_of(body, closer) > gap/3
+    discontinuous = event /= 0 .and. gap_of(machine, closer) > gap/3
     pair = closer
   end subroutine look_closer
 
   !> Looks for the nearest return among the last points; from a near one Newton's method, whose orbit is to be near.
-  pure subroutine try_returns(machines, body, past, least, saddle, found)
+  pure subroutine try_returns(machines, past, least, saddle, found)
     type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
     real(wp), intent(in) :: past(:, :)
     real(wp), intent(inout) :: least
     type(saddle_t), intent(out) :: saddle
@@ -142,80 +155,112 @@ contains
     found = .false.
     n = size(past, 2)
     do p = 1, min(longest, n - 1)
-      distance = section_distance(body, past(:, n - p), past(:, n))
+      distance = section_distance(machines%centre, past(:, n - p), past(:, n))
       if (n > most_periods/2) least = min(least, distance)
       if (distance > near_return) cycle
-      call find_saddle(machines, body, past(:, n), p, saddle, found)
-      if (found) found = distance_to_saddle(body, saddle, past(:, n)) <= 10*distance + together
+      call find_saddle(machines, past(:, n), p, saddle, found)
+      if (found) found = distance_to_saddle(machines%centre, saddle, past(:, n)) <= 10*distance + together
       if (found) return
     end do
   end subroutine try_returns
 
-  pure function point_of(pair, side) result(point)
+  !> Distance of a pair on the section.
+  pure real(wp) function gap_of(machine, pair) result(gap)
+    class(hybrid_t), intent(in) :: machine
     type(pair_t), intent(in) :: pair
-    integer, intent(in) :: side
-    real(wp) :: point(2)
-    point = [pair%states(side)%x, pair%states(side)%v]
-  end function point_of
-
-  pure real(wp) function gap_of(body, pair) result(gap)
-    type(one_body_t), intent(in) :: body
-    type(pair_t), intent(in) :: pair
-    gap = section_distance(body, point_of(pair, 1), point_of(pair, 2))
+    gap = section_distance(machine, pair%points(:, 1), pair%points(:, 2))
   end function gap_of
 
-  !> Halves the way between the two on the section, by the labels, down to a distance. `ok` is false where the labels are not
-  !> those of the pair, or a third is met.
-  pure subroutine bring_together(body, catalogue, span, goal, pair, ok)
-    type(one_body_t), intent(in) :: body
-    type(attractor_t), intent(in) :: catalogue(:)
-    type(span_t), intent(in) :: span
+  !> Label of a section point, or of a start.
+  pure integer function label_at(machine, labeller, on_section, point) result(label)
+    class(hybrid_t), intent(in) :: machine
+    type(labeller_t), intent(in) :: labeller
+    logical, intent(in) :: on_section
+    real(wp), intent(in) :: point(:)
+    type(outcome_t) :: outcome
+    type(strobe_t) :: strobe
+    logical :: ok
+    if (on_section) then
+      call strobe_of_section(machine, labeller%moving, point, strobe, ok)
+      label = label_not_known
+      if (ok) label = label_from(labeller%moving, labeller%catalogue, labeller%span, strobe)
+    else
+      call run_trajectory(labeller%moving, labeller%catalogue, labeller%span, point(1), point(2), point(3), outcome, &
+                          others=point(4:))
+      label = label_of(outcome)
+    end if
+  end function label_at
+
+  !> Halves the way between the two, by the labels: on the section down to the distance `goal`, of starts to a thousandth. `ok` is
+  !> false where the labels are not those of the pair, or a third is met.
+  pure subroutine bring_together(machine, labeller, goal, pair, ok)
+    class(hybrid_t), intent(in) :: machine
+    type(labeller_t), intent(in) :: labeller
     real(wp), intent(in) :: goal
     type(pair_t), intent(inout) :: pair
     logical, intent(out) :: ok
-    real(wp) :: points(2, 2), middle(2)
-    integer :: side, label
+    real(wp) :: points(size(pair%points, 1), 2), middle(size(pair%points, 1))
+    integer :: side, label, halvings, i
+    points = pair%points
     do side = 1, 2
-      points(:, side) = point_of(pair, side)
-      ok = label_start(body%moving, catalogue, span, [points(:, side), 0.0_wp]) == pair%labels(side)
+      ok = label_at(machine, labeller, pair%on_section, points(:, side)) == pair%labels(side)
       if (.not. ok) return
     end do
-    do while (section_distance(body, points(:, 1), points(:, 2)) > goal)
+    halvings = start_halvings
+    if (pair%on_section) halvings = ceiling(log(max(1.0_wp, gap_of(machine, pair)/goal))/log(2.0_wp))
+    do i = 1, halvings
       middle = points(:, 1) + (points(:, 2) - points(:, 1))/2
       if (all(abs(middle - points(:, 1)) <= 0) .or. all(abs(middle - points(:, 2)) <= 0)) exit
-      label = label_start(body%moving, catalogue, span, [middle, 0.0_wp])
+      label = label_at(machine, labeller, pair%on_section, middle)
       ok = any(pair%labels == label)
       if (.not. ok) return
       points(:, findloc(pair%labels, label, 1)) = middle
     end do
-    do side = 1, 2
-      pair%states(side) = start_state(body%moving, points(1, side), points(2, side), 0.0_wp)
-    end do
+    pair%points = points
   end subroutine bring_together
 
   !> Moves both to the next section. `event` is the first that only one of them has, 0 if they have the same.
-  pure subroutine advance_pair(body, pair, event, ok)
-    type(one_body_t), intent(in) :: body
+  pure subroutine advance_pair(machine, pair, event, ok)
+    class(hybrid_t), intent(in) :: machine
     type(pair_t), intent(inout) :: pair
     integer, intent(out) :: event
     logical, intent(out) :: ok
     type(event_t), allocatable :: events(:), others(:)
+    real(wp) :: images(machine%n, 2)
     integer :: k
     event = 0
-    call advance_one(body, pair%states(1), events, ok)
-    if (ok) call advance_one(body, pair%states(2), others, ok)
+    call advance_one(machine, pair, 1, images(:, 1), events, ok)
+    if (ok) call advance_one(machine, pair, 2, images(:, 2), others, ok)
     if (.not. ok) return
+    pair = pair_t(images, .true., pair%labels)
     do k = 1, max(size(events), size(others))
       if (k > size(events)) then
         event = others(k)%kind
       else if (k > size(others)) then
         event = events(k)%kind
-      else if (events(k)%kind /= others(k)%kind .or. events(k)%side /= others(k)%side) then
+      else if (events(k)%kind /= others(k)%kind .or. events(k)%side /= others(k)%side .or. &
+               events(k)%joint /= others(k)%joint) then
         event = rarer(events(k)%kind, others(k)%kind)
       end if
       if (event /= 0) return
     end do
   end subroutine advance_pair
+
+  pure subroutine advance_one(machine, pair, side, image, events, ok)
+    class(hybrid_t), intent(in) :: machine
+    type(pair_t), intent(in) :: pair
+    integer, intent(in) :: side
+    real(wp), intent(out) :: image(:)
+    type(event_t), allocatable, intent(out) :: events(:)
+    logical, intent(out) :: ok
+    type(tally_t) :: tally
+    integer :: mode
+    if (pair%on_section) then
+      call fly_sections(machine, pair%points(:, side), 1, .true., image, events, mode, tally, ok)
+    else
+      call fly_to_section(machine, pair%points(:, side), image, events, ok)
+    end if
+  end subroutine advance_one
 
   !> Of two events at the same place of two sequences the one that tells them apart: chatter, then sticking, then an impact.
   pure integer function rarer(one, other) result(event)
@@ -230,7 +275,7 @@ contains
       rank = 3
     case (event_stick)
       rank = 2
-    case (event_impact_lower, event_impact_upper)
+    case (event_impact_lower, event_impact_upper, event_touch_lower, event_touch_upper)
       rank = 1
     case default
       rank = 0
@@ -243,57 +288,39 @@ contains
     edge = edges(rank_of(event))
   end function edge_of_event
 
-  pure subroutine advance_one(body, state, events, ok)
-    type(one_body_t), intent(in) :: body
-    type(state_t), intent(inout) :: state
-    type(event_t), allocatable, intent(out) :: events(:)
-    logical, intent(out) :: ok
-    type(state_t) :: start
-    type(tally_t) :: tally
-    type(log_t) :: log
-    integer :: reason, mode
-    call open_log(log, 0.0_wp)
-    log%book%kept = .false.
-    start = state
-    call advance_period(body%moving, state, tally, reason, log)
-    ok = reason == 0
-    if (ok) call events_of_body(body, start, log, state, .true., events, mode)
-  end subroutine advance_one
-
   !> Whether a pair, followed without halving, comes near to a saddle and leaves it on two sides: then it started on its stable set.
   !> `number` is that of the saddle, 0 for none.
-  pure subroutine reaches_saddle(body, saddles, starts, number)
-    type(one_body_t), intent(in) :: body
+  pure subroutine reaches_saddle(machine, saddles, starts, number)
+    class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddles(:)
-    real(wp), intent(in) :: starts(3, 2)
+    real(wp), intent(in) :: starts(:, :)
     integer, intent(out) :: number
     type(pair_t) :: pair
-    real(wp) :: nearest(size(saddles)), distance
-    integer :: n, k, side, reason
-    type(tally_t) :: tally
+    type(event_t), allocatable :: events(:)
+    real(wp) :: nearest(size(saddles)), distance, images(machine%n, 2)
+    integer :: n, k, side
+    logical :: ok
     number = 0
-    do side = 1, 2
-      pair%states(side) = start_state(body%moving, starts(1, side), starts(2, side), starts(3, side))
-    end do
+    pair = pair_t(starts, .false.)
     nearest = huge(nearest)
     do n = 1, most_periods
       do side = 1, 2
-        tally = tally_t()
-        call advance_period(body%moving, pair%states(side), tally, reason)
-        if (reason /= 0) return
+        call advance_one(machine, pair, side, images(:, side), events, ok)
+        if (.not. ok) return
       end do
+      pair = pair_t(images, .true.)
       do k = 1, size(saddles)
-        distance = maxval([(distance_to_saddle(body, saddles(k), point_of(pair, side)), side=1, 2)])
+        distance = maxval([(distance_to_saddle(machine, saddles(k), images(:, side)), side=1, 2)])
         if (distance < nearest(k)) then
           nearest(k) = distance
         else if (nearest(k) < near_saddle .and. distance > left_saddle) then
           ! It leaves: the two together, or each to its side.
-          if (gap_of(body, pair) > distance/2) number = k
+          if (gap_of(machine, pair) > distance/2) number = k
           if (number > 0) return
           nearest(k) = huge(nearest)
         end if
       end do
-      if (gap_of(body, pair) > 1) return
+      if (gap_of(machine, pair) > 1) return
     end do
   end subroutine reaches_saddle
 

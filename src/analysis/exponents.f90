@@ -8,8 +8,9 @@ module exponents
   use elementary, only: logarithm
   use hybrid_machine, only: event_t
   use kinds, only: int64, wp
+  use motion, only: advance_period
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
-    event_turning_point, log_t, open_log, state_t
+    event_turning_point, log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
   use variations, only: neighbourhood_t
   implicit none
@@ -75,6 +76,8 @@ contains
       call open_log(log, 0.0_wp)
       log%book%kept = .false.
       spectrum%has_sum = has_exact_sum(body)
+      call fly_to_section(body, state, log, spectrum%known)
+      if (.not. spectrum%known) return
       do i = 1 - transient, periods
         call vary_period(machines, body, state, log, events, by_start, spectrum%known)
         if (.not. spectrum%known) return
@@ -91,7 +94,7 @@ contains
         if (i < 1) cycle
         dead = dead .or. .not. growth > 0
         determinant = abs(by_start(1, 1)*by_start(2, 2) - by_start(1, 2)*by_start(2, 1))
-        singular = singular .or. .not. determinant > 0 .or. any(loses_direction(events%kind))
+        singular = singular .or. .not. determinant > 0 .or. any(loses_direction(events))
         part = 1 + int((int(i - 1, int64)*batches)/periods)
         if (growth > 0) batch(part) = batch(part) + logarithm(growth)
         if (determinant > 0) lost(part) = lost(part) + logarithm(determinant)
@@ -106,10 +109,26 @@ contains
     spectrum%mean_period = machines%centre%period
   end subroutine lyapunov_exponents
 
-  !> Whether an event leaves less of the start than came to it: sticking one direction, completed chatter none.
-  pure elemental logical function loses_direction(kind)
-    integer, intent(in) :: kind
-    loses_direction = kind == event_stick .or. kind == event_chatter_upper .or. kind == event_chatter_lower
+  !> Moves a body that starts at another crank angle on to the first section.
+  subroutine fly_to_section(body, state, log, ok)
+    type(one_body_t), intent(in) :: body
+    type(state_t), intent(inout) :: state
+    type(log_t), intent(inout) :: log
+    logical, intent(out) :: ok
+    type(tally_t) :: tally
+    integer :: reason
+    ok = .true.
+    if (.not. state%time > 0) return
+    call advance_period(body%moving, state, tally, reason, log)
+    ok = reason == 0
+  end subroutine fly_to_section
+
+  !> Whether an event leaves less of the start than came to it: sticking and an impact without rebound one direction, completed
+  !> chatter none.
+  pure elemental logical function loses_direction(event)
+    type(event_t), intent(in) :: event
+    loses_direction = any(event%kind == [event_stick, event_chatter_upper, event_chatter_lower]) .or. &
+      (any(event%kind == [event_impact_upper, event_impact_lower]) .and. .not. abs(event%departure(2)) > 0)
   end function loses_direction
 
   !> Means and standard errors of the batches.

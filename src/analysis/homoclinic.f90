@@ -162,11 +162,11 @@ contains
     type is (one_body_t)
       beside%body = body
     end select
-    call find_saddle(machines, beside%body, guess, periods, beside%saddle, ok)
+    call find_saddle(machines, guess, periods, beside%saddle, ok)
     if (ok) ok = distance_to_saddle(beside%body, beside%saddle, guess) < 0.1_wp
-    if (ok) ok = beside%saddle%multipliers(1) > 1 + least_growth
+    if (ok) ok = real(beside%saddle%multipliers(1)) > 1 + least_growth
     if (.not. ok) return
-    beside%growth = beside%saddle%multipliers(1)
+    beside%growth = real(beside%saddle%multipliers(1), wp)
     associate (m => beside%saddle%matrix, sizes => beside%body%size_of)
       first = [m(1, 2), beside%growth - m(1, 1)]
       second = [beside%growth - m(2, 2), m(2, 1)]

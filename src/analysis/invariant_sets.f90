@@ -118,7 +118,7 @@ contains
     real(wp), intent(in) :: low(2), high(2)
     type(growth_t), intent(out) :: growth
     real(wp) :: root, first(2), second(2)
-    root = saddle%multipliers(merge(2, 1, stable))
+    root = real(saddle%multipliers(merge(2, 1, stable)), wp)
     associate (m => saddle%matrix)
       first = [m(1, 2), root - m(1, 1)]
       second = [root - m(2, 2), m(2, 1)]

@@ -145,12 +145,41 @@ contains
         margin%value = -rate*size_of(1)/size_of(2)/force
       end select
       list = [list, margin]
+      if (is_dead_impact(machine, event)) list = [list, rest_or_return(machine, event, k)]
       if (k == 1) return
       margin = margin_t(event=k, side=event%side, time=event%time, kind=of_order, &
                         value=(event%time - orbit%events(k - 1)%time)/machine%period)
       list = [list, margin]
     end associate
   end subroutine add_event
+
+  !> Whether an event is an impact without rebound.
+  pure logical function is_dead_impact(machine, event) result(dead)
+    type(one_body_t), intent(in) :: machine
+    type(event_t), intent(in) :: event
+    real(wp) :: after(states), by_state(states, states), by_time(states)
+    dead = is_impact(event%kind)
+    if (.not. dead) return
+    call machine%jump(event, event%time, event%arrival(:states), after, by_state, by_time)
+    dead = .not. any(abs(by_state) > 0)
+  end function is_dead_impact
+
+  !> After the impact `k` without rebound: by how much the force is more than what keeps the body at the barrier where it goes
+  !> back, or less where it stays.
+  pure type(margin_t) function rest_or_return(machine, event, k) result(margin)
+    type(one_body_t), intent(in) :: machine
+    type(event_t), intent(in) :: event
+    integer, intent(in) :: k
+    type(event_t) :: probe
+    real(wp) :: value, by_state(states), rate
+    probe = event
+    probe%kind = event_barrier_release
+    probe%side = -event%side
+    call machine%guard(probe, event%time, event%departure(:states), value, by_state, rate)
+    margin = margin_t(event=k, side=event%side, time=event%time, kind=merge(of_stick, of_turning, rests_on_barrier(event%after)))
+    margin%value = value/max(machine%moving%machine%force_scale, tiny(1.0_wp))
+    if (margin%kind == of_turning) margin%value = -margin%value
+  end function rest_or_return
 
   !> Where the velocity passes zero within a flight the body turns short of a barrier; where its size has a least value, a slip
   !> in which friction acts may stop.

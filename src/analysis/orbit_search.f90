@@ -25,6 +25,8 @@ module orbit_search
   !> A motion has settled when it moves no further than this over a number of periods that every short one divides.
   real(wp), parameter :: at_rest = 1e-9_wp
   integer, parameter :: any_period = 12
+  !> A motion this near to a stable orbit, and coming nearer, is on it.
+  real(wp), parameter :: captured = 1e-5_wp
   !> An orbit whose map less 1 has a determinant below this is one of a family.
   real(wp), parameter :: neutral = 1e-8_wp
   !> Rate of change in natural sizes below which a motion is an equilibrium.
@@ -51,7 +53,7 @@ contains
     integer :: i, n
     if (.not. allocated(found%orbits)) allocate (found%orbits(0))
     do i = 1, size(starts, 2)
-      call settle(machines, starts(:, i), longest, settled, n)
+      call settle(machines, starts(:, i), longest, found, settled, n)
       if (n == 0 .or. is_found(machines, settled, n, found)) cycle
       call try_newton(family, machines, value, settled, n, found)
     end do
@@ -80,11 +82,12 @@ contains
     end do
   end function is_found
 
-  !> Where a motion is after many periods, and after how many it is back there (0: it is not).
-  subroutine settle(machines, start, longest, settled, periods)
+  !> Where a motion is after many periods, and after how many it is back there (0: it is not, or it has come to a known orbit).
+  subroutine settle(machines, start, longest, found, settled, periods)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: start(:)
     integer, intent(in) :: longest
+    type(found_t), intent(in) :: found
     real(wp), intent(out) :: settled(:)
     integer, intent(out) :: periods
     real(wp), dimension(size(start)) :: image, next, then
@@ -99,6 +102,7 @@ contains
       settled = next
       if (modulo(i, any_period) /= 0) cycle
       if (distance(machines, settled, then) < at_rest) exit
+      if (is_captured(machines, settled, then, found)) return
       then = settled
     end do
     image = settled
@@ -111,6 +115,22 @@ contains
       return
     end do
   end subroutine settle
+
+  !> Whether a motion that was at `before` a number of periods ago approaches a known stable orbit.
+  logical function is_captured(machines, point, before, found)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:), before(:)
+    type(found_t), intent(in) :: found
+    integer :: i
+    real(wp) :: near
+    is_captured = .false.
+    do i = 1, size(found%orbits)
+      if (maxval(abs(found%orbits(i)%multipliers)) >= 1) cycle
+      near = distance(machines, point, found%orbits(i)%y)
+      is_captured = near < captured .and. near < distance(machines, before, found%orbits(i)%y)
+      if (is_captured) return
+    end do
+  end function is_captured
 
   !> Image of a section point.
   subroutine image_of(machines, point, image, ok)
@@ -187,10 +207,8 @@ contains
       return
     end if
     if (.not. is_admissible(machines, orbit)) return
+    if (is_shorter(machines, orbit)) return
     points = section_points(machines, orbit)
-    do i = 2, periods
-      if (distance(machines, points(:, i), points(:, 1)) < same_orbit) return
-    end do
     do i = 1, size(found%orbits)
       if (found%orbits(i)%periods /= periods) cycle
       do k = 1, periods
@@ -200,6 +218,24 @@ contains
     found%orbits = [found%orbits, orbit]
     if (present(added)) added = .true.
   end subroutine add_orbit
+
+  !> Whether the motion of an orbit is back before its period is over: flown, since the points of a chatter are not on the orbit.
+  logical function is_shorter(machines, orbit)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(in) :: orbit
+    real(wp) :: point(size(orbit%y)), next(size(orbit%y))
+    logical :: ok
+    integer :: i
+    is_shorter = .false.
+    point = orbit%y
+    do i = 1, orbit%periods - 1
+      call image_of(machines, point, next, ok)
+      if (.not. ok) return
+      point = next
+      is_shorter = distance(machines, point, orbit%y) < same_orbit
+      if (is_shorter) return
+    end do
+  end function is_shorter
 
   !> Whether nothing moves on an orbit without a clock, in natural sizes; one that is all but at rest counts as well.
   pure logical function is_equilibrium(machines, orbit)

@@ -6,8 +6,9 @@
 module other_sequence
   use hybrid_machine, only: event_t
   use kinds, only: wp
-  use motion_state, only: event_impact_lower, event_impact_upper, event_release, event_separation, event_stick, &
-    event_touch_lower, event_touch_upper, event_turning_point, mode_slip_minus, mode_slip_plus, mode_stick
+  use motion_state, only: event_barrier_release, event_impact_lower, event_impact_upper, event_release, event_separation, &
+    event_stick, event_touch_lower, event_touch_upper, event_turning_point, mode_lower_barrier, mode_slip_minus, mode_slip_plus, &
+    mode_stick, mode_upper_barrier
   use one_body, only: one_body_t, turns_smoothly
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact, of_slip, of_stick, of_turning
   use periodic_orbit, only: orbit_t
@@ -37,6 +38,10 @@ contains
     case (of_gap)
       call put_impact_in(machine, margin, other, known)
     case (of_turning)
+      if (is_impact(orbit%events(k)%kind)) then
+        call rest_at_barrier(k, other)
+        return
+      end if
       other%events(k)%kind = event_stick
       other%events(k)%side = -orbit%events(k)%side
       other%events(k)%after = mode_stick
@@ -44,6 +49,12 @@ contains
                       orbit%events(k + 1:)]
     case (of_stick)
       known = k < size(orbit%events)
+      if (is_impact(orbit%events(k)%kind)) then
+        if (known) known = orbit%events(k + 1)%kind == event_barrier_release
+        if (known) other%events(k)%after = orbit%events(k + 1)%after
+        if (known) other%events = [other%events(:k), orbit%events(k + 2:)]
+        return
+      end if
       if (known) known = orbit%events(k + 1)%kind == event_release
       if (.not. known) return
       other%events(k)%kind = event_turning_point
@@ -62,6 +73,17 @@ contains
       known = .false.
     end select
   end subroutine change_sequence
+
+  !> The body stays where the impact `k` without rebound leaves it, until the force takes it back.
+  pure subroutine rest_at_barrier(k, other)
+    integer, intent(in) :: k
+    type(orbit_t), intent(inout) :: other
+    type(event_t) :: leave
+    leave = release_at(other%events(k)%time, -other%events(k)%side, other%events(k)%after)
+    leave%kind = event_barrier_release
+    other%events(k)%after = merge(mode_upper_barrier, mode_lower_barrier, other%events(k)%side > 0)
+    other%events = [other%events(:k), leave, other%events(k + 1:)]
+  end subroutine rest_at_barrier
 
   pure integer function slip_in(direction)
     integer, intent(in) :: direction

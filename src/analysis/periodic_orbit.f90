@@ -22,7 +22,7 @@ module periodic_orbit
   private
 
   public :: orbit_of_motion, correct_orbit, tangent_of, direct, same_sequence, is_admissible, scales_of_orbit, move_along, shoot, &
-    closing_time
+    closing_time, crossing_direction, depends_on_parameter, set_multipliers
 
   !> Orbits with more events are not followed.
   integer, parameter, public :: most_events = 60
@@ -217,8 +217,8 @@ contains
       if (.not. ok) return
       ! It has come as near as rounding lets it.
       if (length < 1e-14_wp .or. (length < converged_step .and. length >= 0.1_wp*before)) exit
-      ! Or what the next step would be is nil, the steps shrinking with the square; of several bodies near a graze they do not yet.
-      ok = size(orbit%y) == 2 .and. length < 1e-7_wp .and. length*(length/before)**2 < 1e-17_wp
+      ! Or what the next step would be is nil, even if the steps shrink no faster than so far: beside a graze they do so late.
+      ok = i > 1 .and. length*(length/before) < 1e-15_wp
       if (ok) exit
     end do
     ok = ok .or. length < converged_step
@@ -286,6 +286,44 @@ contains
     call solve(slopes, right, tangent, ok)
     if (ok) tangent = tangent/norm2(tangent)
   end subroutine tangent_of
+
+  !> Direction of the branch that crosses at a branch point: the equations and `tangent` leave it free. A unit vector in natural
+  !> sizes across the tangent.
+  pure subroutine crossing_direction(machines, orbit, parameter_size, tangent, direction, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(inout) :: orbit
+    real(wp), intent(in) :: parameter_size, tangent(:)
+    real(wp), intent(out) :: direction(:)
+    logical, intent(out) :: ok
+    real(wp) :: miss(size(tangent)), slopes(size(tangent), size(tangent)), next(size(tangent))
+    integer :: i, n
+    n = size(tangent)
+    call equations(machines, orbit, scales_of_orbit(machines, orbit, parameter_size), miss(:n - 1), slopes(:n - 1, :))
+    slopes(n, :) = tangent
+    direction = [(1/(1 + 0.3_wp*i), i=1, n)]
+    do i = 1, 3
+      call solve(slopes, direction, next, ok)
+      if (.not. ok) return
+      direction = next/norm2(next)
+    end do
+    direction = direction - tangent*sum(tangent*direction)
+    ok = norm2(direction) > 0.5_wp
+    direction = direction/norm2(direction)
+  end subroutine crossing_direction
+
+  !> Whether an orbit depends on the parameter at all, to the bit.
+  pure logical function depends_on_parameter(machines, orbit) result(depends)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(in) :: orbit
+    real(wp) :: own(size(orbit%y) + size(orbit%events)), near(size(own))
+    integer :: i
+    call shoot_only(machines%centre, orbit, own)
+    depends = .false.
+    do i = 1, size(machines%near)
+      call shoot_only(machines%near(i), orbit, near)
+      depends = depends .or. any(abs(near - own) > 0)
+    end do
+  end function depends_on_parameter
 
   !> The direction along the parameter alone, upwards or downwards.
   pure function direct(orbit, way) result(along)

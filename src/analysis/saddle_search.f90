@@ -1,15 +1,16 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Saddle orbits of one body: Newton's method on the stroboscopic map with its exact derivative, from points of the section.
+!> Saddle orbits of a machine: Newton's method on the map from section to section with its exact derivative, from points of the
+!> section.
 module saddle_search
-  use body_family, only: map_with_variation
-  use circle, only: point_near
   use event_words, only: canonical_word
+  use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: int64, wp
-  use matrices, only: eigenvalues, solve
+  use machine_family, only: fly_sections, map_with_variation, nearest_copy, watched_rows, within_stops
+  use matrices, only: solve
   use motion_state, only: tally_t
-  use one_body, only: one_body_t
+  use multipliers, only: multipliers_of
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -21,129 +22,145 @@ module saddle_search
   real(wp), parameter :: longest_step = 0.3_wp, converged = 1e-12_wp, same_orbit = 1e-7_wp
   !> A multiplier nearer to the unit circle than this does not tell a saddle.
   real(wp), parameter :: neutral = 1e-6_wp
+  !> Rate of change in natural sizes below which nothing moves.
+  real(wp), parameter :: all_but_at_rest = 1e-5_wp
 
-  !> A periodic orbit with one multiplier outside and one inside of the unit circle.
+  !> A periodic orbit with one multiplier outside of the unit circle and the others inside: its stable set can be a boundary.
   type, public :: saddle_t
+    !> Drive periods, or without a clock returns to the section.
     integer :: periods = 0
-    !> Points on the section at crank angle 0 (columns x [m], v [m/s]), period by period.
+    !> Points on the section (columns), period by period: of one body x [m], v [m/s] at crank angle 0.
     real(wp), allocatable :: points(:, :)
-    !> Over the period of the orbit, the larger first, and the derivative of the map that they belong to, at the first point.
-    real(wp) :: multipliers(2) = 0, matrix(2, 2) = 0
+    !> Of each of them the place [m] and the speed [m/s] of what is watched.
+    real(wp), allocatable :: watched(:, :)
+    !> Over the period of the orbit, the largest modulus first, and the derivative of the map they belong to, at the first point.
+    complex(wp), allocatable :: multipliers(:)
+    real(wp), allocatable :: matrix(:, :)
     integer(int64) :: word = 0
   end type saddle_t
 
 contains
 
   !> Distance of two section points in natural sizes; an angle is on a circle.
-  pure real(wp) function section_distance(body, one, other) result(distance)
-    type(one_body_t), intent(in) :: body
-    real(wp), intent(in) :: one(2), other(2)
-    distance = norm2((point_near(one, other, body%moving%machine%turn) - other)/body%size_of)
+  pure real(wp) function section_distance(machine, one, other) result(distance)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: one(:), other(:)
+    distance = norm2((nearest_copy(machine, one, other) - other)/machine%size_of)
   end function section_distance
 
   !> Distance of a section point to the nearest of an orbit.
-  pure real(wp) function distance_to_saddle(body, saddle, point) result(distance)
-    type(one_body_t), intent(in) :: body
+  pure real(wp) function distance_to_saddle(machine, saddle, point) result(distance)
+    class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddle
-    real(wp), intent(in) :: point(2)
+    real(wp), intent(in) :: point(:)
     integer :: k
     distance = huge(distance)
     do k = 1, saddle%periods
-      distance = min(distance, section_distance(body, point, saddle%points(:, k)))
+      distance = min(distance, section_distance(machine, point, saddle%points(:, k)))
     end do
   end function distance_to_saddle
 
-  !> The saddle that Newton's method comes to from `start` over `periods` drive periods; `ok` is false if it comes to none of this
+  !> The saddle that Newton's method comes to from `start` over `periods` sections; `ok` is false if it comes to none of this
   !> period.
-  pure subroutine find_saddle(machines, body, start, periods, saddle, ok)
+  pure subroutine find_saddle(machines, start, periods, saddle, ok)
     type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
-    real(wp), intent(in) :: start(2)
+    real(wp), intent(in) :: start(:)
     integer, intent(in) :: periods
     type(saddle_t), intent(out) :: saddle
     logical, intent(out) :: ok
     type(tally_t) :: tally
-    real(wp) :: point(2), image(2), slopes(2, 2), step(2), length, before
+    real(wp), dimension(size(start)) :: point, image, step
+    real(wp) :: slopes(size(start), size(start)), length, before
     integer :: i, k
     point = start
     length = huge(length)
     do i = 1, most_newton
       call map_with_variation(machines, point, periods, image, slopes, tally, ok)
       if (.not. ok) return
-      do k = 1, 2
+      do k = 1, size(start)
         slopes(k, k) = slopes(k, k) - 1
       end do
-      image = point_near(image, point, body%moving%machine%turn)
+      image = nearest_copy(machines%centre, image, point)
       call solve(slopes, point - image, step, ok)
       if (.not. ok) return
       before = length
-      length = norm2(step/body%size_of)
+      length = norm2(step/machines%centre%size_of)
       if (.not. length < huge(length)) then
         ok = .false.
         return
       end if
       if (length > longest_step) step = step*(longest_step/length)
-      point = point + step
-      point(1) = max(min(point(1), body%moving%machine%contact%upper), body%moving%machine%contact%lower)
+      point = within_stops(machines%centre, point + step)
       if (length < converged*1e-2_wp .or. (length < converged*1e2_wp .and. length >= 0.1_wp*before)) exit
     end do
     ok = length < converged*1e2_wp
-    if (ok) call describe(machines, body, point_near(point, [0.0_wp, 0.0_wp], body%moving%machine%turn), periods, saddle, ok)
+    if (ok) call describe(machines, nearest_copy(machines%centre, point, 0*point), periods, saddle, ok)
   end subroutine find_saddle
 
   !> Points, multipliers and word of the orbit through a fixed point; not `ok` if it is no saddle, or of a shorter period.
-  pure subroutine describe(machines, body, point, periods, saddle, ok)
+  pure subroutine describe(machines, point, periods, saddle, ok)
     type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
-    real(wp), intent(in) :: point(2)
+    real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
     type(saddle_t), intent(inout) :: saddle
     logical, intent(out) :: ok
     type(tally_t) :: tally
-    complex(wp) :: values(2)
     integer(int64) :: words(periods)
-    real(wp) :: image(2), slopes(2, 2)
-    integer :: k
-    allocate (saddle%points(2, periods))
+    real(wp) :: image(size(point)), slopes(size(point), size(point))
+    integer :: k, n
+    n = size(point)
+    allocate (saddle%points(n, periods), saddle%matrix(n, n))
     saddle%periods = periods
     call map_with_variation(machines, point, periods, image, saddle%matrix, tally, ok)
     if (.not. ok) return
-    values = eigenvalues(saddle%matrix)
-    saddle%multipliers = real(values, wp)
-    if (abs(saddle%multipliers(1)) < abs(saddle%multipliers(2))) saddle%multipliers = saddle%multipliers([2, 1])
-    ok = all(abs(aimag(values)) <= 0) .and. abs(saddle%multipliers(1)) > 1 + neutral .and. &
-         abs(saddle%multipliers(2)) < 1 - neutral
+    saddle%multipliers = multipliers_of(saddle%matrix)
+    associate (values => saddle%multipliers)
+      ok = abs(aimag(values(1))) <= 0 .and. abs(values(1)) > 1 + neutral .and. all(abs(values(2:)) < 1 - neutral)
+    end associate
+    if (ok .and. .not. machines%centre%has_clock) ok = moves(machines%centre, point)
     if (.not. ok) return
     saddle%points(:, 1) = point
     do k = 1, periods
       call map_with_variation(machines, saddle%points(:, k), 1, image, slopes, tally, ok)
       if (.not. ok) return
       words(k) = tally%word
-      if (k < periods) saddle%points(:, k + 1) = point_near(image, [0.0_wp, 0.0_wp], body%moving%machine%turn)
       if (k == periods) exit
-      ok = section_distance(body, image, point) > same_orbit
+      saddle%points(:, k + 1) = nearest_copy(machines%centre, image, 0*image)
+      ok = section_distance(machines%centre, image, point) > same_orbit
       if (.not. ok) return
     end do
     saddle%word = canonical_word(words)
+    saddle%watched = matmul(watched_rows(machines%centre), saddle%points)
   end subroutine describe
 
+  !> Whether a machine without a clock moves from a section point: an equilibrium is met as a cycle of no extent.
+  pure logical function moves(machine, point)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: point(:)
+    type(event_t), allocatable :: events(:)
+    type(tally_t) :: tally
+    real(wp) :: image(size(point))
+    integer :: mode
+    call fly_sections(machine, point, 1, .true., image, events, mode, tally, moves)
+    if (moves) moves = norm2(machine%slope(mode, 0.0_wp, point)/machine%size_of)*machine%size_of_time() > all_but_at_rest
+  end function moves
+
   !> Adds an orbit unless it is among `saddles`; `number` is its place there.
-  pure subroutine add_saddle(body, saddle, saddles, number)
-    type(one_body_t), intent(in) :: body
+  pure subroutine add_saddle(machine, saddle, saddles, number)
+    class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddle
     type(saddle_t), allocatable, intent(inout) :: saddles(:)
     integer, intent(out) :: number
     do number = 1, size(saddles)
       if (saddles(number)%periods /= saddle%periods) cycle
-      if (distance_to_saddle(body, saddles(number), saddle%points(:, 1)) < same_orbit) return
+      if (distance_to_saddle(machine, saddles(number), saddle%points(:, 1)) < same_orbit) return
     end do
     saddles = [saddles, saddle]
   end subroutine add_saddle
 
-  !> Adds the saddles of up to `longest` drive periods that Newton's method comes to from `starts` (columns x, v).
-  pure subroutine seek_saddles(machines, body, starts, longest, saddles)
+  !> Adds the saddles of up to `longest` sections that Newton's method comes to from `starts` (section points, columns).
+  pure subroutine seek_saddles(machines, starts, longest, saddles)
     type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: longest
     type(saddle_t), allocatable, intent(inout) :: saddles(:)
@@ -152,8 +169,8 @@ contains
     logical :: ok
     do i = 1, size(starts, 2)
       do n = 1, longest
-        call find_saddle(machines, body, starts(:, i), n, saddle, ok)
-        if (ok) call add_saddle(body, saddle, saddles, number)
+        call find_saddle(machines, starts(:, i), n, saddle, ok)
+        if (ok) call add_saddle(machines%centre, saddle, saddles, number)
       end do
     end do
   end subroutine seek_saddles

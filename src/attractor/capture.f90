@@ -35,7 +35,8 @@ contains
 
   !> Whether a motion on the section, with what was counted since the last impact, has settled at one of a family of cycles, each
   !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left
-  !> of its drift, |d| T/(1 - |multiplier|), is less than half of the distance at which it last missed a stop.
+  !> of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it last
+  !> missed a stop.
   pure logical function stays_in_family(moving, catalogue, strobe, tally)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -53,7 +54,7 @@ contains
         do i = 1, attractor%period
           if (squared_distance(attractor, i, point(2:)) > attractor%capture_radius**2) cycle
           ! The first coordinate is a velocity.
-          drift = attractor%scale(1)*moving%machine%period/(1 - attractor%multiplier) &
+          drift = attractor%scale(1)*attractor%period*moving%machine%period/(1 - attractor%multiplier) &
                   *sum(abs(point(2:n + 1) - attractor%points(:n, i))/attractor%scale(:n))
           stays_in_family = drift < tally%grazing_margin/2
           if (stays_in_family) return

@@ -7,11 +7,12 @@ module start_label
   use kinds, only: wp
   use motion, only: motion_t
   use status, only: reason_left_domain
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use strobe, only: strobe_t
+  use trajectory, only: outcome_t, run_from_section, span_t
   implicit none
   private
 
-  public :: label_of, label_start
+  public :: label_of, label_from
 
   !> Labels that are no attractors: the motion is not known (not captured, or given up), or it has left the domain.
   integer, parameter, public :: label_not_known = 0, label_left_domain = -1
@@ -25,15 +26,15 @@ contains
     if (outcome%attractor == 0 .and. outcome%reason == reason_left_domain) label = label_left_domain
   end function label_of
 
-  !> Label of one start: x [m], v [m/s], crank angle [rad].
-  pure integer function label_start(moving, catalogue, span, start) result(label)
+  !> Label of a state on the section.
+  pure integer function label_from(moving, catalogue, span, strobe) result(label)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
-    real(wp), intent(in) :: start(3)
+    type(strobe_t), intent(in) :: strobe
     type(outcome_t) :: outcome
-    call run_trajectory(moving, catalogue, span, start(1), start(2), start(3), outcome)
+    call run_from_section(moving, catalogue, span, strobe, outcome)
     label = label_of(outcome)
-  end function label_start
+  end function label_from
 
 end module start_label

@@ -16,7 +16,8 @@ module trajectory
   implicit none
   private
 
-  public :: run_trajectory, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, conclude, fit_window
+  public :: run_trajectory, run_from_section, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, &
+    conclude, fit_window
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -78,12 +79,36 @@ contains
     type(log_t), intent(inout), optional :: log
     real(wp), intent(in), optional :: others(:)
     type(course_t) :: course
-    logical :: slipped
     if (present(others)) then
       call begin_course(moving, span, [x, v, crank_angle, others], course)
     else
       call begin_course(moving, span, [x, v, crank_angle], course)
     end if
+    call run_course(moving, catalogue, span, course, outcome, log)
+  end subroutine run_trajectory
+
+  !> The same from a state on the section.
+  pure subroutine run_from_section(moving, catalogue, span, strobe, outcome)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(span_t), intent(in) :: span
+    type(strobe_t), intent(in) :: strobe
+    type(outcome_t), intent(out) :: outcome
+    type(course_t) :: course
+    course%strobe_t = strobe
+    call set_off(moving, span, course)
+    call run_course(moving, catalogue, span, course, outcome)
+  end subroutine run_from_section
+
+  !> Runs a course that has been set off to its end.
+  pure subroutine run_course(moving, catalogue, span, course, outcome, log)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(span_t), intent(in) :: span
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    type(log_t), intent(inout), optional :: log
+    logical :: slipped
     if (present(log)) then
       log%book%at_start = energy_now(moving, course)
       log%origin = -course%state%time
@@ -101,7 +126,7 @@ contains
       call pass_stop(moving, catalogue, span, slipped, course, outcome)
     end do
     call conclude(moving, catalogue, course, outcome)
-  end subroutine run_trajectory
+  end subroutine run_course
 
   !> A body set off from a `start` as `start_strobe` has it.
   pure subroutine begin_course(moving, span, start, course)
@@ -110,10 +135,18 @@ contains
     real(wp), intent(in) :: start(:)
     type(course_t), intent(out) :: course
     course%strobe_t = start_strobe(moving, start)
+    call set_off(moving, span, course)
+  end subroutine begin_course
+
+  !> Counts and the first stop of a course whose state is there.
+  pure subroutine set_off(moving, span, course)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(course_t), intent(inout) :: course
     call begin_tally(moving, course%strobe_t, course%tally)
     if (.not. span%duration - span%window > 0) call open_window(moving, course)
     call set_stop(moving, span, course)
-  end subroutine begin_course
+  end subroutine set_off
 
   !> Moves to the next stop. `slipped` tells whether the body moved on the way.
   pure subroutine go_to_stop(moving, course, slipped, log)

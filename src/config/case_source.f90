@@ -4,24 +4,18 @@
 !> The text of a case while it is read: its entries with overrides applied, the keys that may
 !> occur, and the problems found so far with their places.
 module case_source
+  use case_overrides, only: apply_override, is_or_is_below, source_entry_t
   use errors, only: error_t, fail
   use status, only: exit_bad_case, exit_no_input
   use structure_data, only: structure_file_reader
   use suggest, only: nearest_word
   use text, only: join, replace_all, starts_with, to_text
-  use toml_bindings, only: read_toml, toml_array, toml_boolean, toml_entry_t, toml_float, toml_integer, &
-    toml_string, toml_table
+  use toml_bindings, only: read_toml, toml_array, toml_boolean, toml_entry_t, toml_float, toml_integer, toml_string, toml_table
   implicit none
   private
 
   public :: open_source, find, list_size, know, know_all_below, enter_table, report, forgive_missing, &
     report_unknown, problems_of, description, has_problems
-
-  type, public :: source_entry_t
-    type(toml_entry_t) :: entry
-    !> The override `key=value` that gave it; not allocated for the file.
-    character(len=:), allocatable :: override
-  end type source_entry_t
 
   type :: problem_t
     integer :: line
@@ -63,85 +57,10 @@ contains
       source%entries(i)%entry = entries(i)
     end do
     do i = 1, size(overrides)
-      call apply_override(source, trim(overrides(i)), error)
+      call apply_override(source%entries, trim(overrides(i)), error)
       if (allocated(error)) return
     end do
   end subroutine open_source
-
-  subroutine apply_override(source, override, error)
-    type(case_source_t), intent(inout) :: source
-    character(len=*), intent(in) :: override
-    type(error_t), allocatable, intent(out) :: error
-    type(toml_entry_t), allocatable :: entries(:)
-    character(len=:), allocatable :: key, problem
-    integer :: mark
-    mark = index(override, '=')
-    key = trim(adjustl(override(1:max(mark - 1, 0))))
-    problem = key_problem(source, key)
-    if (mark == 0) problem = 'found no ''='', allowed KEY=VALUE'
-    if (len(problem) == 0) then
-      ! The value is parsed under a short name: 'axis[1].count' is a path, not a TOML key.
-      call read_toml('v = '//override(mark + 1:), '', entries, error)
-      if (allocated(error)) then
-        problem = error%message(index(error%message, ': ') + 2:)
-      else if (any_other_key(entries)) then
-        problem = 'found more than one value'
-      end if
-    end if
-    if (len(problem) > 0) then
-      call fail(error, exit_bad_case, '--set '//override//': '//problem)
-      return
-    end if
-    call put(source, key, entries, override)
-  end subroutine apply_override
-
-  pure logical function any_other_key(entries)
-    type(toml_entry_t), intent(in) :: entries(:)
-    integer :: i
-    any_other_key = .false.
-    do i = 1, size(entries)
-      if (.not. is_or_is_below(entries(i)%path, 'v')) any_other_key = .true.
-    end do
-  end function any_other_key
-
-  !> What is wrong with the key of an override, '' if nothing.
-  pure function key_problem(source, key) result(problem)
-    type(case_source_t), intent(in) :: source
-    character(len=*), intent(in) :: key
-    character(len=:), allocatable :: problem
-    integer :: i
-    problem = ''
-    if (len(key) == 0) problem = 'the key is missing'
-    if (verify(key, 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.[]') > 0) then
-      problem = 'found the key '''//key//''', allowed letters, digits, _ and the index of a list'
-    end if
-    do i = 1, len(key)
-      if (key(i:i) /= ']') cycle
-      if (find(source, key(1:i)) == 0) problem = 'there is no element '''//key(1:i)//''' to change'
-    end do
-  end function key_problem
-
-  !> Puts the entries of a value 'v' in the place of `key` and of everything below it.
-  subroutine put(source, key, entries, override)
-    type(case_source_t), intent(inout) :: source
-    character(len=*), intent(in) :: key, override
-    type(toml_entry_t), intent(in) :: entries(:)
-    type(source_entry_t) :: added(size(entries))
-    logical :: kept(size(source%entries))
-    integer :: i, at
-    do i = 1, size(entries)
-      added(i)%entry = entries(i)
-      added(i)%entry%path = key//entries(i)%path(2:)
-      added(i)%override = override
-    end do
-    at = find(source, key)
-    if (at == 0) at = size(source%entries) + 1
-    do i = 1, size(kept)
-      kept(i) = .not. is_or_is_below(source%entries(i)%entry%path, key)
-    end do
-    source%entries = [pack(source%entries(:at - 1), kept(:at - 1)), added, &
-                      pack(source%entries(at:), kept(at:))]
-  end subroutine put
 
   !> Position of a path in the entries, 0 if it is absent; the search may begin at `from`.
   pure integer function find(source, path, from)
@@ -376,15 +295,6 @@ contains
       if (all(names /= name)) call append(names, trim(name))
     end do
   end function names_below
-
-  !> Whether `path` is `above` or lies in it: 'drive.sine[2]' is below 'drive.sine' and 'drive'.
-  pure logical function is_or_is_below(path, above)
-    character(len=*), intent(in) :: path, above
-    is_or_is_below = path == above
-    if (is_or_is_below .or. len(path) <= len(above)) return
-    if (path(1:len(above)) /= above) return
-    is_or_is_below = scan(path(len(above) + 1:len(above) + 1), '.[') == 1
-  end function is_or_is_below
 
   !> What an entry holds, for messages.
   pure function description(entry) result(text)

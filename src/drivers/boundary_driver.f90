@@ -8,7 +8,9 @@ module boundary_driver
   use boundary_layout, only: describe_boundary
   use boundary_search, only: plane_t, search_lines
   use boundary_lines, only: crossed_edges
-  use boundary_names, only: grow_sets, name_points, names_t
+  use boundary_names, only: name_points, names_t
+  use boundary_pieces, only: bridge_gaps
+  use boundary_sets, only: grow_sets
   use case_setup, only: grid_of, span_of
   use catalogue_search, only: check_slices
   use command_line, only: command_t
@@ -18,6 +20,7 @@ module boundary_driver
   use grid, only: grid_t, point_slice, two_axes
   use invariant_sets, only: end_names
   use journal, only: json_number, json_text
+  use kinds, only: wp
   use map_final, only: write_whole
   use map_reader, only: reader_t
   use map_schema, only: schema_t
@@ -77,6 +80,7 @@ contains
       end associate
       call search_lines(session, grid, planes(i))
       call name_points(session%team, session%journal, grid, planes(i), names(i))
+      call bridge_gaps(planes(i), names(i))
       call grow_sets(session%team, session%journal, grid, planes(i), command%grow, names(i))
     end do
     call report(session, planes)
@@ -196,12 +200,11 @@ contains
         number = number + 1
         associate (saddle => names(i)%saddles(k))
           call session%journal%line('saddle', 'saddle '//to_text(number)//': period '//to_text(saddle%periods)//', '// &
-            word_text(saddle%word)//', multipliers '//to_text(saddle%multipliers(1), 9)//', '//to_text(saddle%multipliers(2), 9)// &
+            word_text(saddle%word)//', multipliers '//multipliers_text(saddle%multipliers)// &
             ', '//to_text(names(i)%reached(k))//' boundary points lead to it', '"number": '//to_text(number)//', "period": '// &
             to_text(saddle%periods)//', "word": '//json_text(word_text(saddle%word))//', "x": '// &
-            json_number(saddle%points(1, 1))//', "v": '//json_number(saddle%points(2, 1))// &
-            ', "multipliers": ['//json_number(saddle%multipliers(1))//', '// &
-            json_number(saddle%multipliers(2))//'], "points": '//to_text(names(i)%reached(k)))
+            json_number(saddle%watched(1, 1))//', "v": '//json_number(saddle%watched(2, 1))// &
+            ', "multipliers": '//multipliers_json(saddle%multipliers)//', "points": '//to_text(names(i)%reached(k)))
         end associate
       end do
       call report_sets(session, names(i), number - size(names(i)%saddles))
@@ -217,6 +220,33 @@ contains
                                 json_text(name)//', "points": '//to_text(points))
     end do
   end subroutine report_names
+
+  !> Multipliers one after the other.
+  pure function multipliers_text(multipliers) result(text)
+    complex(wp), intent(in) :: multipliers(:)
+    character(len=:), allocatable :: text
+    integer :: i
+    text = ''
+    do i = 1, size(multipliers)
+      if (i > 1) text = text//', '
+      text = text//to_text(real(multipliers(i)), 9)
+      if (abs(aimag(multipliers(i))) > 0) text = text//merge('+', '-', aimag(multipliers(i)) > 0)// &
+                                                 to_text(abs(aimag(multipliers(i))), 9)//'i'
+    end do
+  end function multipliers_text
+
+  !> The same as pairs of real and imaginary parts.
+  pure function multipliers_json(multipliers) result(text)
+    complex(wp), intent(in) :: multipliers(:)
+    character(len=:), allocatable :: text
+    integer :: i
+    text = '['
+    do i = 1, size(multipliers)
+      if (i > 1) text = text//', '
+      text = text//'['//json_number(real(multipliers(i)))//', '//json_number(aimag(multipliers(i)))//']'
+    end do
+    text = text//']'
+  end function multipliers_json
 
   !> How far the stable and unstable sets were grown; `before` saddles belong to the planes before this.
   subroutine report_sets(session, names, before)

@@ -4,7 +4,8 @@
 !> The file of `separatrix boundary`.
 module boundary_layout
   use boundary_lines, only: line_point_t, line_t
-  use boundary_names, only: cut_lines, names_t
+  use boundary_names, only: names_t
+  use boundary_pieces, only: cut_lines
   use boundary_search, only: plane_t
   use edge_state, only: edge_names
   use errors, only: error_t
@@ -130,24 +131,19 @@ contains
     type(schema_t), intent(inout) :: schema
     type(saddle_t), allocatable :: saddles(:)
     integer, allocatable :: plane(:), reached(:)
-    real(wp), allocatable :: points(:, :)
     character(len=name_length) :: along(1)
-    integer :: p, k, i
+    integer :: p, k, i, n
     allocate (saddles(0), plane(0), reached(0))
     do p = 1, size(planes)
       saddles = [saddles, names(p)%saddles]
       plane = [plane, spread(p, 1, size(names(p)%saddles))]
       reached = [reached, names(p)%reached]
     end do
-    allocate (points(2, sum(saddles%periods)))
-    i = 0
-    do k = 1, size(saddles)
-      points(:, i + 1:i + saddles(k)%periods) = saddles(k)%points
-      i = i + saddles(k)%periods
-    end do
+    n = 2
+    if (size(saddles) > 0) n = size(saddles(1)%multipliers)
     call schema%add_dimension('orbit', size(saddles, kind=int64))
-    call schema%add_dimension('multiplier', 2_int64)
-    call schema%add_dimension('section_point', size(points, 2, kind=int64))
+    call schema%add_dimension('multiplier', int(n, int64))
+    call schema%add_dimension('section_point', int(sum(saddles%periods), int64))
     along = 'orbit'
     call schema%add_variable('period', type_int16, along, units='1', long_name='period in drive periods', group=group, &
                              data=real(saddles%periods, wp))
@@ -156,8 +152,11 @@ contains
     call schema%add_variable('boundary_points', type_int32, along, units='1', group=group, data=real(reached, wp), &
                              long_name='boundary points that lead to it; 0: it lies within one basin, or beyond the map')
     call schema%add_variable('multipliers', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, the larger first', group=group, &
-      data=[((saddles(k)%multipliers(i), i=1, 2), k=1, size(saddles))])
+      long_name='multipliers over the period, largest modulus first, real part', group=group, &
+      data=[((real(saddles(k)%multipliers(i), wp), i=1, n), k=1, size(saddles))])
+    call schema%add_variable('multipliers_imag', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
+      long_name='multipliers over the period, imaginary part', group=group, &
+      data=[((aimag(saddles(k)%multipliers(i)), i=1, n), k=1, size(saddles))])
     do i = 1, size(grid%axes)
       if (any(planes(1)%axes == i)) cycle
       call schema%add_variable(axis_dimension(grid%axes(i)%name), type_float64, along, units=grid%axes(i)%unit, group=group, &
@@ -167,10 +166,16 @@ contains
     along = 'section_point'
     call schema%add_variable('saddle', type_int32, along, units='1', group=group, long_name='number of the saddle, from 1', &
                              data=[((real(k, wp), i=1, saddles(k)%periods), k=1, size(saddles))])
-    call schema%add_variable('x', type_float64, along, units='m', group=group, data=points(1, :), &
-                             long_name='position at crank angle 0, period by period')
-    call schema%add_variable('v', type_float64, along, units='m/s', group=group, data=points(2, :), &
-                             long_name='velocity at crank angle 0')
+    call schema%add_variable('x', type_float64, along, units='m', group=group, &
+                             data=[(saddles(k)%watched(1, :), k=1, size(saddles))], &
+                             long_name='position on the section, period by period')
+    call schema%add_variable('v', type_float64, along, units='m/s', group=group, &
+                             data=[(saddles(k)%watched(2, :), k=1, size(saddles))], long_name='velocity on the section')
+    if (n == 2) return
+    call schema%add_dimension('coordinate', int(n, int64))
+    call schema%add_variable('section', type_float64, [along, [character(len=name_length) :: 'coordinate']], units='1', &
+      long_name='coordinates on the section in SI units: places [m], then speeds [m/s] of all bodies', group=group, &
+      data=[((saddles(k)%points(:, i), i=1, saddles(k)%periods), k=1, size(saddles))])
   end subroutine add_saddles
 
   !> The curves of the stable and unstable sets, cut where they are, one after the other.

@@ -6,7 +6,7 @@ module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
   use build_jointed, only: is_jointed
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
-  use branch_point, only: branch_t, is_stable, label_bp, label_crisis, label_homoclinic, label_names, label_range, last_label, &
+  use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
@@ -200,7 +200,9 @@ contains
     do b = 1, size(search%branches)
       associate (line => search%branches(b))
         call session%journal%line('branch', 'branch '//to_text(b)//': period '//to_text(line%points(1)%orbit%periods)//', '// &
-                                  to_text(size(line%points))//' points')
+          to_text(size(line%points))//' points, '//ends_text(line%ending), &
+          '"branch": '//to_text(b)//', "ends": ['//json_text(trim(label_names(line%ending(1))))//', '// &
+          json_text(trim(label_names(line%ending(2))))//']')
         do i = 1, size(line%points)
           if (line%points(i)%label /= no_label) call report_point(session, search, line%points(i), b, unit)
           if (allocated(contacts%list)) call report_contacts(session, search, contacts, b, i, unit)
@@ -210,6 +212,8 @@ contains
     end do
     call session%journal%line('found', to_text(size(search%branches))//' branches from '//to_text(search%seeds)// &
       ' seeds at '//to_text(size(search%values))//' values of '//search%family%path//'; there may be others')
+    if (search%seeds > 0 .and. .not. search%depends) call session%journal%line('no_effect', search%family%path// &
+      ' has no effect on any orbit that was found: each is the same at every value')
     families = sum(search%found%equilibria)
     if (families > 0) call session%journal%line('equilibria', 'equilibria were met '//to_text(families)// &
                                                 ' times; they are not followed')
@@ -217,6 +221,16 @@ contains
     if (families > 0) call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
                                                 to_text(families)//' times; they are not followed')
   end subroutine report
+
+  !> Where a branch ends, in words.
+  pure function ends_text(ending) result(text)
+    integer, intent(in) :: ending(2)
+    character(len=:), allocatable :: text
+    text = 'ends: '//trim(label_names(ending(1)))//' and '//trim(label_names(ending(2)))
+    if (ending(1) == ending(2)) text = 'ends: '//trim(label_names(ending(1)))
+    if (ending(1) == label_closed) text = 'closed'
+    text = replace_all(text, '_', ' ')
+  end function ends_text
 
   subroutine report_point(session, search, point, number, unit)
     type(session_t), intent(inout) :: session

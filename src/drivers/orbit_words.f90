@@ -14,6 +14,7 @@ module orbit_words
   use motion_state, only: append_word, event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, &
     event_stick, event_touch_lower, event_touch_upper, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
+  use one_body, only: rests_on_barrier
   use periodic_orbit, only: orbit_t
   implicit none
   private
@@ -85,6 +86,10 @@ contains
     case (event_chatter_lower)
       call append_word(tally, word_chatter_lower)
     end select
+    ! An impact of one body without rebound.
+    if (event%guard == 0 .and. any(event%kind == [event_impact_upper, event_impact_lower]) .and. rests_on_barrier(event%after)) then
+      call append_word(tally, word_stick)
+    end if
   end subroutine append_event
 
   !> Drive period of the machine of an orbit [s].

@@ -15,8 +15,8 @@ module contact_law
   implicit none
   private
 
-  public :: contact_of, add_to_contact, compliant_contact, contact_at_speed, barrier_positions, velocity_after_impact, &
-    restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, force_on_body
+  public :: contact_of, add_to_contact, compliant_contact, force_table, contact_at_speed, barrier_positions, &
+    velocity_after_impact, restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
     contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6, contact_table = 7
@@ -116,7 +116,7 @@ contains
     select case (choice%name)
     case ('contact_curve')
       law%kind = contact_table
-      law%change = curve_of([0.0_wp, list_of(choice, 'penetration')], [0.0_wp, list_of(choice, 'force')])
+      law%change = force_table(choice)
       ! What it is on average tells its size.
       law%stiffness = maxval(law%change%value)/law%change%at(law%change%count)
     case ('kelvin_voigt_contact')
@@ -128,6 +128,14 @@ contains
       law%exponent = value_of(choice, 'exponent')
     end select
   end function compliant_contact
+
+  !> The force over the penetration of a choice of `contact_curve`, with q(0) = 0. The polynomial through the knots may
+  !> begin downwards where the force grows steeply: then it begins level.
+  pure type(curve_t) function force_table(choice) result(table)
+    type(law_choice_t), intent(in) :: choice
+    table = curve_of([0.0_wp, list_of(choice, 'penetration')], [0.0_wp, list_of(choice, 'force')])
+    table%slope(1) = max(0.0_wp, table%slope(1))
+  end function force_table
 
   !> The part of a soft law that is not its position.
   pure function soft_of(choice, mass) result(law)

@@ -10,7 +10,7 @@ module curve_law
   implicit none
   private
 
-  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, knots_problem
+  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, is_positive, knots_problem
 
   integer, parameter, public :: most_knots = 16
 
@@ -157,6 +157,41 @@ contains
                       abs(6*mean - 2*curve%slope(i) - 4*curve%slope(i + 1))/width)
     end do
   end function most_bent
+
+  !> Whether a curve that begins with value 0 is above 0 from there on, beyond the last knot too.
+  pure logical function is_positive(curve)
+    type(curve_t), intent(in) :: curve
+    real(wp) :: width, c(0:3), place(4), q
+    integer :: i, k
+    is_positive = .false.
+    if (curve%slope(curve%count) < 0) return
+    do i = 1, curve%count - 1
+      width = curve%at(i + 1) - curve%at(i)
+      ! The cubic in s; that of the first interval is divided by s.
+      c = [curve%value(i), width*curve%slope(i), 3*(curve%value(i + 1) - curve%value(i)) - &
+           width*(2*curve%slope(i) + curve%slope(i + 1)), 2*(curve%value(i) - curve%value(i + 1)) + &
+           width*(curve%slope(i) + curve%slope(i + 1))]
+      if (i == 1) c = [c(1:), 0.0_wp]
+      ! Where it may be least: at its ends, where its derivative is 0.
+      q = -c(2) - sign(sqrt(max(0.0_wp, c(2)**2 - 3*c(1)*c(3))), c(2))
+      place = [epsilon(q), 1.0_wp, quotient(q, 3*c(3)), quotient(c(1), q)]
+      do k = 1, size(place)
+        if (place(k) <= 0 .or. place(k) > 1) cycle
+        if (.not. c(0) + place(k)*(c(1) + place(k)*(c(2) + place(k)*c(3))) > 0) return
+      end do
+    end do
+    is_positive = .true.
+
+  contains
+
+    !> a/b; 0 where b is 0.
+    pure real(wp) function quotient(a, b)
+      real(wp), intent(in) :: a, b
+      quotient = 0
+      if (abs(b) > 0) quotient = a/b
+    end function quotient
+
+  end function is_positive
 
   !> A bound on the derivative: that of 6 s (1 - s) d + (1 - s)(1 - 3 s) m_i - s (2 - 3 s) m_{i+1}, d the mean slope.
   pure real(wp) function steepest(curve)

@@ -200,13 +200,14 @@ contains
     if (effects%play > 0) bounds = bounds + effects%series_stiffness*[1.0_wp, 1/effects%corner]
   end function stretch_bounds
 
-  !> r [N], a force over the place `x` [m], and a bound on its derivative [N/m].
+  !> r [N], a force over the place `x` [m].
   pure real(wp) function place_force(effects, x) result(force)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x
     force = continued_at(effects%force, x)
   end function place_force
 
+  !> A bound on the derivative [N/m] of the force over the place.
   pure real(wp) function steepest_force(effects) result(slope)
     type(effects_t), intent(in) :: effects
     slope = steepest(effects%force)

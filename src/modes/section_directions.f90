@@ -22,7 +22,11 @@ contains
     real(wp) :: values(machine%n)
     integer :: i, j, n
     n = machine%n
-    depends = machine%stiffness/max(maxval(abs(machine%stiffness)), tiny(1.0_wp))
+    ! Without its signs: a negative stiffness would cancel what a joint adds.
+    call symmetric_eigen(machine%stiffness/max(maxval(abs(machine%stiffness)), tiny(1.0_wp)), values, vectors)
+    do i = 1, n
+      depends(:, i) = matmul(vectors, abs(values)*vectors(i, :))
+    end do
     do j = 1, size(machine%joints)
       if (machine%joints(j)%kind == joint_friction .or. machine%joints(j)%kind == joint_section) cycle
       do i = 1, n

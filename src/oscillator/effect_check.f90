@@ -3,7 +3,8 @@
 
 !> Which effects the laws of a machine have a place for.
 module effect_check
-  use curve_law, only: knots_problem, most_knots
+  use contact_law, only: force_table
+  use curve_law, only: is_positive, knots_problem, most_knots
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: real64, wp
@@ -76,7 +77,7 @@ contains
       if (law /= 'newton') problem = ': found with contact.law = "'//law//'", allowed with "newton"'
       if (len(soft_effect(choices, '')) > 0) problem = ': found with effect.'//soft_effect(choices, '')//', allowed one of them'
     case ('compliant_contact', 'kelvin_voigt_contact', 'contact_curve')
-      if (effect%name == 'contact_curve') problem = table_problem(effect, 'penetration', 'force', implied=1)
+      if (effect%name == 'contact_curve') problem = force_problem(effect)
       if (len(soft_effect(choices, effect%name)) > 0) problem = ': found with effect.'//soft_effect(choices, effect%name)// &
                                                                 ', allowed one of them'
       if (index(law, 'newton') /= 1) problem = ': found with contact.law = "'//law//'", allowed with the rigid ones: newton, '// &
@@ -125,6 +126,16 @@ contains
     if (len(problem) > 0) problem = '.'//knots//': found '//to_text(size(list_of(effect, knots)))//' knots and '// &
                                     to_text(size(list_of(effect, values)))//' values of '//values//', '//problem
   end function table_problem
+
+  !> What is wrong with the table of a contact, '' if nothing.
+  pure function force_problem(effect) result(problem)
+    type(law_choice_t), intent(in) :: effect
+    character(len=:), allocatable :: problem
+    problem = table_problem(effect, 'penetration', 'force', implied=1)
+    if (len(problem) > 0) return
+    if (.not. is_positive(force_table(effect))) problem = '.force: found a barrier that pulls at some depth; allowed values '// &
+                                                'whose curve is above 0 everywhere and does not fall behind the last'
+  end function force_problem
 
   pure function harmonics_problem(choices, effect) result(problem)
     type(law_choice_t), intent(in) :: choices(:), effect

@@ -221,16 +221,14 @@ contains
     if (machine%contact%soft) force = force + force_on_body(machine%contact, x, 0.0_wp)
     curvature_bound = machine%restoring%stiffness*machine%foot_acceleration_bound
     if (.not. machine%effects%present) return
+    force = force + machine%effects%offset + stretch_force(machine%effects, stretch)
+    rate = rate + stretch_slope(machine%effects, stretch)*foot_rate*machine%drive_frequency
     associate (cubic => machine%effects%cubic, speed => machine%foot_speed_bound)
-      force = force + machine%effects%offset + cubic*stretch**3
-      rate = rate + 3*cubic*stretch**2*foot_rate*machine%drive_frequency
       longest = abs(machine%restoring%free_length + machine%drive%mean - x) + sum(abs(machine%drive%cosine)) &
                 + sum(abs(machine%drive%sine))
       curvature_bound = curvature_bound + abs(cubic)*longest*(3*longest*machine%foot_acceleration_bound + 6*speed**2)
       if (.not. machine%effects%by_position) return
-      ! The cubic spring is in it already.
-      force = force + (stretch_force(machine%effects, stretch) - cubic*stretch**3) + place_force(machine%effects, x)
-      rate = rate + (stretch_slope(machine%effects, stretch) - 3*cubic*stretch**2)*foot_rate*machine%drive_frequency
+      force = force + place_force(machine%effects, x)
       bounds = stretch_bounds(machine%effects)
       curvature_bound = curvature_bound + bounds(1)*machine%foot_acceleration_bound + bounds(2)*speed**2
     end associate

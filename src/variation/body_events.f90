@@ -42,9 +42,13 @@ contains
       next_x = finish%x
       if (i < log%events) next_x = log%event_data(2, i + 1)
       call set_mode(body, next_x - event%arrival(1), event)
-      if (smooth .and. event%kind == event_turning_point .and. slips_in(mode) .and. .not. rests_on_barrier(event%after)) then
-        if (.not. after_dead_impact(events, count)) cycle
+      if (follows_dead_impact(events, count, event)) then
+        ! The body stays there, or goes back from there: of the impact.
+        mode = event%after
+        events(count)%after = mode
+        cycle
       end if
+      if (smooth .and. event%kind == event_turning_point .and. slips_in(mode) .and. .not. rests_on_barrier(event%after)) cycle
       mode = event%after
       if (collapsed .and. is_chatter(event%kind)) count = before_chatter(events, count, event%side)
       if (collapsed .and. is_chatter(event%kind) .and. count < size(events)) then
@@ -99,14 +103,16 @@ contains
     end associate
   end subroutine set_mode
 
-  !> Whether the last of `count` events is an impact from which the body does not rebound.
-  pure logical function after_dead_impact(events, count) result(dead)
-    type(event_t), intent(in) :: events(:)
+  !> Whether a turning point or a stick is the end of an impact without rebound, the last of `count` events.
+  pure logical function follows_dead_impact(events, count, event) result(follows)
+    type(event_t), intent(in) :: events(:), event
     integer, intent(in) :: count
-    dead = .false.
-    if (count == 0) return
-    dead = is_impact(events(count)%kind) .and. .not. abs(events(count)%departure(2)) > 0
-  end function after_dead_impact
+    follows = count > 0 .and. (event%kind == event_turning_point .or. event%kind == event_stick)
+    if (.not. follows) return
+    associate (last => events(count))
+      follows = is_impact(last%kind) .and. .not. abs(last%departure(2)) > 0 .and. .not. event%time > last%time
+    end associate
+  end function follows_dead_impact
 
   pure elemental logical function is_impact(kind)
     integer, intent(in) :: kind

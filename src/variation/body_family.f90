@@ -11,7 +11,7 @@ module body_family
   use law_table, only: change_parameter, law_choice_t
   use motion, only: advance_period, motion_t, start_state
   use motion_state, only: log_t, open_log, options_t, reset_tally, state_t, tally_t
-  use one_body, only: has_variation, mode_of_body, one_body_of, one_body_t
+  use one_body, only: mode_of_body, one_body_of, one_body_t, why_not_varied
   use status, only: exit_bad_case
   use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
   implicit none
@@ -62,14 +62,15 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
     type(motion_t) :: moving
+    character(len=:), allocatable :: why
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
-    if (.not. has_variation(moving)) then
-      call fail(error, exit_bad_case, 'body.law, effect.dahl, drive.law, contact.law: variations are known of one body with '// &
-                'a drive and of structures, without Dahl friction, a measured force, or a damping that each impact sets')
+    why = why_not_varied(moving)
+    if (len(why) > 0) then
+      call fail(error, exit_bad_case, why)
       return
     end if
     body = one_body_of(moving, merge(family%sizes(1), size_of_motion(moving), family%sizes(1) > 0))

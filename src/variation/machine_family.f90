@@ -3,26 +3,32 @@
 
 !> Machines over a parameter of their laws, whatever they are made of: one body or a structure.
 module machine_family
+  use body_events, only: events_of_body
   use body_family, only: body_neighbourhood, body_of_family, family_t, fly_periods, map_of_body => map_with_variation
   use build_jointed, only: is_jointed
   use circle, only: point_near
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
+  use jointed_log, only: watched_state
   use jointed_motion, only: start_jointed
+  use jointed_section, only: start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use law_table, only: law_choice_t
-  use motion_state, only: tally_t
+  use motion, only: advance_period, motion_t, start_state
+  use motion_state, only: log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
   use pair, only: is_pair
   use structure, only: coordinates_of, structure_t
-  use structure_family, only: fly_structure, map_of_structure, structure_neighbourhood, structure_of_family
+  use strobe, only: start_strobe, strobe_t
+  use structure_family, only: advance_section, fly_structure, map_of_structure, start_of_structure, structure_neighbourhood, &
+    structure_of_family
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: machine_of_family, machine_neighbourhood, fly_sections, map_with_variation, section_sizes, nearest_copy, within_stops, &
-    watched_rows, starts_of_section
+  public :: machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, section_sizes, &
+    nearest_copy, within_stops, watched_rows, starts_of_section, strobe_of_section
 
 contains
 
@@ -61,6 +67,64 @@ contains
       call body_neighbourhood(family, value, machines, error)
     end if
   end subroutine machine_neighbourhood
+
+  !> Flies a machine from a start as `start_strobe` has it to its first section: where it then is, and the events on the way.
+  !> `ok` is false for a start beyond a stop, and if the trajectory had to be given up.
+  pure subroutine fly_to_section(machine, start, point, events, ok)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: start(:)
+    real(wp), intent(out) :: point(:)
+    type(event_t), allocatable, intent(out) :: events(:)
+    logical, intent(out) :: ok
+    type(state_t) :: before, state
+    type(jointed_state_t) :: jointed
+    type(tally_t) :: tally
+    type(log_t) :: log
+    real(wp) :: lasted
+    integer :: reason, mode, count_events
+    logical :: certain
+    ok = .false.
+    point = 0
+    select type (machine)
+    type is (one_body_t)
+      call open_log(log, 0.0_wp)
+      log%book%kept = .false.
+      before = start_state(machine%moving, start(1), start(2), start(3))
+      state = before
+      call advance_period(machine%moving, state, tally, reason, log)
+      ok = reason == 0
+      if (.not. ok) return
+      point = [state%x, state%v]
+      call events_of_body(machine, before, log, state, .true., events, mode)
+    type is (structure_t)
+      jointed = start_of_jointed(machine%frame%moving, start(1), start(2), start(3), start(4:))
+      ok = .not. any(jointed%q /= jointed%q)
+      if (.not. ok) return
+      allocate (events(8))
+      count_events = 0
+      lasted = 0
+      call advance_section(machine, jointed, lasted, events, count_events, tally, ok, certain)
+      events = events(:count_events)
+      if (ok) point = coordinates_of(machine, jointed)
+    end select
+  end subroutine fly_to_section
+
+  !> The state of a trajectory of the same machine on the section. `ok` is false for a point beyond a stop.
+  pure subroutine strobe_of_section(machine, moving, point, strobe, ok)
+    class(hybrid_t), intent(in) :: machine
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    type(strobe_t), intent(out) :: strobe
+    logical, intent(out) :: ok
+    ok = .true.
+    select type (machine)
+    type is (structure_t)
+      call start_of_structure(machine, point, strobe%jointed, ok)
+      if (ok) strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    class default
+      strobe = start_strobe(moving, [point, 0.0_wp])
+    end select
+  end subroutine strobe_of_section
 
   !> Flies a machine from a section point over so many sections: where it then is, the mode in which it began, and the events on
   !> the way, with `collapsed` a completed chatter as one. `ok` is false if the trajectory had to be given up.

@@ -18,7 +18,7 @@ module one_body
   implicit none
   private
 
-  public :: one_body_of, has_variation, mode_of_body, slips_in, direction_in, rests_on_barrier, turns_smoothly
+  public :: one_body_of, why_not_varied, mode_of_body, slips_in, direction_in, rests_on_barrier, turns_smoothly
 
   !> Steps of the differences that stand in for derivatives of laws, as a share of the natural size: of fourth order.
   real(wp), parameter :: step = merge(3e-4_wp, 1e-6_wp, epsilon(1.0_wp) > 1e-20_wp)
@@ -36,20 +36,28 @@ module one_body
 
 contains
 
-  !> Whether the variations of a machine are known: one body whose motion from a section of its drive depends on x and v alone.
-  pure logical function has_variation(moving)
+  !> Why the variations of a machine are not known, with the key of the case; nothing if they are: one body whose motion from a
+  !> section of its drive depends on x and v alone.
+  pure function why_not_varied(moving) result(why)
     type(motion_t), intent(in) :: moving
-    has_variation = .not. allocated(moving%pair) .and. .not. allocated(moving%jointed)
-    if (.not. has_variation) return
-    has_variation = moving%machine%drive%ratio > 0
-    has_variation = has_variation .and. .not. moving%machine%effects%dahl_stiffness > 0 .and. &
-                    .not. moving%machine%drive%interval > 0 .and. .not. moving%machine%contact%by_impact
-    ! A Stribeck law that is vertical at rest has no derivative there.
-    associate (law => moving%machine%friction)
-      if (law%excess > 0) has_variation = has_variation .and. law%stribeck_exponent >= 1
-      if (law%second_excess > 0) has_variation = has_variation .and. law%second_exponent >= 1
+    character(len=:), allocatable :: why
+    why = ''
+    associate (machine => moving%machine, law => moving%machine%friction)
+      if (allocated(moving%pair) .or. allocated(moving%jointed)) then
+        why = 'body.law: of several bodies only the variations of structures are known'
+      else if (machine%drive%interval > 0) then
+        why = 'drive.law: the variations of a body under a measured force are not known'
+      else if (.not. machine%drive%ratio > 0) then
+        why = 'drive.law: one body without a drive has no section; as a structure it has one where it turns round'
+      else if (machine%effects%dahl_stiffness > 0) then
+        why = 'effect.dahl: variations of this friction are not known'
+      else if (machine%contact%by_impact) then
+        why = 'contact.law: variations of a damping that each impact sets are not known'
+      else if ((law%excess > 0 .and. law%stribeck_exponent < 1) .or. (law%second_excess > 0 .and. law%second_exponent < 1)) then
+        why = 'friction.stribeck_exponent: below 1 the law has no derivative at rest'
+      end if
     end associate
-  end function has_variation
+  end function why_not_varied
 
   !> The hybrid machine of a body. `size_of_x` [m] is the size of the motion, for differences of laws.
   pure function one_body_of(moving, size_of_x) result(body)
@@ -206,9 +214,14 @@ contains
         after(2) = velocity_after_impact(contact, y(2))
         by_state(2, 2) = -contact%restitution
         if (contact%kind /= 0) then
-          h = step*abs(y(2))
+          h = step*max(abs(y(2)), 1e-3_wp*self%size_of(2))
           by_state(2, 2) = quarter(velocity_after_impact(contact, y(2) - 2*h), velocity_after_impact(contact, y(2) - h), &
                                    velocity_after_impact(contact, y(2) + h), velocity_after_impact(contact, y(2) + 2*h))/h
+        end if
+        ! Without rebound nothing is left but the instant.
+        if (.not. abs(by_state(2, 2)) > 0) then
+          by_state = 0
+          after(1) = merge(contact%upper, contact%lower, event%kind == event_impact_upper)
         end if
       case (event_turning_point, event_stick)
         after(2) = 0

@@ -32,7 +32,6 @@ module structure_family
   real(wp), parameter :: held_within = 1e-10_wp
   !> Longest return to an event section, in periods of the slowest mode.
   integer, parameter :: longest_return = 256
-  !> Phases take five digits of a mode's number.
   integer, parameter :: joints_in_number = 13, most_marched = 16
 
 contains
@@ -321,8 +320,8 @@ contains
     end select
   end subroutine map_of_structure
 
-  !> Directions that a motion leaves of its start: a joint that sticks takes one, a closed contact two, a slider one, an event
-  !> section one.
+  !> Directions that a motion leaves of its start: a joint that sticks takes one, a closed contact two, a slider one, an impact
+  !> without rebound one, an event section one.
   pure integer function least_dimension(structure, mode, events) result(least)
     type(structure_t), intent(in) :: structure
     integer, intent(in) :: mode
@@ -331,10 +330,19 @@ contains
     least = dimension_in(mode)
     do k = 1, size(events)
       least = min(least, dimension_in(events(k)%after))
+      if (leaves_no_speed(events(k))) least = min(least, max(dimension_in(events(k)%after) - 1, 0))
     end do
     if (.not. structure%has_clock) least = least - 1
 
   contains
+
+    pure logical function leaves_no_speed(event)
+      type(event_t), intent(in) :: event
+      leaves_no_speed = any(event%guard == [meets_upper, meets_lower])
+      associate (contact => structure%frame%moving%machine%joints(event%joint)%contact)
+        if (leaves_no_speed) leaves_no_speed = contact%kind == 0 .and. .not. contact%restitution > 0
+      end associate
+    end function leaves_no_speed
 
     pure integer function dimension_in(number)
       integer, intent(in) :: number

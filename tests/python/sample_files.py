@@ -226,6 +226,7 @@ def write_boundary(path: Path, stack: Path) -> Path:
                              ("boundary_points", [40, 40])):  # fmt: skip
             group[name] = np.array(values)
         group["multipliers"] = np.array([[3.0, 0.1], [4.0, 0.2]])
+        group["multipliers_imag"] = np.zeros((2, 2))
         group["x"], group["v"], group["drive_ratio"] = np.array([0.85, 0.25]), np.zeros(2), ratios
     return path
 

@@ -123,6 +123,21 @@ def test_a_parameter_without_effect_has_straight_branches(run):
             chosen = result["branch"].values == number
             assert np.ptp(result["x"].values[chosen]) < 1e-9
         assert set(decode_flags(result["label"]).values) == {"none", "end_of_range"}
+    assert "body.gravity has no effect on any orbit that was found" in ended.stdout
+    assert "ends: end of range" in ended.stdout
+
+
+@pytest.mark.parametrize(
+    ("case", "said"),
+    [
+        ("../measured_pendulum", "drive.law: one body without a drive has no section"),
+        ("../measured_platform", "drive.law: the variations of a body under a measured force"),
+    ],
+)
+def test_a_refusal_names_what_the_case_has(run, case, said):
+    out, ended = run(case, "--parameter", "body.mass", "--from", "1", "--to", "2")
+    assert ended.returncode == 65 and said in ended.stderr
+    assert not out.exists()
 
 
 # fold at which the impacting motion ends in a run up; grazes at which impacts start in it and in a run down

@@ -92,8 +92,9 @@ def ask(true: Model, without: Model, names: tuple[str, ...], **options) -> tuple
     return investigate(without, records[:2], records[2:], Options(quick=True, candidates=names, **options))
 
 
-def test_the_stretch_of_the_spring_is_that_of_its_foot():
-    without = base()
+@pytest.mark.parametrize("gap", [0.0, 0.03])
+def test_the_stretch_of_the_spring_is_that_of_its_foot(gap: float):
+    without = base().with_effect("backlash", {"gap": gap}) if gap else base()
     record = records_of(without)[0]
     data = gather([prepare(record, without)], 1.0, None)
     fitted = fit_base(data, without, scales_of(data, without).mass)

@@ -13,8 +13,9 @@ from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
 from separatrix.discovery.fitting.base import measure_noise
-from separatrix.discovery.fitting.fit import blocks_of, eliminate, gauss_newton_step, minimise
+from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, gauss_newton_step
 from separatrix.discovery.fitting.problem import Evaluation
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.measured.signals import white_noise
@@ -132,7 +133,7 @@ def test_false_flags_are_rare():
 
 def test_what_was_not_tested_is_in_the_order_of_the_catalogue(monkeypatch):
     names = ["viscous", "dahl", "cubic_spring", "offset_force", "sensor_delay"]
-    fits = SimpleNamespace(values=[], reduced_chi2=1.0)
+    fits = SimpleNamespace(values=[], reduced_chi2=1.0, like_noise=lambda _: False)
     monkeypatch.setattr(
         rounds, "candidate", lambda *words: "the machine has no friction" if words[3] == "dahl" else object()
     )
@@ -205,6 +206,46 @@ def test_a_fit_ends_at_a_kink_only_after_steps_of_every_length():
     assert not fit.converged
 
 
+def test_derivatives_are_kept_while_steps_gain_what_they_promise():
+    """A bent line is fitted with fewer derivatives than steps; the last ones are those of the end."""
+    random = np.random.default_rng(9)
+    noise, along = random.standard_normal(60), np.linspace(0.5, 1.5, 60)
+    noise[:2] = along[:2] = 0
+    asked = []
+
+    def bent(value: float) -> np.ndarray:
+        return value + 0.02 * value**2
+
+    class Counted(Residuals):
+        def evaluate(self, values, starts, derivatives=True):
+            asked.append(derivatives)
+            return super().evaluate(values, starts, derivatives)
+
+    problem = Counted(
+        lambda value: noise + 40 * bent(value) * along, lambda value: -40 * (1 + 0.04 * value) * along
+    )
+    fit = minimise(problem, np.array([3.0]), np.zeros((1, 2)), tolerance=1e-6)
+    best = -(noise @ along) / (40 * along @ along)
+    assert bent(fit.values[0]) == pytest.approx(best, abs=1e-4)
+    assert fit.converged
+    slope = fit.evaluation.by_parameter[0, :, 0]
+    np.testing.assert_array_equal(slope, -40 * (1 + 0.04 * fit.values[0]) * along)
+    assert asked.count(True) < asked.count(False)
+
+
+def test_a_fit_that_cannot_come_near_another_is_given_up():
+    random = np.random.default_rng(10)
+    left = 5 * random.standard_normal(60)
+    hard = Residuals(
+        lambda value: left + 0.1 * np.tanh(value + np.arange(60)), lambda value: np.full(60, -0.01)
+    )
+    begin = np.array([0.7])
+    whole = minimise(hard, begin, np.zeros((1, 2)), patient=True, most=40)
+    short = minimise(hard, begin, np.zeros((1, 2)), patient=True, most=40, beat=60.0)
+    assert whole.total > 60 + 100
+    assert short.iterations <= min(4, whole.iterations)
+
+
 def test_a_segment_that_cannot_be_flown_is_followed_badly():
     one = minimise(
         Residuals(lambda _: np.full(60, 1.0), lambda _: np.zeros(60)), np.zeros(1), np.zeros((1, 2)), most=0
@@ -261,7 +302,7 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     monkeypatch.setattr(rounds, "_out_of_race", lambda *_: False)
     for step in ("_carry_on", "_cross", "_fair"):
         monkeypatch.setattr(rounds, step, lambda *_: None)
-    fits = SimpleNamespace(values=[], reduced_chi2=1.0)
+    fits = SimpleNamespace(values=[], reduced_chi2=1.0, like_noise=lambda _: False)
     base = SimpleNamespace(
         names=(), model=SimpleNamespace(parameters={}), problem=SimpleNamespace(free=[]), fit=fits
     )

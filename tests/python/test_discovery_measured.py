@@ -89,3 +89,14 @@ def test_a_spring_that_small_swings_suggest_is_refuted_by_large_ones(records):
     assert set(verdict["effects"]) == {"coulomb", "quadratic_drag", "dahl"}
     alone = found(records, "pendulum_large")["parameters"]["effect.coulomb.force"]["value"]
     assert verdict["parameters"]["effect.coulomb.force"]["value"] == pytest.approx(alone, rel=0.15)
+
+
+def test_half_swings_alone_foretell_the_small_pendulum_no_better(records):
+    """Constant friction misses by more than the scatter; friction that may change is hardly known."""
+    figures = runpy.run_path(str(ROOT / "scripts" / "measured_figures"))
+    swings = [figures["half_swings"](records, name) for name in ("pendulum_small", "pendulum_small_low")]
+    own, held_out, error = figures["swings_alone"](*swings[0], *swings[1], 0)
+    assert own < 2 < 5 < held_out
+    assert held_out > 3 * error
+    _, held_out, error = figures["swings_alone"](*swings[0], *swings[1], 1)
+    assert min(held_out, error) > 9

@@ -3,6 +3,7 @@
 """The command `stability`: exponents, their sum, and what a motion is."""
 
 import json
+import math
 import subprocess
 from pathlib import Path
 
@@ -39,6 +40,24 @@ def test_a_stable_orbit_is_periodic(run):
     ended = run("--set", "start.x0=-1.0", "--periods", "2000", "--json")
     lines = {line["event"]: line for line in map(json.loads, ended.stdout.splitlines())}
     assert lines["motion"]["type"] in ("periodic", "not_known")
+
+
+def test_a_start_at_another_crank_angle_comes_to_the_same_motion(run):
+    ended = run("--set", "start.x0=-1.0", "--set", "start.crank_angle=1", "--periods", "2000", "--json")
+    lines = {line["event"]: line for line in map(json.loads, ended.stdout.splitlines())}
+    # one impact a period of restitution 0.8 and no damping
+    assert lines["sum"]["found"] == pytest.approx(2 * math.log(0.8) * 2.8 / (2 * math.pi), abs=1e-9)
+
+
+def test_impacts_without_rebound_lose_a_direction(run):
+    ended = run("--set", "contact.restitution=0.0", "--set", "start.x0=-1.0", "--periods", "200", "--json")
+    values = {
+        line["number"]: line["value"]
+        for line in map(json.loads, ended.stdout.splitlines())
+        if line["event"] == "exponent"
+    }
+    assert values[2] is None
+    assert '"sum"' not in ended.stdout
 
 
 def test_what_makes_no_sense_is_refused(run):

@@ -16,7 +16,9 @@ def rows(source_dir):
     sys.path.remove(str(source_dir / "scripts"))
 
 
-@pytest.mark.parametrize(("name", "count"), [("nonsmooth_modes", 3), ("others", 3), ("ball", 5)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("nonsmooth_modes", 3), ("others", 3), ("ball", 5), ("rattle", 1)]
+)
 def test_numbers_agree(rows, separatrix, build_dir, tmp_path, name, count):
     found = getattr(rows, name)(rows.Program(build_dir, tmp_path))
     assert len(found) == count

@@ -140,16 +140,22 @@ def _notes(result: xr.Dataset) -> list[str]:
     rows = zip(
         result["saddles_period"].values,
         result["saddles_event_word"].values,
-        result["saddles_multipliers"].values,
+        result["saddles_multipliers"].values + 1j * result["saddles_multipliers_imag"].values,
         result["saddles_boundary_points"].values,
         strict=True,
     )
     listed = [
-        f"saddle {k}: period {period}, {decode_word(word)}, multipliers {one:.4g} and {two:.4g}"
-        for k, (period, word, (one, two), reached) in enumerate(rows, 1)
+        f"saddle {k}: period {period}, {decode_word(word)}, multipliers {_multipliers_text(values)}"
+        for k, (period, word, values, reached) in enumerate(rows, 1)
         if reached > 0
     ]
     return notes + listed[:_MOST_LISTED]
+
+
+def _multipliers_text(values: np.ndarray) -> str:
+    """List multipliers, of a structure the two of largest modulus alone."""
+    shown = [f"{value.real:.4g}" if value.imag == 0 else f"{value:.4g}" for value in values[:2]]
+    return " and ".join(shown) if values.size == 2 else ", ".join([*shown, "..."])
 
 
 def draw(

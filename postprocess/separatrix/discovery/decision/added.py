@@ -51,7 +51,7 @@ def _law(bench: Bench, decision: Decision, character: Character) -> Judged | str
     shares = [closed_share(base.fit, best.fitted.fit)]
     if best.prediction is not None:
         shares.append(closed_share(decision.foretold, best.prediction))
-    lowest = min(share for share in shares if share is not None)
+    lowest = min((share for share in shares if share is not None), default=0.0)
     if lowest <= bench.options.characterised:
         return f"effect.{member.effect}, over {member.variable}, closes only {100 * lowest:.0f} % of the gap"
     return best

@@ -15,7 +15,7 @@ from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, motion_of
 from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Bench
-from separatrix.discovery.fitting.fit import blocks_of, eliminate
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 
 _USABLE = 1e-6
 # of the distance of the values of a constant that are tried, towards the best

@@ -128,9 +128,14 @@ def _directions(
             rows.append(row)
             places.append(place)
     covariance = one.covariance[np.ix_(places, places)]
-    known = np.diag(covariance) > 0
+    known = np.flatnonzero(np.diag(covariance) > 0)
+    # parameters differ by many orders of magnitude in SI units
+    size = np.sqrt(np.diag(covariance)[known])
+    units = np.outer(size, size)
     prior = np.zeros_like(covariance)
-    prior[np.ix_(known, known)] = np.linalg.pinv(covariance[np.ix_(known, known)], hermitian=True)
+    prior[np.ix_(known, known)] = (
+        np.linalg.pinv(covariance[np.ix_(known, known)] / units, hermitian=True) / units
+    )
     return paths, np.array(rows), prior
 
 

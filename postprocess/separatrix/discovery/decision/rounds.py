@@ -9,9 +9,9 @@ import numpy as np
 from separatrix.discovery.decision.judge import Judged, judged
 from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
-from separatrix.discovery.fitting.fit import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.machine import with_values
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
@@ -95,6 +95,8 @@ def run_round(
     known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
     ends = [one for one in found.judged if one.fitted.fit.converged]
     rival = max(ends, key=lambda one: one.training).fitted if ends else None
+    if rival is None and base.fit.like_noise(2):
+        rival = base
     chosen = choose(base, found.screened, options, everything)
     if stands:
         chosen = [name for name in chosen if name not in known]
@@ -110,7 +112,7 @@ def run_round(
             known.get(name),
         )
         # what is far behind a machine that leaves only noise and foretells need not foretell
-        told = None if _out_of_race(fitted, found.judged, rival) else bench.foretell(fitted, foretold)
+        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
         found.judged.append(found.judge(fitted, told))
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
@@ -145,11 +147,15 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
 
 
-def _out_of_race(fitted: Fitted, found: list[Judged], rival: Fitted | None) -> bool:
-    first = next((one for one in found if one.fitted is rival), None)
-    return bool(
-        first is not None and first.held_out >= 0 and rival.fit.like_noise(2) and beaten(fitted, rival)
-    )
+def _out_of_race(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:
+    if rival is None or not (rival.fit.like_noise(2) and beaten(fitted, rival)):
+        return False
+    return rival is found.base or any(one.fitted is rival and one.held_out >= 0 for one in found.judged)
+
+
+def _beaten_by_noise(fitted: Fitted, base: Fitted) -> bool:
+    """Whether a candidate is far behind a base that already leaves only noise."""
+    return base.fit.like_noise(2) and beaten(fitted, base)
 
 
 def _fair(bench: Bench, found: Round) -> None:
@@ -172,7 +178,8 @@ def _carry_on(bench: Bench, found: Round) -> None:
         done = one.fitted.fit.converged
         if near and not (done and (one.prediction is not None or bench.held_out is None)):
             fitted = one.fitted
-            if not done:
+            # of a base that leaves only noise the rest could be no name
+            if not done and not _beaten_by_noise(fitted, found.base):
                 fitted = carried_on(bench.training, found.candidates[one.name], fitted, patient=True)
             order[place] = found.judge(fitted, bench.foretell(fitted, one.prediction))
     found.rank()

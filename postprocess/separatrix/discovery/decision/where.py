@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from separatrix.discovery.fitting.fit import blocks_of, eliminate
 from separatrix.discovery.fitting.motions import after_impacts, scaled_motion
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns
 from separatrix.discovery.options import Options

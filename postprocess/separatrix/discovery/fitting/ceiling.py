@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.fitting.fit import Fit, blocks_of, eliminate
+from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knots_of, scaled_motion, splines
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project

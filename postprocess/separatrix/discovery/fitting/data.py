@@ -165,13 +165,16 @@ def fit_stages(
     known = begin
     problem, fit = None, None
     for stage in stages:
+        last = stage == stages[-1]
         problem = Problem(model, data.prepared, data.stages[stage], free)
         starts = data.smoothed_starts(stage) if known is None else data.carried_starts(stage, *known)
+        begun = None
         if robust:
-            fit = minimise(problem, values, starts, robust=True, most=most, hopeless=hopeless, fixed=fixed)
-            values, starts = fit.values, fit.starts
-        if not robust or stage == stages[-1]:
-            fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed)
+            more = {"hopeless": hopeless, "fixed": fixed, "rough": not last}
+            fit = minimise(problem, values, starts, robust=True, most=most, **more)
+            values, starts, begun = fit.values, fit.starts, fit.evaluation
+        if not robust or last:
+            fit = minimise(problem, values, starts, most=most, hopeless=hopeless, fixed=fixed, begun=begun)
             values = fit.values
         known = (stage, fit)
     if hopeless is not None and fit.far_off(hopeless):

@@ -1,24 +1,24 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Least squares over many short segments: each start is eliminated block by block, the common parameters
-remain.
-
-The normal equations of a Levenberg-Marquardt step have the form of an arrow: one 2 x 2 block per segment,
-coupled only through the parameters. Their Schur complement has the size of the parameters
-(tests/python/test_discovery_fit.py compares it with the dense step).
-"""
+"""Least squares over many short segments: damped Gauss-Newton steps of all starts and parameters together."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from separatrix.discovery.fitting.normal_equations import (
+    Blocks,
+    Reduced,
+    blocks_of,
+    eliminate,
+    gauss_newton_step,
+)
 from separatrix.discovery.fitting.problem import Evaluation, Problem
 
 _HUBER = 1.5
 _TOLERANCE = 0.02
 _NEAR = 0.25
 _KINK = 4.0
-_TINY = 1e-12
 _STRONGEST = 1e8
 _FINE = 0.03
 # damping of the first step
@@ -29,26 +29,15 @@ _LITTLE = 0.1
 _LITTLE_SHARE = 3e-5
 _STALLS = 2
 _PATIENT_STALLS = 4
-
-
-@dataclass
-class Blocks:
-    """Normal equations by segment; columns are the start (2), then the parameters."""
-
-    matrix: np.ndarray
-    gradient: np.ndarray
-
-
-@dataclass
-class Reduced:
-    """What is left of each segment after its start is eliminated, to be summed or resampled."""
-
-    matrix: np.ndarray
-    gradient: np.ndarray
-
-    def total(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sum over the segments."""
-        return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
+# decrement within which a fit ends that only leads to another
+_ROUGH = 0.5
+# derivatives are kept where a step gained its promise within this share, and the decrement falls by so much
+_AS_PROMISED = 0.25
+_FALLS = 10.0
+# iterations before a fit may be given up; what it must be behind, in squares and in decrements
+_HEARD = 3
+_LOST = 100.0
+_OVER = 5.0
 
 
 @dataclass
@@ -138,65 +127,6 @@ class Fit:
         return self.reduced_chi2 < 1 + max(_FINE, deviations * np.sqrt(2 / self.freedom))
 
 
-def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:
-    """Normal equations of each segment."""
-    whole = np.concatenate([by_start, columns], axis=2)
-    weighted = (whole * weights[:, :, None]).transpose(0, 2, 1)
-    return Blocks(weighted @ whole, (weighted @ residual[:, :, None])[:, :, 0])
-
-
-def eliminate(blocks: Blocks, damping: float = 0.0) -> tuple[Reduced, np.ndarray, np.ndarray]:
-    """Schur complement by segment; also inverse start blocks and couplings, to find the starts again."""
-    start = blocks.matrix[:, :2, :2].copy()
-    diagonal = np.einsum("kii->ki", start)
-    diagonal *= 1 + damping
-    diagonal += _TINY * (diagonal.max(axis=1, keepdims=True, initial=0) + 1e-300)
-    determinant = start[:, 0, 0] * start[:, 1, 1] - start[:, 0, 1] * start[:, 1, 0]
-    safe = np.where(determinant > 0, determinant, 1)
-    inverse = np.empty_like(start)
-    inverse[:, 0, 0], inverse[:, 1, 1] = start[:, 1, 1] / safe, start[:, 0, 0] / safe
-    inverse[:, 0, 1] = inverse[:, 1, 0] = -start[:, 0, 1] / safe
-    inverse[determinant <= 0] = 0
-    coupling = blocks.matrix[:, :2, 2:]
-    carried = coupling.transpose(0, 2, 1) @ inverse
-    matrix = blocks.matrix[:, 2:, 2:] - carried @ coupling
-    gradient = blocks.gradient[:, 2:] - (carried @ blocks.gradient[:, :2, None])[:, :, 0]
-    return Reduced(matrix, gradient), inverse, coupling
-
-
-def solve_scaled(
-    matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float = 0.0
-) -> np.ndarray:
-    """Solve for the open unknowns in units of their own diagonal; directions without information stay."""
-    step = np.zeros(gradient.size)
-    diagonal = np.diag(matrix)
-    open_ = open_ & (diagonal > 0)
-    if not open_.any():
-        return step
-    scale = 1 / np.sqrt(diagonal[open_])
-    scaled = matrix[np.ix_(open_, open_)] * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(scaled)
-    kept = values > 1e-11
-    inverse = np.where(kept, 1 / np.where(kept, values + damping, 1), 0)
-    step[open_] = scale * (vectors @ (inverse * (vectors.T @ (scale * gradient[open_]))))
-    return step
-
-
-def gauss_newton_step(
-    blocks: Blocks, open_: np.ndarray, damping: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Steps of the starts and the parameters, and the decrease of chi^2 that the linear model promises."""
-    reduced, inverse, coupling = eliminate(blocks, damping)
-    matrix, gradient = reduced.total()
-    step = solve_scaled(matrix, gradient, open_, damping)
-    back = blocks.gradient[:, :2] - (coupling @ step[None, :, None])[:, :, 0]
-    starts = (inverse @ back[:, :, None])[:, :, 0]
-    whole = np.concatenate([starts, np.broadcast_to(step, (starts.shape[0], step.size))], axis=1)
-    bent = (blocks.matrix @ whole[:, :, None])[:, :, 0]
-    promised = float(np.sum(whole * (2 * blocks.gradient - bent)))
-    return starts, step, promised
-
-
 def minimise(
     problem: Problem,
     values: np.ndarray,
@@ -208,65 +138,152 @@ def minimise(
     fixed: np.ndarray | None = None,
     hopeless: float | None = None,
     patient: bool = False,
+    rough: bool = False,
+    beat: float | None = None,
+    begun: Evaluation | None = None,
 ) -> Fit:
     """Minimise squares (or Huber's loss, `robust`); stop early above `hopeless` times the wanted chi^2.
 
-    A `patient` fit goes on where steps gain next to nothing, for machines that a verdict depends on.
+    A `patient` fit goes on where steps gain next to nothing, for machines that a verdict depends on; a
+    `rough` one only leads to another and ends within a standard error. A fit that is behind the sum of
+    squares `beat` by far more than it can still gain is given up. `begun`: the evaluation at values and
+    starts, if it is known.
     """
-    lower = np.array([one.lower for one in problem.free])
-    upper = np.array([one.upper for one in problem.free])
     movable = np.ones(values.size, bool) if fixed is None else ~fixed
-    values = np.clip(values, lower, upper)
-    damping = _MILD
-    current = problem.evaluate(values, starts)
+    tolerance = max(tolerance, _ROUGH) if rough else tolerance
+    descent = _Descent(problem, values, starts, movable, robust, begun)
     iterations = stalled = 0
     begun_anew = exhausted = False
     most_stalls = _PATIENT_STALLS if patient else _STALLS
     while iterations < most:
         iterations += 1
-        weights, scale = _weights(current, robust)
-        blocks = blocks_of(current.by_start, current.by_parameter, current.residual, weights)
-        open_ = _open(blocks, values, lower, upper, movable)
-        _, _, decrement = gauss_newton_step(blocks, open_)
-        if decrement < max(tolerance, 1e-5 * _cost(current, weights > 0, scale, robust)):
+        if not descent.look(tolerance, rough):
             break
-        good = ~current.failed & current.steady
-        before = _costs(current, scale, robust)
-        accepted, mild = False, damping <= _MILD
-        while damping < _STRONGEST:
-            start_step, step, promised = gauss_newton_step(blocks, open_, damping)
-            tried = np.clip(values + step, lower, upper)
-            trial = problem.evaluate(tried, starts + start_step, derivatives=False)
-            both = good & ~trial.failed
-            gain = float((before - _costs(trial, scale, robust))[both].sum())
-            lost = int((good & trial.failed).sum())
-            if gain > 0 and lost <= 0.02 * good.sum():
-                accepted = True
-                break
-            damping = max(10 * damping, 1e-6)
-        if not accepted:
+        if beat is not None and iterations > _HEARD and descent.behind(beat):
+            break
+        mild = descent.damping <= _MILD
+        if not descent.step():
             exhausted = mild or begun_anew
             if exhausted:
                 break
-            damping, begun_anew = _MILD, True
+            descent.damping, begun_anew = _MILD, True
             continue
-        values, starts = tried, starts + start_step
-        damping = damping * 0.2 if gain > 0.5 * promised else damping * 2
-        current = problem.evaluate(values, starts)
-        little = tolerance if patient else max(_LITTLE, _LITTLE_SHARE * float(before[both].sum()))
-        stalled = stalled + 1 if gain < little else 0
+        little = tolerance if patient else max(_LITTLE, _LITTLE_SHARE * descent.before)
+        stalled = stalled + 1 if descent.gain < little else 0
         if stalled >= most_stalls:
             exhausted = begun_anew
             if exhausted:
                 break
-            damping, stalled, begun_anew = _MILD, most_stalls - 1, True
+            descent.damping, stalled, begun_anew = _MILD, most_stalls - 1, True
         elif not stalled:
             begun_anew = False
-        if hopeless is not None and iterations >= 4 and gain < 0.02 * before[both].sum():
-            mean = before[both].sum() / max(1, current.used[both].sum())
-            if mean > hopeless:
-                break
-    return replace(_finished(problem, values, starts, current, movable, iterations), exhausted=exhausted)
+        if hopeless is not None and iterations >= _HEARD and descent.hopeless(hopeless):
+            break
+    if not rough:
+        descent.renew()
+    found = _finished(problem, descent.values, descent.starts, descent.current, movable, iterations)
+    return replace(found, exhausted=exhausted)
+
+
+class _Descent:
+    """Where a minimisation is, and its damped steps.
+
+    Derivatives cost far more than residuals: they are kept from step to step for as long as steps gain what
+    they promise and the decrement falls by `_FALLS` each time.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        values: np.ndarray,
+        starts: np.ndarray,
+        movable: np.ndarray,
+        robust: bool,
+        begun: Evaluation | None,
+    ) -> None:
+        self.problem, self.movable, self.robust = problem, movable, robust
+        self.lower = np.array([one.lower for one in problem.free])
+        self.upper = np.array([one.upper for one in problem.free])
+        self.values, self.starts = np.clip(values, self.lower, self.upper), starts
+        self.current = problem.evaluate(self.values, starts) if begun is None else begun
+        self.damping = _MILD
+        self.gain = self.before = self.decrement = 0.0
+        # decrement of the step before, where the derivatives are those of an earlier point
+        self.kept: float | None = None
+
+    def renew(self) -> None:
+        """Derivatives of here, if they are those of an earlier point."""
+        if self.kept is not None:
+            self.current, self.kept = self.problem.evaluate(self.values, self.starts), None
+
+    def look(self, tolerance: float, rough: bool) -> bool:
+        """Whether a further step promises more than `tolerance`."""
+        while True:
+            weights, self.scale = _weights(self.current, self.robust)
+            self.inside = weights > 0
+            residual = self.current.residual
+            self.blocks = blocks_of(self.current.by_start, self.current.by_parameter, residual, weights)
+            self.open = _open(self.blocks, self.values, self.lower, self.upper, self.movable)
+            _, _, self.decrement = gauss_newton_step(self.blocks, self.open)
+            cost = _cost(self.current, self.inside, self.scale, self.robust)
+            more = self.decrement >= max(tolerance, 1e-5 * cost)
+            if self.kept is None or (rough and not more):
+                return more
+            if more and self.decrement * _FALLS <= self.kept:
+                return True
+            self.renew()
+
+    def step(self) -> bool:
+        """Go a step that lowers the loss; false where none of any length does."""
+        while True:
+            good = ~self.current.failed & self.current.steady
+            before = _costs(self.current, self.scale, self.robust)
+            while self.damping < _STRONGEST:
+                start_step, step, promised = gauss_newton_step(self.blocks, self.open, self.damping)
+                tried = np.clip(self.values + step, self.lower, self.upper)
+                trial = self.problem.evaluate(tried, self.starts + start_step, derivatives=False)
+                both = good & ~trial.failed
+                self.gain = float((before - _costs(trial, self.scale, self.robust))[both].sum())
+                if self.gain > 0 and (good & trial.failed).sum() <= 0.02 * good.sum():
+                    self.before, self.count = float(before[both].sum()), self.current.used[both].sum()
+                    self._take(tried, self.starts + start_step, trial, promised)
+                    return True
+                if self.kept is not None:
+                    break
+                self.damping = max(10 * self.damping, 1e-6)
+            if self.kept is None:
+                return False
+            # the fault may be that of the old derivatives
+            self.renew()
+            self.look(0.0, rough=False)
+
+    def _take(self, values: np.ndarray, starts: np.ndarray, trial: Evaluation, promised: float) -> None:
+        self.values, self.starts = values, starts
+        self.damping = self.damping * 0.2 if self.gain > 0.5 * promised else self.damping * 2
+        alike = np.array_equal(trial.hits, self.current.hits) and np.array_equal(
+            trial.failed, self.current.failed
+        )
+        if alike and abs(self.gain - promised) < _AS_PROMISED * promised:
+            old = self.current
+            self.current = replace(
+                trial,
+                by_start=old.by_start,
+                by_parameter=old.by_parameter,
+                transition=old.transition,
+                steady=old.steady,
+            )
+            self.kept = self.decrement
+        else:
+            self.current, self.kept = self.problem.evaluate(values, starts), None
+
+    def behind(self, beat: float) -> bool:
+        """Whether the squares are above `beat` by far more than the next steps may gain."""
+        squares = _cost(self.current, self.inside, self.scale, robust=False)
+        return squares - beat > max(_LOST, _OVER * self.decrement)
+
+    def hopeless(self, limit: float) -> bool:
+        """Whether steps gain little far above the wanted chi^2."""
+        return bool(self.gain < 0.02 * self.before and self.before > limit * max(1, self.count))
 
 
 def again(problem: Problem, fit: Fit) -> Fit:

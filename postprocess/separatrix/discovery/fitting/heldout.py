@@ -18,6 +18,7 @@ from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
 from separatrix.discovery.fitting.machine import Free, drive_amplitudes, on_other_records
 from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.errors import SeparatrixError
 
 # reduced chi^2 above which errors of the machine are larger than the noise
@@ -143,11 +144,15 @@ def _fit_own(
     if settled is None:
         settled, own = model, np.ones(values.size, bool)
     kept = [one for one, mine in zip(free, own, strict=True) if mine]
-    stages = list(range(len(data.stages)))
-    problem, fit = fit_stages(data, settled, kept, values[own], stages=stages, most=12, fixed=fixed[own])
+    fit = None
     if guess is not None:
-        other = minimise(problem, fit.values, guess, most=12, fixed=fixed[own])
-        if other.good.sum() >= fit.good.sum() and other.total < fit.total:
+        problem = Problem(settled, data.prepared, data.stages[-1], kept)
+        fit = minimise(problem, values[own], guess, most=12, fixed=fixed[own])
+    # a guess that leads all segments to a minimum needs no way from short ones
+    if fit is None or not fit.converged or suspicious(fit).size:
+        stages = list(range(len(data.stages)))
+        _, other = fit_stages(data, settled, kept, values[own], stages=stages, most=12, fixed=fixed[own])
+        if fit is None or other.good.sum() > fit.good.sum() or other.total < fit.total:
             fit = other
     found = values.copy()
     found[own] = fit.values

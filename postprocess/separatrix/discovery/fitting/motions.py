@@ -63,6 +63,9 @@ def _slack_places(problem: Problem, fit: Fit, number: int) -> np.ndarray:
         acts = first == "effect" and last.split("[")[0] in effects()[middle[0]].amplitudes
         if (first == "friction" and last.endswith(("coefficient", "damping"))) or acts:
             values[path] = 0.0
+        # free play is no force of its own, but moves the places by half of it
+        if path == "effect.backlash.gap":
+            values[path] = 0.0
     time = _INSTANT / max(1.0, model.drive_frequency({}))
     start = np.column_stack([np.full(_ANGLES.size, x), np.zeros(_ANGLES.size), _ANGLES])
     flown = model.segments(

@@ -75,9 +75,9 @@ def refit(
 ) -> Fitted:
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
-    Where a `rival` already leaves nothing but noise, a candidate that is clearly worse after its first start
-    is not tried further. A fit `known` from another noise is only carried on where it is good or out of the
-    race.
+    Where a `rival` (the base itself, perhaps) already leaves nothing but noise, a candidate that is clearly
+    worse after its first start is not tried further. A fit `known` from another noise is only carried on
+    where it is good or out of the race.
     """
     best = None
     if known is not None:
@@ -90,10 +90,13 @@ def refit(
     for tries, (kind, start) in enumerate(_starts(candidate, screened), start=1):
         tried = values.copy()
         tried[list(candidate.added)] = start
-        problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
-        rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        if best is None and settled and beaten(rough, rival):
-            return rough
+        if best is None and settled:
+            problem, fit = _try(data, base, candidate, "linear", tried, 8, rival.fit.total)
+            rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
+            if beaten(rough, rival):
+                return rough
+        else:
+            problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
         if not fit.far_off(_hopeless(base)):
             fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
@@ -175,12 +178,18 @@ def _better(one: Fitted, other: Fitted) -> bool:
 
 
 def _try(
-    data: Data, base: Fitted, candidate: Candidate, kind: str, values: np.ndarray, most: int
+    data: Data,
+    base: Fitted,
+    candidate: Candidate,
+    kind: str,
+    values: np.ndarray,
+    most: int,
+    beat: float | None = None,
 ) -> tuple[Problem, Fit]:
     """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-        return problem, minimise(problem, values, base.fit.starts, most=most)
+        return problem, minimise(problem, values, base.fit.starts, most=most, beat=beat)
     stages = [1, data.last]
     if kind == "far":
         stages = list(range(data.last + 1))
@@ -240,8 +249,13 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
             starts.append(("linear", guess))
         else:
             starts.append(("near", guess))
+    far = [("far", start) for start in candidate.starts[:2]]
+    if starts and not candidate.linear.all():
+        # of the shape least like the first one before all: if both agree, that is the minimum
+        far.sort(key=lambda one: -np.linalg.norm((one[1] - starts[0][1])[~candidate.linear]))
+    starts += far[:1]
     starts += [("near", start) for start in candidate.starts[1:2] if not candidate.linear.all()]
-    starts += [("far", start) for start in candidate.starts[:2]]
+    starts += far[1:]
     return [(kind, np.clip(start, lower, upper)) for kind, start in starts]
 
 

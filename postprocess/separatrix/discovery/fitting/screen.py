@@ -14,7 +14,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from separatrix.discovery.fitting.catalogue import Candidate
-from separatrix.discovery.fitting.fit import Fit, blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 
 # bootstrap of the null

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Normal equations of many short segments: each start is eliminated block by block, the common parameters
+remain.
+
+The normal equations of a Levenberg-Marquardt step have the form of an arrow: one 2 x 2 block per segment,
+coupled only through the parameters. Their Schur complement has the size of the parameters
+(tests/python/test_discovery_fit.py compares it with the dense step).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_TINY = 1e-12
+
+
+@dataclass
+class Blocks:
+    """Normal equations by segment; columns are the start (2), then the parameters."""
+
+    matrix: np.ndarray
+    gradient: np.ndarray
+
+
+@dataclass
+class Reduced:
+    """What is left of each segment after its start is eliminated, to be summed or resampled."""
+
+    matrix: np.ndarray
+    gradient: np.ndarray
+
+    def total(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sum over the segments."""
+        return self.matrix.sum(axis=0), self.gradient.sum(axis=0)
+
+
+def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> Blocks:
+    """Normal equations of each segment."""
+    whole = np.concatenate([by_start, columns], axis=2)
+    weighted = (whole * weights[:, :, None]).transpose(0, 2, 1)
+    return Blocks(weighted @ whole, (weighted @ residual[:, :, None])[:, :, 0])
+
+
+def eliminate(blocks: Blocks, damping: float = 0.0) -> tuple[Reduced, np.ndarray, np.ndarray]:
+    """Schur complement by segment; also inverse start blocks and couplings, to find the starts again."""
+    start = blocks.matrix[:, :2, :2].copy()
+    diagonal = np.einsum("kii->ki", start)
+    diagonal *= 1 + damping
+    diagonal += _TINY * (diagonal.max(axis=1, keepdims=True, initial=0) + 1e-300)
+    determinant = start[:, 0, 0] * start[:, 1, 1] - start[:, 0, 1] * start[:, 1, 0]
+    safe = np.where(determinant > 0, determinant, 1)
+    inverse = np.empty_like(start)
+    inverse[:, 0, 0], inverse[:, 1, 1] = start[:, 1, 1] / safe, start[:, 0, 0] / safe
+    inverse[:, 0, 1] = inverse[:, 1, 0] = -start[:, 0, 1] / safe
+    inverse[determinant <= 0] = 0
+    coupling = blocks.matrix[:, :2, 2:]
+    carried = coupling.transpose(0, 2, 1) @ inverse
+    matrix = blocks.matrix[:, 2:, 2:] - carried @ coupling
+    gradient = blocks.gradient[:, 2:] - (carried @ blocks.gradient[:, :2, None])[:, :, 0]
+    return Reduced(matrix, gradient), inverse, coupling
+
+
+def solve_scaled(
+    matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray, damping: float = 0.0
+) -> np.ndarray:
+    """Solve for the open unknowns in units of their own diagonal; directions without information stay."""
+    step = np.zeros(gradient.size)
+    diagonal = np.diag(matrix)
+    open_ = open_ & (diagonal > 0)
+    if not open_.any():
+        return step
+    scale = 1 / np.sqrt(diagonal[open_])
+    scaled = matrix[np.ix_(open_, open_)] * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    kept = values > 1e-11
+    inverse = np.where(kept, 1 / np.where(kept, values + damping, 1), 0)
+    step[open_] = scale * (vectors @ (inverse * (vectors.T @ (scale * gradient[open_]))))
+    return step
+
+
+def gauss_newton_step(
+    blocks: Blocks, open_: np.ndarray, damping: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Steps of the starts and the parameters, and the decrease of chi^2 that the linear model promises."""
+    reduced, inverse, coupling = eliminate(blocks, damping)
+    matrix, gradient = reduced.total()
+    step = solve_scaled(matrix, gradient, open_, damping)
+    back = blocks.gradient[:, :2] - (coupling @ step[None, :, None])[:, :, 0]
+    starts = (inverse @ back[:, :, None])[:, :, 0]
+    whole = np.concatenate([starts, np.broadcast_to(step, (starts.shape[0], step.size))], axis=1)
+    bent = (blocks.matrix @ whole[:, :, None])[:, :, 0]
+    promised = float(np.sum(whole * (2 * blocks.gradient - bent)))
+    return starts, step, promised

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bodies without a spring of docs/validation.md: a ball on a table by `branches`, a gear between two walls."""
+
+import h5py
+import numpy as np
+from validation_structures_program import Number, Program
+
+
+def bouncing(program: Program) -> list[Number]:
+    """Where a ball on a vibrating table begins to bounce once in k periods, and where that motion doubles."""
+    source, found = "P. J. Holmes (1982), closed form", []
+    for loss, k in ((0.5, 1), (0.8, 1), (0.8, 2)):
+        least = np.pi * k * (1 - loss) / (1 + loss)
+        double = float(np.hypot(least, 2 * (1 + loss**2) / (1 + loss) ** 2))
+        points = program.branch_points(
+            "table", "drive.force.amplitude", 0.97 * least, 1.02 * double, contact__table__restitution=loss
+        )
+        for label, what, place in (("SN", "begins", least), ("PD", "doubles", double)):
+            near = [at for name, at, period, impacts in points if (name, period, impacts) == (label, k, 1)]
+            ours = min(near, key=lambda at, place=place: abs(at - place), default=np.nan)
+            bounces = "one bounce a period" if k == 1 else f"one bounce in {k} periods"
+            text = f"ball on a table, e = {loss}, {bounces}: {what} at Gamma"
+            found.append(Number(source, text, place, ours, 1e-9))
+    return found
+
+
+def rattle(program: Program) -> list[Number]:
+    """Coexisting motions of a gear between two walls."""
+    source = "S. L. T. de Souza, I. L. Caldas (2001), values of BasinsCollection"
+    with h5py.File(program.run("basin", "gear_rattle")) as file:
+        count = np.unique(file["attractor"][:]).size
+    return [Number(source, "gear rattle between two walls: coexisting attractors", 2, count, 0)]

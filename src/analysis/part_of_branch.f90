@@ -1,0 +1,79 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Whether a branch is a part of another one that was followed further.
+module part_of_branch
+  use body_family, only: family_t
+  use branch_point, only: branch_t, point_t
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: lies_on
+
+  !> How far a branch is from the chord of a step, as a share of it: more than the turn of a step allows; and at least.
+  real(wp), parameter :: off_chord = 0.05_wp, rounding = 1e-7_wp
+  !> What tells orbits of a parameter apart.
+  integer, parameter :: features = 5
+
+contains
+
+  !> Whether all points of a branch lie between points of another.
+  pure logical function lies_on(part, whole, family)
+    type(branch_t), intent(in) :: part, whole
+    type(family_t), intent(in) :: family
+    real(wp) :: ends(features, size(whole%points))
+    integer :: i, k, last
+    lies_on = part%points(1)%orbit%periods == whole%points(1)%orbit%periods
+    if (.not. lies_on) return
+    do k = 1, size(whole%points)
+      ends(:, k) = features_of(whole%points(k), family)
+    end do
+    last = 1
+    do i = 1, size(part%points)
+      call find_chord(features_of(part%points(i), family), ends, last, lies_on)
+      if (.not. lies_on) return
+    end do
+  end function lies_on
+
+  !> The chord on which a place lies, from the one found last.
+  pure subroutine find_chord(place, ends, last, found)
+    real(wp), intent(in) :: place(:), ends(:, :)
+    integer, intent(inout) :: last
+    logical, intent(out) :: found
+    real(wp) :: step(features), away(features), share
+    integer :: k, at, chords
+    found = .false.
+    chords = size(ends, 2) - 1
+    do k = 0, chords - 1
+      at = 1 + modulo(last - 1 + k, chords)
+      step = ends(:, at + 1) - ends(:, at)
+      away = place - ends(:, at)
+      share = 0
+      if (norm2(step) > 0) share = min(max(sum(away*step)/sum(step**2), 0.0_wp), 1.0_wp)
+      found = norm2(away - share*step) <= off_chord*norm2(step) + rounding
+      if (found) last = at
+      if (found) return
+    end do
+  end subroutine find_chord
+
+  !> The parameter, the extremes, and sums of the states before the events: none depends on where the orbit begins, and in a graze
+  !> none jumps but that of the places. In natural sizes.
+  pure function features_of(point, family) result(place)
+    type(point_t), intent(in) :: point
+    type(family_t), intent(in) :: family
+    real(wp) :: place(features)
+    integer :: k
+    associate (orbit => point%orbit, sizes => family%sizes)
+      place(:3) = [orbit%parameter/family%parameter_size, [point%x_min, point%x_max]/sizes(1)]
+      place(4:) = 0
+      do k = 1, size(orbit%events)
+        associate (arrival => orbit%events(k)%arrival(:size(orbit%y)))
+          place(4) = place(4) + arrival(1)/sizes(1)
+          place(5) = place(5) + sum(arrival(2:))/sizes(2)
+        end associate
+      end do
+    end associate
+  end function features_of
+
+end module part_of_branch

@@ -1,0 +1,119 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The stable and unstable sets of the saddles of a plane, side by side on the ranks.
+module boundary_sets
+  use body_family, only: body_neighbourhood, family_t
+  use boundary_names, only: names_t
+  use boundary_search, only: plane_t
+  use errors, only: error_t
+  use grid, only: grid_t, point_slice, slice_laws
+  use invariant_sets, only: grow_set, set_t
+  use journal, only: journal_t
+  use kinds, only: int64, wp
+  use one_body, only: one_body_t
+  use team, only: team_t
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: grow_sets
+
+  !> Saddles of a plane whose sets are grown, those first that most boundary points lead to.
+  integer, parameter :: most_grown = 6
+
+contains
+
+  !> Grows the stable and unstable sets of the saddles within `windows` times the window of a plane of x0 and v0, side by side on
+  !> the ranks.
+  subroutine grow_sets(team, journal, grid, plane, windows, names)
+    class(team_t), intent(in) :: team
+    type(journal_t), intent(inout) :: journal
+    type(grid_t), intent(in) :: grid
+    type(plane_t), intent(in) :: plane
+    real(wp), intent(in) :: windows
+    type(names_t), intent(inout) :: names
+    type(family_t) :: family
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    type(set_t) :: set
+    real(wp), allocatable :: own(:), found(:)
+    real(wp) :: low(2), high(2)
+    integer, allocatable :: chosen(:)
+    integer :: k, n, at, length
+    integer, parameter :: sides(2) = [1, -1]
+    if (len(names%problem) > 0 .or. .not. windows > 0 .or. size(names%saddles) == 0) return
+    call window_of(grid, plane, windows, low, high, length)
+    if (length == 0) return
+    family%laws = slice_laws(grid, point_slice(grid, plane%index))
+    family%options = grid%options
+    call body_neighbourhood(family, 0.0_wp, machines, error)
+    if (allocated(error)) return
+    chosen = most_reached(names%reached)
+    allocate (own(0))
+    call journal%begin('sides of stable and unstable sets', int(4*size(chosen), int64), 0_int64)
+    select type (body => machines%centre)
+    type is (one_body_t)
+      do n = team%rank(), 4*size(chosen) - 1, team%size()
+        k = chosen(1 + n/4)
+        call grow_set(machines, body, names%saddles(k), modulo(n, 4) < 2, sides(1 + modulo(n, 2)), low, high, set)
+        own = [own, real(n, wp), real(set%ending, wp), real(size(set%piece), wp), reshape(set%points, [size(set%points)]), &
+               real(set%piece, wp)]
+        call journal%progress(int(n + 1, int64))
+      end do
+    end select
+    call team%allgather(own, found)
+    do n = 0, 4*size(chosen) - 1
+      at = 1
+      do while (nint(found(at)) /= n)
+        at = at + 3 + 3*nint(found(at + 2))
+      end do
+      length = nint(found(at + 2))
+      set%stable = modulo(n, 4) < 2
+      set%side = sides(1 + modulo(n, 2))
+      set%ending = nint(found(at + 1))
+      set%points = reshape(found(at + 3:at + 2 + 2*length), [2, length])
+      set%piece = nint(found(at + 3 + 2*length:at + 2 + 3*length))
+      names%sets = [names%sets, set]
+      names%saddle_of_set = [names%saddle_of_set, chosen(1 + n/4)]
+    end do
+  end subroutine grow_sets
+
+  !> The window in x and v; `axes` is 0 if the plane is not that of x0 and v0.
+  pure subroutine window_of(grid, plane, windows, low, high, axes)
+    type(grid_t), intent(in) :: grid
+    type(plane_t), intent(in) :: plane
+    real(wp), intent(in) :: windows
+    real(wp), intent(out) :: low(2), high(2)
+    integer, intent(out) :: axes
+    integer :: k
+    low = 0
+    high = 0
+    axes = 0
+    do k = 1, 2
+      associate (axis => grid%start_axis(k))
+        if (.not. any(plane%axes == axis)) return
+        associate (values => grid%axes(axis)%values)
+          low(k) = (values(1) + values(size(values)))/2 - windows*(values(size(values)) - values(1))/2
+          high(k) = (values(1) + values(size(values)))/2 + windows*(values(size(values)) - values(1))/2
+        end associate
+      end associate
+    end do
+    axes = 2
+  end subroutine window_of
+
+  !> The saddles that most points lead to, in their order.
+  pure function most_reached(reached) result(chosen)
+    integer, intent(in) :: reached(:)
+    integer, allocatable :: chosen(:)
+    integer :: k, least
+    least = 0
+    do while (count(reached >= least) > most_grown .and. least <= maxval(reached))
+      least = least + 1
+    end do
+    chosen = pack([(k, k=1, size(reached))], reached >= least)
+    if (size(chosen) == 0) chosen = pack([(k, k=1, size(reached))], reached == maxval(reached))
+    chosen = chosen(:min(size(chosen), most_grown))
+  end function most_reached
+
+end module boundary_sets
