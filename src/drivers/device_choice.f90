@@ -8,7 +8,7 @@ module device_choice
   use errors, only: error_t, fail
   use grid, only: slice_motion
   use kinds, only: int64, wp
-  use lane_gpu, only: gpu_count, gpu_in_use, gpu_is_built, gpu_name, use_gpu
+  use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, use_gpu
   use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_flow_t
   use motion, only: motion_t
@@ -38,8 +38,8 @@ contains
     place = place_on_host(team)
     count = 0
     if (has_lanes(the_case)) then
-      count = gpu_count()
-      why = ''
+      call count_gpus(count, why)
+      if (len(why) > 0) why = ' ('//why//')'
       if (.not. gpu_is_built()) why = ' (and no code for one: this build has SEPARATRIX_GPU=OFF)'
       if (asked == 'gpu' .and. count == 0) call fail(error, exit_usage, '--device gpu: found no GPU on '//host_name()//why// &
                                                      '; allowed are auto and cpu')

@@ -139,8 +139,10 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
+    ! Plain text tells of the processor only where it was asked for.
     if (allocated(self%provenance%device)) call self%journal%line('device', 'computed by '//self%provenance%device, &
-      '"device": '//json_text(self%provenance%device)//', "gpus": '//to_text(self%gpus))
+      '"device": '//json_text(self%provenance%device)//', "gpus": '//to_text(self%gpus), &
+      plain=self%gpus > 0 .or. self%command%device /= 'auto')
     call warn_about(self%command%name, self%the_case, self%journal)
   end subroutine begin
 

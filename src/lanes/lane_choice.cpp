@@ -84,7 +84,7 @@ static const lane_gpu *gpu(void) {
   return separatrix_gpu_on_host();
 }
 
-int separatrix_gpu_count(void) { return gpu()->count(); }
+int separatrix_gpu_count(char *message, int size) { return gpu()->count(message, size); }
 
 void separatrix_gpu_name(int device, char *text, int size) { gpu()->name(device, text, size); }
 

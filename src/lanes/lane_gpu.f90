@@ -12,7 +12,7 @@ module lane_gpu
   implicit none
   private
 
-  public :: gpu_is_built, gpu_count, gpu_name, use_gpu, gpu_in_use, open_gpu, send_half, await_half
+  public :: gpu_is_built, count_gpus, gpu_name, use_gpu, gpu_in_use, open_gpu, send_half, await_half
 
   integer, parameter :: message_size = 256
 
@@ -29,8 +29,10 @@ module lane_gpu
       import :: c_int
     end function separatrix_gpu_built
 
-    integer(c_int) function separatrix_gpu_count() bind(c)
-      import :: c_int
+    integer(c_int) function separatrix_gpu_count(message, size) bind(c)
+      import :: c_char, c_int
+      integer(c_int), value :: size
+      character(kind=c_char), intent(out) :: message(size)
     end function separatrix_gpu_count
 
     subroutine separatrix_gpu_name(device, text, size) bind(c)
@@ -71,10 +73,14 @@ contains
     gpu_is_built = separatrix_gpu_built() /= 0
   end function gpu_is_built
 
-  !> GPUs that this process sees.
-  integer function gpu_count()
-    gpu_count = separatrix_gpu_count()
-  end function gpu_count
+  !> GPUs that this process sees; `why`: what CUDA says where it sees none.
+  subroutine count_gpus(number, why)
+    integer, intent(out) :: number
+    character(len=:), allocatable, intent(out) :: why
+    character(kind=c_char) :: message(message_size)
+    number = separatrix_gpu_count(message, int(message_size, c_int))
+    why = text_of(message)
+  end subroutine count_gpus
 
   !> What its maker calls a GPU.
   function gpu_name(device) result(name)

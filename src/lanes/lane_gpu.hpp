@@ -80,9 +80,11 @@ struct gpu_attempt {
   if ((attempt).error == cudaSuccess)                                                                        \
   (attempt)(#call, call(__VA_ARGS__))
 
-int gpu_count() {
+int gpu_count(char *message, int size) {
   int count = 0;
-  return cudaGetDeviceCount(&count) == cudaSuccess ? count : 0;
+  const cudaError_t error = cudaGetDeviceCount(&count);
+  snprintf(message, size, "%s", error == cudaSuccess ? "" : cudaGetErrorString(error));
+  return error == cudaSuccess ? count : 0;
 }
 
 void gpu_name(int device, char *text, int size) {
