@@ -37,14 +37,14 @@ contains
     if (asked == 'cpu') return
     place = place_on_host(team)
     count = 0
-    if (has_lanes(the_case)) then
+    if (has_lanes(the_case, on_gpu=.true.)) then
       call count_gpus(count, why)
       if (len(why) > 0) why = ' ('//why//')'
       if (.not. gpu_is_built()) why = ' (and no code for one: this build has SEPARATRIX_GPU=OFF)'
       if (asked == 'gpu' .and. count == 0) call fail(error, exit_usage, '--device gpu: found no GPU on '//host_name()//why// &
                                                      '; allowed are auto and cpu')
     else if (asked == 'gpu') then
-      call fail(error, exit_usage, '--device gpu: found a machine whose bodies fly one by one, which only a processor does; '// &
+      call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several bodies); '// &
                 'allowed are auto and cpu')
     end if
     if (count > 0) call use_gpu(modulo(place, count))
@@ -62,9 +62,11 @@ contains
     place = count(nint(hosts(:team%rank())) == nint(hosts(team%rank() + 1)))
   end function place_on_host
 
-  !> Whether bodies of the case fly in lanes. Asks the case itself, not along its axes.
-  logical function has_lanes(the_case)
+  !> Whether bodies of the case fly in lanes; `on_gpu`: in those that a GPU has, which know one body. Asks the case itself, not
+  !> along its axes.
+  logical function has_lanes(the_case, on_gpu)
     type(case_t), intent(in) :: the_case
+    logical, intent(in) :: on_gpu
     type(motion_t) :: moving
     type(lane_flow_t) :: flow
     type(error_t), allocatable :: error
@@ -72,7 +74,7 @@ contains
     call slice_motion(grid_of(the_case, the_case%axes(:0)), 0_int64, moving, error)
     if (allocated(error)) return
     call prepare_lanes(moving, flow)
-    has_lanes = flow%available
+    has_lanes = flow%available .and. .not. (on_gpu .and. allocated(flow%structure))
   end function has_lanes
 
   !> What was chosen, in words, and by how many ranks a GPU; on rank 0 of all ranks. Collective.
@@ -90,7 +92,7 @@ contains
     if (gpus == 0) then
       options = options_of(the_case)
       words = 'processor, one by one'
-      if (has_lanes(the_case)) words = 'processor, vectors of '//to_text(options%lane_width)//' doubles'
+      if (has_lanes(the_case, on_gpu=.false.)) words = 'processor, vectors of '//to_text(options%lane_width)//' doubles'
     else if (team%size() == 1) then
       words = 'GPU '//to_text(gpu_in_use)//' ('//gpu_name(gpu_in_use)//')'
     else

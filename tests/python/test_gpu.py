@@ -72,7 +72,7 @@ def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, resu
     ("more", "words"),
     [
         ([], "--device gpu: found no GPU on "),
-        (["--set", 'integrator.lanes="off"'], "found a machine whose bodies fly one by one"),
+        (["--set", 'integrator.lanes="off"'], "found a machine that only a processor flies"),
     ],
 )
 def test_a_gpu_that_cannot_help_is_refused(separatrix, results, monkeypatch, more, words):
