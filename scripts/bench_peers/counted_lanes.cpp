@@ -37,13 +37,14 @@ extern "C" {
 
 int separatrix_lane_width(void) { return width; }
 
-void separatrix_lane_sizes(size_t *machine, size_t *batch) {
+void separatrix_lane_sizes(size_t *machine, size_t *regions, size_t *batch) {
   *machine = sizeof(lane_machine);
+  *regions = sizeof(lane_regions);
   *batch = sizeof(lane_batch);
 }
 
-void separatrix_fly_lanes(int, const lane_machine *machine, lane_batch *batch) {
-  separatrix_fly_counted(machine, batch);
+void separatrix_fly_lanes(int, const lane_machine *machine, const lane_regions *regions, lane_batch *batch) {
+  separatrix_fly_counted(machine, regions, batch);
   for (double status : batch->fields.status)
     counts.left += status == lane_left;
 }

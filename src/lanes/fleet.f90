@@ -5,7 +5,7 @@
 module fleet
   use jointed_log, only: watched_state
   use kinds, only: wp
-  use lane_types, only: lane_batch_t, lane_flow_t
+  use lane_types, only: lane_batch_t, lane_flow_t, regions_t
   use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
@@ -21,6 +21,8 @@ module fleet
   !> Every lane is controlled by `batch`; the motion of several bodies is in `structures`.
   type, public :: fleet_t
     type(lane_batch_t) :: batch
+    !> What one body can be captured by.
+    type(regions_t) :: regions
     type(structure_batch_t), allocatable :: structures
   end type fleet_t
 
@@ -44,11 +46,12 @@ contains
     n = 2
     if (allocated(moving%jointed)) n = 2*moving%jointed%machine%n
     if (size(point) /= n .or. coordinates_of(moving) /= n) then
-      fleet%batch%complete = 0
+      fleet%regions%complete = 0
+      if (allocated(fleet%structures)) fleet%structures%complete = 0
     else if (allocated(moving%jointed)) then
-      call add_structure_region(fleet%batch, fleet%structures, attractor, point, scale, metric, reach)
+      call add_structure_region(fleet%structures, attractor, point, scale, metric, reach)
     else
-      call add_region(fleet%batch, attractor, point, scale, metric(:3), reach)
+      call add_region(fleet%regions, attractor, point, scale, metric(:3), reach)
     end if
   end subroutine add_capture
 
@@ -105,7 +108,7 @@ contains
     if (allocated(fleet%structures)) then
       call fly_structure_lanes(flow, fleet%batch, fleet%structures)
     else
-      call fly_lanes(flow, fleet%batch)
+      call fly_lanes(flow, fleet%regions, fleet%batch)
     end if
   end subroutine fly_fleet
 

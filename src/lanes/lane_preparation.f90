@@ -48,13 +48,14 @@ contains
     if (flow%width <= 0) return
     if (allocated(moving%jointed)) call prepare_structure_lanes(moving%jointed, flow)
     if (.not. is_one_body(moving)) return
+    flow%gpu = moving%options%gpu
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
     else
       call prepare_modes(moving, flow)
     end if
     if (flow%available .or. moving%exact .and. .not. moving%layer > 0) return
-    flow = lane_flow_t(width=flow%width)
+    flow = lane_flow_t(width=flow%width, gpu=flow%gpu)
     call prepare_series(moving, flow)
   end subroutine prepare_lanes
 

@@ -49,7 +49,7 @@ void fly_group(const structure_machine &m, const size &z, int first, lane_batch 
     if (any(due) && 2 * count(stops) < count(flying))
       left = left | take_events(m, z, due, g);
     else if (any(stops))
-      take_stops(m, z, stops, control.complete != 0, batch, g);
+      take_stops(m, z, stops, batch.complete != 0, batch, g);
     put(g.c.status, left, lane_left);
   }
   g.c.exchange(control.fields, first, [](double *to, const vec &from) { memcpy(to, &from, sizeof from); });

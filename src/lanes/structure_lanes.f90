@@ -69,13 +69,12 @@ contains
 
   !> The lanes can be captured by attractor number `attractor` near its `point` (coordinates, speeds): where the square of the
   !> distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`.
-  pure subroutine add_structure_region(control, batch, attractor, point, scale, metric, reach)
-    type(lane_batch_t), intent(inout) :: control
+  pure subroutine add_structure_region(batch, attractor, point, scale, metric, reach)
     type(structure_batch_t), intent(inout) :: batch
     integer, intent(in) :: attractor
     real(wp), intent(in) :: point(:), scale(:), metric(:), reach
     if (batch%regions == structure_regions) then
-      control%complete = 0
+      batch%complete = 0
       return
     end if
     batch%regions = batch%regions + 1

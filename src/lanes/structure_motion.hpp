@@ -6,8 +6,8 @@
 #ifndef SEPARATRIX_STRUCTURE_MOTION_HPP
 #define SEPARATRIX_STRUCTURE_MOTION_HPP
 
+#include "lane_elementary.hpp"
 #include "lane_types.hpp"
-#include "lane_vectors.hpp"
 #include "structure_types.hpp"
 
 namespace {

@@ -65,7 +65,7 @@ module structure_types
     real(c_double), dimension(structure_lane_count, lane_terms) :: end_re = 0, end_im = 0
     real(c_double), dimension(structure_lane_count, lane_joints) :: end_f = 0, end_f1 = 0
     real(c_double) :: sticks(structure_lane_count) = 0
-    integer(c_int) :: regions = 0
+    integer(c_int) :: regions = 0, complete = 1
     type(structure_region_t) :: region(structure_regions)
   end type structure_batch_t
 

@@ -111,7 +111,8 @@ struct structure_region {
 
 struct structure_batch {
   structure_fields<double[lanes_of_structures]> fields;
-  int regions;
+  // Unless the regions are all, every lane stops at every section.
+  int regions, complete;
   structure_region region[most_structure_regions];
 };
 

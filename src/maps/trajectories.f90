@@ -5,8 +5,10 @@
 !> next start. The outcome of a start does not depend on the others.
 module trajectories
   use attractors, only: attractor_t
+  use errors, only: error_t
   use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_lane, take_from_lane
   use kinds, only: wp
+  use lane_gpu, only: await_half, gpu_half_t, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
   use motion, only: motion_t
   use status, only: reason_left_domain
@@ -15,7 +17,7 @@ module trajectories
   implicit none
   private
 
-  public :: run_trajectories, block_size
+  public :: run_trajectories, run_on_device, block_size
 
   !> What is asked of the statistics window of a motion that is not captured.
   integer, parameter, public :: describe_regime = 1, describe_all = 2
@@ -29,6 +31,9 @@ module trajectories
     integer :: describe = describe_all
   end type journey_t
 
+  !> Starts that a GPU is given at a time, where a tile has so many: its pool is refilled many times.
+  integer, parameter :: gpu_block = 2**22
+
   !> The trajectory in a lane: number of its start (0 = none), and whether the extremes of its window went unseen.
   type :: passenger_t
     integer :: start = 0
@@ -38,7 +43,22 @@ module trajectories
 
 contains
 
-  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_strobe` takes; one column each).
+  !> `run_trajectories` on the GPU of the journey, if it has one. Code 75 if that fails; then there are no outcomes.
+  subroutine run_on_device(journey, catalogue, starts, outcomes, error)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    type(outcome_t), intent(out) :: outcomes(:)
+    type(error_t), allocatable, intent(out) :: error
+    if (journey%flow%available .and. journey%flow%gpu >= 0) then
+      call run_on_gpu(journey, catalogue, starts, outcomes, error)
+    else
+      call run_trajectories(journey, catalogue, starts, outcomes)
+    end if
+  end subroutine run_on_device
+
+  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_strobe` takes; one column each), by this
+  !> processor.
   pure subroutine run_trajectories(journey, catalogue, starts, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
@@ -46,7 +66,7 @@ contains
     type(outcome_t), intent(out) :: outcomes(:)
     type(passenger_t) :: passengers(lane_count)
     type(fleet_t) :: lanes
-    integer :: lane, i, next
+    integer :: i, next
     if (.not. journey%flow%available) then
       do i = 1, size(starts, 2)
         call run_trajectory(journey%moving, catalogue, journey%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i), &
@@ -57,25 +77,99 @@ contains
     call open_fleet(journey%moving, lanes)
     call set_regions(journey%moving, catalogue, lanes)
     next = 1
+    call board_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    do while (any(passengers%start > 0))
+      call fly_fleet(journey%flow, lanes)
+      call attend_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    end do
+  end subroutine run_trajectories
+
+  !> A GPU's lanes: while one half of them flies, the other is attended to.
+  subroutine run_on_gpu(journey, catalogue, starts, outcomes, error)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    type(outcome_t), intent(inout) :: outcomes(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(passenger_t), allocatable :: passengers(:, :, :)
+    type(gpu_half_t) :: halves(2)
+    type(fleet_t) :: lanes
+    integer :: next, half, batches, k
+    logical :: away(2)
+    call open_gpu(journey%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
+    if (allocated(error)) return
+    call open_fleet(journey%moving, lanes)
+    call set_regions(journey%moving, catalogue, lanes)
+    batches = size(halves(1)%batches)
+    allocate (passengers(lane_count, batches, 2))
+    next = 1
+    do half = 1, 2
+      do k = 1, batches
+        lanes%batch = lane_batch_t()
+        call board_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
+        halves(half)%batches(k) = lanes%batch
+      end do
+      away(half) = any(passengers(:, :, half)%start > 0)
+      if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
+      if (allocated(error)) return
+    end do
+    half = 1
+    do while (any(away))
+      if (away(half)) then
+        call await_half(half, error)
+        if (allocated(error)) return
+        do k = 1, batches
+          lanes%batch = halves(half)%batches(k)
+          call attend_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
+          halves(half)%batches(k) = lanes%batch
+        end do
+        away(half) = any(passengers(:, :, half)%start > 0)
+        if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
+        if (allocated(error)) return
+      end if
+      half = 3 - half
+    end do
+  end subroutine run_on_gpu
+
+  !> The first starts of a batch.
+  pure subroutine board_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    integer, intent(inout) :: next
+    type(passenger_t), intent(inout) :: passengers(:)
+    type(fleet_t), intent(inout) :: lanes
+    type(outcome_t), intent(inout) :: outcomes(:)
+    integer :: lane
     do lane = 1, lane_count
       call board(journey, catalogue, starts, lane, next, passengers(lane), lanes, outcomes)
     end do
-    do while (any(passengers%start > 0))
-      call fly_fleet(journey%flow, lanes)
-      do lane = 1, lane_count
-        if (passengers(lane)%start == 0 .or. lanes%batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
-        call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), lanes, &
-                    outcomes(passengers(lane)%start))
-        if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, &
-                                                                    passengers(lane), lanes, outcomes)
-      end do
+  end subroutine board_all
+
+  !> The lanes of a batch that has been flown: those that have stopped or are left, and the next starts.
+  pure subroutine attend_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    integer, intent(inout) :: next
+    type(passenger_t), intent(inout) :: passengers(:)
+    type(fleet_t), intent(inout) :: lanes
+    type(outcome_t), intent(inout) :: outcomes(:)
+    integer :: lane
+    do lane = 1, lane_count
+      if (passengers(lane)%start == 0 .or. lanes%batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
+      call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), lanes, &
+                  outcomes(passengers(lane)%start))
+      if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, passengers(lane), &
+                                                                  lanes, outcomes)
     end do
-  end subroutine run_trajectories
+  end subroutine attend_all
 
   !> Trajectories worth asking for at a time: enough to keep the lanes full, or one by one.
   pure integer function block_size(journey)
     type(journey_t), intent(in) :: journey
     block_size = merge(4*lane_count, 1, journey%flow%available)
+    if (journey%flow%available .and. journey%flow%gpu >= 0) block_size = gpu_block
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
