@@ -166,7 +166,7 @@ def multiplier_misses(found: Branches) -> dict[str, float]:
 
 
 def product_misses(case: Case, found: Branches) -> tuple[float, float] | None:
-    """How far products of multipliers are from what damping and impacts make of them, at most: of period 1, of longer."""
+    """How far products of multipliers are from those of damping and impacts: of period 1, of longer orbits."""
     if case.product is None:
         return None
     sizes = np.abs(found.multipliers)
@@ -183,7 +183,7 @@ def product_misses(case: Case, found: Branches) -> tuple[float, float] | None:
 
 
 def apart(case: Case, one: Branches, other: Branches) -> tuple[list[float], int, int]:
-    """How far labels of two runs are apart at most, those of a release last; how many both and how many only one found."""
+    """How far labels of two runs are apart, those of a release last; how many both and how many one found."""
     worst, both, alone = [0.0, 0.0], 0, 0
     near = SAME * (case.ends[1] - case.ends[0])
     for key in one.places.keys() | other.places.keys():
