@@ -26,6 +26,8 @@ module part_reader
   !> Names of the places between which joints act: bodies, then points of structures.
   type :: bodies_t
     character(len=label_length), allocatable :: names(:)
+    !> Displacement of one per force at another by the modes that structures leave out [m/N].
+    real(wp), allocatable :: left_out(:, :)
   end type bodies_t
 
 contains
@@ -75,14 +77,17 @@ contains
     character(len=label_length), allocatable :: names(:)
     character(len=:), allocatable :: watched
     type(law_choice_t), allocatable :: structures(:)
+    real(wp), allocatable :: left_out(:, :)
     integer :: i, k
     bodies%names = names_of(source, 'body')
     call check_names(source, 'body', bodies%names)
     names = names_of(source, 'structure')
     call check_names(source, 'structure', names)
     allocate (structures(0))
+    allocate (bodies%left_out(size(bodies%names), size(bodies%names)), source=0.0_wp)
     do k = 1, size(names)
-      call read_structure(source, trim(names(k)), k, structures)
+      call read_structure(source, trim(names(k)), k, structures, left_out)
+      call append_block(bodies%left_out, left_out)
     end do
     bodies%names = [bodies%names, pack(structures%label, index(structures%name, 'point:') == 1)]
     call check_columns(source, bodies%names)
@@ -207,8 +212,44 @@ contains
       ! Break-away friction that is not given equals sliding friction.
       if (value_of(choice, 'static_force') < 0) call set_value(choice, 'static_force', [value_of(choice, 'force')])
     end if
+    if (choice%name == 'contact:massless') call set_flexibility(source, path, bodies, choice)
     choices = [choices, choice]
   end subroutine read_part
+
+  !> A matrix as the last block on the diagonal of another.
+  pure subroutine append_block(matrix, block)
+    real(wp), allocatable, intent(inout) :: matrix(:, :)
+    real(wp), intent(in) :: block(:, :)
+    real(wp), allocatable :: larger(:, :)
+    integer :: n
+    n = size(matrix, 1)
+    allocate (larger(n + size(block, 1), n + size(block, 1)), source=0.0_wp)
+    larger(:n, :n) = matrix
+    larger(n + 1:, n + 1:) = block
+    call move_alloc(larger, matrix)
+  end subroutine append_block
+
+  !> A massless contact without a stiffness has that of the modes which the structures at its ends leave out.
+  subroutine set_flexibility(source, path, bodies, choice)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    type(bodies_t), intent(in) :: bodies
+    type(law_choice_t), intent(inout) :: choice
+    real(wp) :: flexibility
+    integer :: ends(2)
+    if (value_of(choice, 'stiffness') > 0 .or. has_problems(source)) return
+    ends = nint([value_of(choice, 'first_end'), value_of(choice, 'second_end')])
+    flexibility = 0
+    if (ends(1) > 0) flexibility = flexibility + bodies%left_out(ends(1), ends(1))
+    if (ends(2) > 0) flexibility = flexibility + bodies%left_out(ends(2), ends(2))
+    if (all(ends > 0)) flexibility = flexibility - 2*bodies%left_out(ends(1), ends(2))
+    if (flexibility > 0) then
+      call set_value(choice, 'stiffness', [1/flexibility])
+    else
+      call report(source, path//'.stiffness', 'missing, allowed more than 0 N/m, or between points of a structure of which '// &
+                  'structure.NAME.modes leaves modes out: their flexibility is the contact''s')
+    end if
+  end subroutine set_flexibility
 
   !> The watched body starts where [start] says.
   subroutine refuse_start(source, path)

@@ -3,28 +3,9 @@
 
 // Which kernel this processor gets. All give the same bits.
 #include "lane_types.hpp"
+#include "lane_untrapped.hpp"
 
-#include <cfenv>
 #include <cstddef>
-
-namespace {
-
-// Lanes that a step does not concern hold any value, so that exceptions say nothing: a build that traps them
-// goes on.
-struct untrapped {
-  std::fenv_t held;
-  const bool trapping = fegetexcept() != 0;
-  untrapped() {
-    if (trapping)
-      std::feholdexcept(&held);
-  }
-  ~untrapped() {
-    if (trapping)
-      std::fesetenv(&held);
-  }
-};
-
-} // namespace
 
 extern "C" {
 

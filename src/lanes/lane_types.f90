@@ -6,6 +6,7 @@
 module lane_types
   use curve_law, only: most_knots
   use kinds, only: wp
+  use structure_types, only: structure_machine_t
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_size_t, c_sizeof
   implicit none
   private
@@ -98,6 +99,8 @@ module lane_types
     real(wp) :: slowest = 0
     !> With a Stribeck layer.
     logical :: layered = .false.
+    !> A jointed structure.
+    type(structure_machine_t), allocatable :: structure
   end type lane_flow_t
 
   interface

@@ -5,11 +5,10 @@
 !> next start. The outcome of a start does not depend on the others.
 module trajectories
   use attractors, only: attractor_t
+  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_lane, take_from_lane
   use kinds, only: wp
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
-  use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
   use motion, only: motion_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus
   use status, only: reason_left_domain
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_turn, go_to_stop, outcome_t, pass_stop, &
     phase_over, phase_window, run_trajectory, sections_ahead, span_t
@@ -46,7 +45,7 @@ contains
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(out) :: outcomes(:)
     type(passenger_t) :: passengers(lane_count)
-    type(lane_batch_t) :: batch
+    type(fleet_t) :: lanes
     integer :: lane, i, next
     if (.not. journey%flow%available) then
       do i = 1, size(starts, 2)
@@ -55,19 +54,20 @@ contains
       end do
       return
     end if
-    call set_regions(catalogue, batch)
+    call open_fleet(journey%moving, lanes)
+    call set_regions(journey%moving, catalogue, lanes)
     next = 1
     do lane = 1, lane_count
-      call board(journey, catalogue, starts, lane, next, passengers(lane), batch, outcomes)
+      call board(journey, catalogue, starts, lane, next, passengers(lane), lanes, outcomes)
     end do
     do while (any(passengers%start > 0))
-      call fly_lanes(journey%flow, batch)
+      call fly_fleet(journey%flow, lanes)
       do lane = 1, lane_count
-        if (passengers(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
-        call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, &
+        if (passengers(lane)%start == 0 .or. lanes%batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
+        call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), lanes, &
                     outcomes(passengers(lane)%start))
         if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, &
-                                                                    passengers(lane), batch, outcomes)
+                                                                    passengers(lane), lanes, outcomes)
       end do
     end do
   end subroutine run_trajectories
@@ -79,14 +79,14 @@ contains
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
-  pure subroutine board(journey, catalogue, starts, lane, next, passenger, batch, outcomes)
+  pure subroutine board(journey, catalogue, starts, lane, next, passenger, lanes, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: lane
     integer, intent(inout) :: next
     type(passenger_t), intent(inout) :: passenger
-    type(lane_batch_t), intent(inout) :: batch
+    type(fleet_t), intent(inout) :: lanes
     type(outcome_t), intent(inout) :: outcomes(:)
     do while (next <= size(starts, 2))
       passenger%start = next
@@ -97,27 +97,27 @@ contains
         call go_on(journey, catalogue, start, passenger, outcome)
       end associate
       if (passenger%course%phase /= phase_over) then
-        call occupy_lane(journey%flow, lane, passenger%course%state, .true., batch)
-        call send_on(journey, passenger%course, outcomes(passenger%start), lane, batch)
+        call put_into_lane(journey%moving, journey%flow, lane, passenger%course, .true., lanes)
+        call send_on(journey, passenger%course, outcomes(passenger%start), lane, lanes%batch)
         return
       end if
     end do
     passenger%start = 0
-    batch%status(lane) = lane_idle
+    lanes%batch%status(lane) = lane_idle
   end subroutine board
 
-  !> Tells the lanes what they can be captured by: a slipping body, by a cycle.
-  pure subroutine set_regions(catalogue, batch)
+  !> Tells the lanes what they can be captured by: what moves, by a cycle.
+  pure subroutine set_regions(moving, catalogue, lanes)
+    type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
-    type(lane_batch_t), intent(inout) :: batch
+    type(fleet_t), intent(inout) :: lanes
     integer :: k, i
     do k = 1, size(catalogue)
       associate (a => catalogue(k))
         if (a%rests .or. a%any_place) cycle
-        if (a%coordinates > 2) batch%complete = 0
-        if (a%coordinates > 2) cycle
         do i = 1, a%period
-          call add_region(batch, k, a%points(:2, i), a%scale(:2), a%metric(:3, i), a%capture_radius**2)
+          call add_capture(moving, lanes, k, a%points(:a%coordinates, i), a%scale(:a%coordinates), &
+                           a%metric(:(a%coordinates*(a%coordinates + 1))/2, i), a%capture_radius**2)
         end do
       end associate
     end do
@@ -140,22 +140,21 @@ contains
   end subroutine send_on
 
   !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
-  pure subroutine attend(journey, catalogue, start, lane, passenger, batch, outcome)
+  pure subroutine attend(journey, catalogue, start, lane, passenger, lanes, outcome)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: start(:)
     integer, intent(in) :: lane
     type(passenger_t), intent(inout) :: passenger
-    type(lane_batch_t), intent(inout) :: batch
+    type(fleet_t), intent(inout) :: lanes
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped, left, taken
-    left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
-    associate (course => passenger%course)
+    left = lanes%batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
+    associate (course => passenger%course, batch => lanes%batch)
       course%elapsed = batch%elapsed(lane)
       course%captured = nint(batch%captor(lane))
       outcome%settle_time = batch%settled(lane)
-      call lane_state(batch, lane, course%state)
-      call take_counts(batch, lane, course%tally)
+      call take_from_lane(journey%moving, lane, lanes, course%strobe_t, course%tally)
       if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
@@ -173,7 +172,7 @@ contains
       end if
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
       batch%status(lane) = lane_flying
-      if (taken) call occupy_lane(journey%flow, lane, course%state, .false., batch)
+      if (taken) call put_into_lane(journey%moving, journey%flow, lane, course, .false., lanes)
       call send_on(journey, course, outcome, lane, batch)
     end associate
   end subroutine attend
@@ -203,12 +202,11 @@ contains
     end associate
   end subroutine go_on
 
-  !> Whether a lane can take a course: it slips fast enough, and nobody needs the extremes of its window.
+  !> Whether a lane can take a course, and nobody needs the extremes of its window.
   pure logical function flies(journey, course)
     type(journey_t), intent(in) :: journey
     type(course_t), intent(in) :: course
-    flies = (course%state%mode == mode_slip_plus .or. course%state%mode == mode_slip_minus) .and. &
-      abs(course%state%v) >= journey%flow%slowest .and. course%phase /= phase_over .and. &
+    flies = flies_in_lane(journey%moving, journey%flow, course%strobe_t) .and. course%phase /= phase_over .and. &
       (course%phase /= phase_window .or. course%captured > 0 .or. journey%describe == describe_regime)
   end function flies
 
