@@ -166,7 +166,7 @@ def multiplier_misses(found: Branches) -> dict[str, float]:
 
 
 def product_misses(case: Case, found: Branches) -> tuple[float, float] | None:
-    """How far products of multipliers are from those of damping and impacts: of period 1, of longer orbits."""
+    """How far products of multipliers are from those of damping and impacts: of period 1, of longer ones."""
     if case.product is None:
         return None
     sizes = np.abs(found.multipliers)
