@@ -76,7 +76,7 @@ def turn(ratio: float) -> float:
 TAU = 2 * np.pi
 CASES = (
     Case("sweep_coulomb", "drive.ratio", (0.7, 1.8)),
-    Case("sweep_viscous", "drive.ratio", (0.7, 1.8), product=lambda w: (3.0, 0.5, turn(w))),
+    Case("sweep_viscous", "drive.ratio", (0.7, 1.8), product=lambda w: (0.2, 0.5, turn(w))),
     Case("sweep_stribeck", "drive.ratio", (0.7, 1.8), (1, 2)),
     Case("basin_effects", "drive.ratio", (1.0, 1.4), (1, 2)),
     Case("basin_coulomb_crank_lever_rod", "drive.ratio", (0.9, 1.4)),
