@@ -4,6 +4,7 @@
 !> How far a periodic orbit is from having another sequence of events: margins that are positive as long as the motion really
 !> has its events and no others, and pass through zero where it grazes a barrier, begins or ends to stick, or is released no more.
 module orbit_margins
+  use body_flight, only: pressed_side
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
@@ -228,7 +229,8 @@ contains
     call find_zero(machine, mode, start, low, high, 1, t, y)
     margins%x_max = max(margins%x_max, y(1))
     margins%x_min = min(margins%x_min, y(1))
-    call note_gap(machine, y(1), k, side, t, .false., gaps)
+    ! A soft barrier that is pressed is not missed.
+    if (pressed_side(mode) /= side) call note_gap(machine, y(1), k, side, t, .false., gaps)
   end subroutine note_turning
 
   pure subroutine note_slowest(machine, mode, start, low, high, direction, k, slowest)
