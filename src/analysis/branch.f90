@@ -15,11 +15,11 @@ module branch
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
-  use one_body, only: slips_in
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
   use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, same_sequence, &
     scales_of_orbit
+  use soft_graze, only: is_touch, locate_missed_graze
   implicit none
   private
 
@@ -235,7 +235,7 @@ contains
     logical :: ok
     label = label_not_known
     associate (orbit => trace%now%orbit)
-      if (size(orbit%events) == 0 .and. .not. slips_in(orbit%mode)) label = label_release
+      if (size(orbit%events) == 0 .and. trace%machines%centre%rests(orbit%mode)) label = label_release
       call orbit_of_motion(next%machines, next%now%orbit%parameter, next%now%orbit%y, orbit%periods, motion, ok)
       if (.not. ok) return
       if (any(is_chatter(motion%events%kind)) .neqv. any(is_chatter(orbit%events%kind))) label = label_chatter
@@ -308,6 +308,20 @@ contains
     end do
   end function is_repeated
 
+  !> The graze of a soft contact by the orbit that misses it, for the equations of that which touches are singular there.
+  subroutine put_on_graze(family, missing, touch, point)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: missing
+    type(margin_t), intent(in) :: touch
+    type(point_t), intent(inout) :: point
+    type(trace_t) :: graze
+    logical :: ok
+    call locate_missed_graze(family, missing, touch, point%orbit%parameter, graze, ok)
+    if (.not. ok) return
+    graze%now%label = point%label
+    point = graze%now
+  end subroutine put_on_graze
+
   !> The orbit where a margin is zero: its label, and on with the sequence of events beyond, if there is one.
   subroutine pass_margin(family, trace, at, passed, points, ending)
     type(family_t), intent(in) :: family
@@ -332,6 +346,11 @@ contains
     if (known) call enter_sequence(family, at, trace%step, beyond, known)
     if (known) then
       rise_before = at%now%tangent(size(at%now%tangent))
+      if (is_touch(at%now%orbit, passed)) then
+        call put_on_graze(family, beyond, passed, point)
+        ! The tangent is that of the singular point.
+        rise_before = point%orbit%parameter - points(size(points))%orbit%parameter
+      end if
       rise_after = beyond%now%tangent(size(beyond%now%tangent))
       if (point%label == label_gr .and. rise_before*rise_after < 0) point%label = label_gr_fold
     end if

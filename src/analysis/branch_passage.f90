@@ -9,11 +9,13 @@ module branch_passage
   use branch_point, only: label_bp, label_gr, label_gr_fold, label_not_known, label_ns, label_pd, label_sn, label_stick, &
     label_stiction, no_label, point_t, set_point, step_to, trace_t
   use kinds, only: wp
+  use motion_state, only: event_separation
   use one_body, only: one_body_t
   use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_release, of_slip, of_stick, &
     of_turning, same_meaning
   use other_sequence, only: change_sequence
   use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_t
+  use soft_graze, only: enter_touches, is_touch, touches_apart, touching, vanishing_touch
   use structure, only: structure_t
   use structure_sequence, only: change_structure_sequence
   implicit none
@@ -45,7 +47,7 @@ contains
     type(margin_t), intent(out) :: passed
     type(trace_t) :: there
     type(margin_t) :: candidate
-    integer :: tries
+    integer :: tries, i
     logical :: ok
     do tries = 1, 8
       call most_negative(trace%margins, next%margins, candidate)
@@ -55,6 +57,11 @@ contains
       candidate%time = time_like(there%margins, candidate)
       next = there
       passed = candidate
+      i = vanishing_touch(there%now%orbit, there%margins, candidate%joint)
+      if (i == 0) cycle
+      ! The order of its events and the gap pass zero with it.
+      passed = there%margins%list(i)
+      return
     end do
   end subroutine first_passed
 
@@ -250,14 +257,20 @@ contains
     type(orbit_t), intent(out) :: changed
     logical, intent(out) :: known
     type(orbit_t) :: before
-    real(wp) :: place(size(at%margins%list))
+    real(wp) :: place(size(at%margins%list)), nil
     integer :: i
     changed = at%now%orbit
     known = .true.
     place = -1
     do i = 1, size(place)
       associate (one => at%margins%list(i))
-        if (one%kind /= passed%kind .or. .not. abs(one%value) <= together) cycle
+        if (one%kind /= passed%kind) cycle
+        nil = merge(touching, together, is_touch(at%now%orbit, one))
+        if (.not. abs(one%value) <= nil) cycle
+        ! The end of a touch goes with its beginning.
+        if (one%kind == of_impact) then
+          if (at%now%orbit%events(one%event)%kind == event_separation) cycle
+        end if
         place(i) = one%event
         ! After an event that comes with its number turned round.
         if (one%event < 0) place(i) = -one%event - 0.5_wp
@@ -289,6 +302,12 @@ contains
     type(trace_t) :: start, there
     real(wp) :: look, along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
     integer :: way, tries, steps
+    along = touches_apart(beyond%now%orbit)
+    if (any(abs(along) > 0)) then
+      call enter_touches(family, at, along, no_passage, beyond, ok)
+      if (ok) beyond%step = 0.1_wp*step
+      return
+    end if
     start%machines = at%machines
     start%now%orbit = beyond%now%orbit
     call correct_orbit(family, start%machines, start%now%orbit, direct(start%now%orbit, 1), ok)

@@ -8,6 +8,7 @@ module branch_search
   use body_family, only: family_t
   use branch, only: trace_branch
   use branch_point, only: branch_t, label_bp, label_pd, plan_t, point_t, set_sizes
+  use doubling_ends, only: join_doublings
   use errors, only: error_t
   use kinds, only: wp
   use hybrid_machine, only: hybrid_t
@@ -30,8 +31,6 @@ module branch_search
   real(wp), parameter :: doubled_at = 3e-3_wp
   !> The same of a branch that crosses.
   real(wp), parameter :: crossed_at = 4e-3_wp
-  !> Nearness to a doubling, in multiplier and as a share of the range, at the end of a branch.
-  real(wp), parameter :: at_doubling = 1e-3_wp
 
   type, public :: search_t
     type(family_t) :: family
@@ -108,7 +107,7 @@ contains
       end do
     end do
     call leave_out_parts(search)
-    call join_doublings(search)
+    call join_doublings(search%family, search%branches)
     do i = 1, size(search%branches)
       call mark_symmetry(search%family, search%branches(i))
     end do
@@ -216,40 +215,6 @@ contains
       call machine_neighbourhood(search%family, point%orbit%parameter, machines, error)
     end do
   end subroutine cross
-
-  !> Puts the ends of branches that are in a doubling where it was located on the branch of half the period: the equations are
-  !> singular there.
-  pure subroutine join_doublings(search)
-    type(search_t), intent(inout) :: search
-    type(orbit_t) :: nearest
-    real(wp) :: distance, least
-    integer :: b, c, i, k
-    do b = 1, size(search%branches)
-      do k = 1, 2
-        if (search%branches(b)%ending(k) /= label_pd) cycle
-        least = at_doubling
-        associate (ended => search%branches(b)%points(merge(1, size(search%branches(b)%points), k == 1))%orbit)
-          do c = 1, size(search%branches)
-            do i = 1, size(search%branches(c)%points)
-              associate (there => search%branches(c)%points(i))
-                if (2*there%orbit%periods /= ended%periods .or. there%label /= label_pd) cycle
-                if (minval(abs(there%orbit%multipliers + 1)) > at_doubling) cycle
-                distance = abs(ended%parameter - there%orbit%parameter)/search%family%parameter_size
-                if (distance >= least) cycle
-                least = distance
-                nearest = there%orbit
-              end associate
-            end do
-          end do
-          if (.not. least < at_doubling) cycle
-          ended%parameter = nearest%parameter
-          ended%y = nearest%y
-          ended%matrix = matmul(nearest%matrix, nearest%matrix)
-          ended%multipliers = nearest%multipliers**2
-        end associate
-      end do
-    end do
-  end subroutine join_doublings
 
   !> The orbits at which a branch passes the values of the search.
   subroutine note_passages(search, found)

@@ -36,8 +36,6 @@ module homoclinic
   integer, parameter :: halvings = 10
   !> Where a chaotic transient is to end, it may take so many times longer than what settles at once.
   integer, parameter :: long_wait = 20
-  !> Width of the bracket, as a share of the range of the parameter.
-  real(wp), parameter :: narrow = 1e-10_wp
   !> What the starts of a side do: none reaches the attractor of the other side, some, all, or it is not known.
   integer, parameter :: not_known = 0, none_reach = 1, some_reach = 2, all_reach = 3
 

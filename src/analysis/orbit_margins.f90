@@ -90,8 +90,9 @@ contains
         if (k > 0) then
           associate (event => orbit%events(k))
             call add_event(machine, orbit, k, margins%list)
-            if (event%kind == event_turning_point) call note_gap(machine, event%arrival(1), k, -event%side, event%time, .true., &
-                                                                 gaps)
+            if (event%kind == event_turning_point .and. pressed_side(event%before) /= -event%side) then
+              call note_gap(machine, event%arrival(1), k, -event%side, event%time, .true., gaps)
+            end if
             y = event%departure(:states)
             t = event%time
             mode = event%after
@@ -282,8 +283,6 @@ contains
     end associate
     if (.not. abs(barrier) < huge(barrier)) return
     value = side*(barrier - x)/machine%size_of(1)
-    ! A soft barrier is pressed.
-    if (machine%moving%machine%contact%soft .and. at_event .and. value < 0) return
     if (value < gaps(side)%value) gaps(side) = margin_t(value, of_gap, merge(k, -k - 1, at_event), side, t)
   end subroutine note_gap
 

@@ -14,7 +14,6 @@ module periodic_orbit
   use matrices, only: solve
   use multipliers, only: multipliers_of
   use motion_state, only: tally_t
-  use one_body, only: rests_on_barrier
   use structure, only: structure_t
   use structure_family, only: vary_section
   use variations, only: by_difference, neighbourhood_t, vary
@@ -274,12 +273,12 @@ contains
     orbit%parameter = orbit%parameter + change(size(change))
   end subroutine move_along
 
-  !> A body that rests on a barrier at the section is there to the bit.
+  !> What rests at the section is where it is held to the bit.
   pure subroutine clean_rest(machines, orbit)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
     real(wp) :: y(size(orbit%y))
-    if (.not. rests_on_barrier(orbit%mode)) return
+    if (.not. machines%centre%rests(orbit%mode)) return
     call machines%centre%fly(orbit%mode, 0.0_wp, orbit%y, 0.0_wp, y)
     orbit%y = y
   end subroutine clean_rest

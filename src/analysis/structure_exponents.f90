@@ -76,6 +76,7 @@ contains
     ! To the first section.
     lasted = 0
     count_events = 0
+    smooth = .true.
     call advance_section(structure, state, lasted, events, count_events, tally, spectrum%known, smooth)
     if (.not. spectrum%known) return
     do i = 1 - transient, sections
@@ -84,6 +85,8 @@ contains
       count_events = 0
       lasted = 0
       smooth = .true.
+      ! Budgets are those of a section, as for one body.
+      tally = tally_t()
       call advance_section(structure, state, lasted, events, count_events, tally, spectrum%known, smooth)
       spectrum%known = spectrum%known .and. smooth
       if (spectrum%known) call vary_section(machines, structure, mode, point, events(:count_events), 1, &

@@ -7,6 +7,7 @@ module part_reader
   use case_parameters, only: row_bounds
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
+  use drive_record, only: read_record
   use kinds, only: wp
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, set_value, value_of
@@ -79,6 +80,12 @@ contains
     type(law_choice_t), allocatable :: structures(:)
     real(wp), allocatable :: left_out(:, :)
     integer :: i, k
+    logical :: found
+    do i = 1, size(kinds_of_parts)
+      ! Tables that may be there are named where one is misspelt.
+      call know(source, trim(kinds_of_parts(i))//'.')
+      call enter_table(source, trim(kinds_of_parts(i)), found)
+    end do
     bodies%names = names_of(source, 'body')
     call check_names(source, 'body', bodies%names)
     names = names_of(source, 'structure')
@@ -174,7 +181,7 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: law, path
     integer :: i
-    logical :: found
+    logical :: found, from_record
     path = kind//'.'//name
     call enter_table(source, path, found)
     law = default
@@ -196,10 +203,12 @@ contains
     choice = law_choice(part_family, kind//':'//law)
     choice%label = name
     if (kind == 'drive') call read_body(source, path, bodies, choice)
+    from_record = .false.
+    if (choice%name == 'drive:force') call read_record(source, path, choice, from_record)
     if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
-      if (is_hidden(rows(i))) cycle
+      if (is_hidden(rows(i)) .or. from_record) cycle
       if (rows(i)%list) then
         call take_reals(source, path//'.'//trim(rows(i)%name), row_bounds(rows(i)), choice%parameters(i)%values, &
                         required=.not. rows(i)%optional)

@@ -84,15 +84,15 @@ struct structure_target {
 };
 
 // A function and three derivatives of it.
-struct course {
+struct guard_course {
   vec w = {}, w1 = {}, w2 = {}, w3 = {};
 };
 
 // -side (f - limit) of the targets: positive before the event.
 template <class size>
-inline course course_of(const size &z, const structure_group &g, const structure_target &target,
-                        const outlook &o) {
-  course c;
+inline guard_course course_of(const size &z, const structure_group &g, const structure_target &target,
+                              const outlook &o) {
+  guard_course c;
   for (int j = 0; j < z.joints; j++) {
     mask is = target.joint == double(j + 1);
     put(c.w, is, -target.side * (o.f[j] - pick(target.side > 0.0, g.high[j], g.low[j])));
@@ -134,7 +134,7 @@ inline structure_target earliest_fallen(const structure_machine &m, const size &
 }
 
 // Share of a panel of length h at which the polynomial of degree 7 through both ends of a function falls.
-inline vec falls_at(vec h, const course &a, const course &b) {
+inline vec falls_at(vec h, const guard_course &a, const guard_course &b) {
   vec square = h * h, a1 = h * a.w1, a2 = 0.5 * square * a.w2, a3 = (1.0 / 6) * square * h * a.w3;
   vec d0 = b.w - (a.w + a1 + a2 + a3), d1 = h * b.w1 - (a1 + 2 * a2 + 3 * a3),
       d2 = square * b.w2 - (2 * a2 + 6 * a3), d3 = (1.0 / 6) * square * h * b.w3 - a3;
@@ -235,7 +235,7 @@ template <class size>
 inline mask polish(const structure_machine &m, const size &z, mask asked, structure_walk &p,
                    structure_group &g) {
   vec low = p.t, high = p.end;
-  course a = course_of(z, g, p.target, p.here), c = course_of(z, g, p.target, p.far);
+  guard_course a = course_of(z, g, p.target, p.here), c = course_of(z, g, p.target, p.far);
   vec s = p.t + (p.end - p.t) * falls_at(p.end - p.t, a, c);
   for (int round = 0; round < most_polishings && any(asked); round++) {
     structure_bases b;

@@ -11,9 +11,13 @@ module section_directions
 
   public :: directions_of
 
+  !> Much, as a share of the most; no ratio of small integers, so that rounding does not decide.
+  real(wp), parameter :: much = 0.3_wp
+
 contains
 
-  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count.
+  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. What is
+  !> tied to what tells them, not how strongly: machines of one build have the same.
   pure subroutine directions_of(machine, directions, count_directions)
     type(jointed_t), intent(in) :: machine
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
@@ -41,8 +45,44 @@ contains
         directions(i, i) = 1
       end do
     else
-      directions(:n, :count_directions) = vectors(:, pack([(i, i=1, n)], abs(values) > 1e-12_wp*maxval(abs(values))))
+      vectors(:, :n - count_directions) = vectors(:, pack([(i, i=1, n)], .not. abs(values) > 1e-12_wp*maxval(abs(values))))
+      call complement_of(vectors(:, :n - count_directions), directions(:n, :count_directions))
     end if
   end subroutine directions_of
+
+  !> An orthonormal basis of what is across some orthonormal columns: unit vectors less those and one another, at each step the
+  !> first of which much is left.
+  pure subroutine complement_of(free, basis)
+    real(wp), intent(in) :: free(:, :)
+    real(wp), intent(out) :: basis(:, :)
+    real(wp) :: rest(size(free, 1), size(free, 1))
+    integer :: i, k
+    rest = 0
+    do i = 1, size(rest, 1)
+      rest(i, i) = 1
+    end do
+    do k = 1, size(free, 2)
+      call take_out(free(:, k), rest)
+    end do
+    do k = 1, size(basis, 2)
+      associate (left => norm2(rest, 1))
+        i = findloc(left > much*maxval(left), .true., 1)
+      end associate
+      basis(:, k) = rest(:, i)/norm2(rest(:, i))
+      call take_out(basis(:, k), rest)
+    end do
+  end subroutine complement_of
+
+  !> Takes a direction out of vectors (columns), twice because of rounding.
+  pure subroutine take_out(direction, vectors)
+    real(wp), intent(in) :: direction(:)
+    real(wp), intent(inout) :: vectors(:, :)
+    integer :: i, pass
+    do pass = 1, 2
+      do i = 1, size(vectors, 2)
+        vectors(:, i) = vectors(:, i) - direction*sum(direction*vectors(:, i))
+      end do
+    end do
+  end subroutine take_out
 
 end module section_directions

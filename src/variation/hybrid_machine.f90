@@ -39,6 +39,7 @@ module hybrid_machine
     real(wp), allocatable :: size_of(:)
   contains
     procedure :: size_of_time
+    procedure(rests_interface), deferred :: rests
     procedure(fly_interface), deferred :: fly
     procedure(slope_interface), deferred :: slope
     procedure(guard_interface), deferred :: guard
@@ -46,6 +47,13 @@ module hybrid_machine
   end type hybrid_t
 
   abstract interface
+    !> Whether nothing moves in a mode.
+    pure logical function rests_interface(self, mode)
+      import :: hybrid_t
+      class(hybrid_t), intent(in) :: self
+      integer, intent(in) :: mode
+    end function rests_interface
+
     !> The state `y1` that the mode brings `y0` at `t0` to at `t1` [s], and, which takes longer, its derivative by `y0`.
     pure subroutine fly_interface(self, mode, t0, y0, t1, y1, flight)
       import :: hybrid_t, wp

@@ -28,6 +28,7 @@ module one_body
     !> Steps of the differences of laws.
     real(wp) :: step_of(2) = 1
   contains
+    procedure :: rests => body_rests
     procedure :: fly => fly_body
     procedure :: slope => slope_of_body
     procedure :: guard => guard_of_body
@@ -90,6 +91,12 @@ contains
     end select
     if (.not. self%moving%machine%contact%soft) mode = state%mode
   end function mode_of_body
+
+  pure logical function body_rests(self, mode)
+    class(one_body_t), intent(in) :: self
+    integer, intent(in) :: mode
+    body_rests = self%n > 0 .and. .not. slips_in(mode)
+  end function body_rests
 
   !> Whether the body rests on a rigid barrier, which makes it forget where it came from.
   pure elemental logical function rests_on_barrier(mode)

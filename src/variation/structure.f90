@@ -23,6 +23,7 @@ module structure
   type, extends(hybrid_t), public :: structure_t
     type(frame_t) :: frame
   contains
+    procedure :: rests => structure_rests
     procedure :: fly => fly_structure
     procedure :: slope => slope_of_structure
     procedure :: guard => guard_of_structure
@@ -123,6 +124,18 @@ contains
     integer, intent(in) :: j, phase
     sliding_stretch = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
   end function sliding_stretch
+
+  !> Whether the joints that are held leave no coordinate free.
+  pure logical function structure_rests(self, mode)
+    class(structure_t), intent(in) :: self
+    integer, intent(in) :: mode
+    integer, allocatable :: held(:)
+    real(wp), allocatable :: carried(:, :)
+    associate (machine => self%frame%moving%machine)
+      call carried_by(machine, phases_in(machine, mode), .false., held, carried)
+      structure_rests = size(held) == machine%n
+    end associate
+  end function structure_rests
 
   pure subroutine fly_structure(self, mode, t0, y0, t1, y1, flight)
     class(structure_t), intent(in) :: self

@@ -52,6 +52,24 @@ def test_two_masses_with_a_stop(follow):
         assert np.prod(multipliers[plain], axis=1).real == pytest.approx(expected, rel=1e-6)
 
 
+def test_a_soft_stop(follow, source_dir: Path, tmp_path: Path):
+    """The branch passes the graze both ways, which is where the amplitude without the stop is the gap."""
+    text = (source_dir / "examples" / "structure_two_masses.toml").read_text()
+    case = tmp_path / "soft.toml"
+    case.write_text(text.replace('law = "newton"\nrestitution = 0.8', 'law = "kelvin_voigt"\nstiffness = 20'))
+    # the seeds miss the stop, or meet it, or both
+    for start, end in (0.99875, 1.01), (0.95, 1.05):
+        points, out = follow(case, "drive.force.frequency", start, end, "--searches", "2", "--force")
+        grazes = [point for point in points if point["label"].startswith("GR")]
+        assert [point["label"] for point in grazes] == ["GR"]
+        assert amplitude(grazes[0]["parameter"]) == pytest.approx(1, abs=1e-12)
+        ends = [point["parameter"] for point in points if point["branch"] == grazes[0]["branch"]]
+        assert {min(ends), max(ends)} <= {start, end}
+        with open_result(out) as result:
+            branch = result["branch"].values == grazes[0]["branch"]
+            assert len(set(result["event_word"].values[branch])) == 2
+
+
 def test_an_impact_may_pass_the_section(follow):
     """The orbit of one impact a period is stable, also where the impact comes at the section's phase."""
     setting = {
@@ -70,6 +88,31 @@ def test_an_impact_may_pass_the_section(follow):
         assert result["stable"].values.all()
         multipliers = result["multiplier_real"].values + 1j * result["multiplier_imag"].values
         assert abs(multipliers).max() < 0.9
+
+
+def test_a_floating_structure(follow, tmp_path: Path):
+    """Nothing ties the bodies to the ground: x is that of the watched one less the mean, in closed form."""
+    case = tmp_path / "floating.toml"
+    case.write_text(
+        "[body.a]\nmass = 1\n[body.b]\nmass = 2\n[body.c]\nmass = 1.5\n"
+        '[spring.ab]\nbetween = ["a", "b"]\nstiffness = 1\ndamping = 0.05\n'
+        '[spring.bc]\nbetween = ["b", "c"]\nstiffness = 2\ndamping = 0.05\n'
+        '[spring.ground]\nbetween = ["a"]\nstiffness = 0\ndamping = 0.3\n'
+        '[drive.force]\nlaw = "force"\nbody = "a"\namplitude = 1\nfrequency = 1.14\n'
+        '[watch]\nbody = "c"\n[run]\nduration = 500\n'
+    )
+    _, out = follow(case, "spring.ab.stiffness", 0.5, 6, "--searches", "1")
+    first, second, ground = np.array([1, -1, 0]), np.array([0, 1, -1]), np.array([1, 0, 0])
+    damping = 0.05 * np.outer(first, first) + 0.05 * np.outer(second, second) + 0.3 * np.outer(ground, ground)
+    with open_result(out) as result:
+        assert result["parameter"].values.min() == 0.5
+        assert result["parameter"].values.max() == 6
+        for stiffness, x, v in zip(*(result[name].values for name in ("parameter", "x", "v")), strict=True):
+            springs = stiffness * np.outer(first, first) + 2 * np.outer(second, second)
+            system = springs - 1.14**2 * np.diag([1, 2, 1.5]) + 1.14j * damping
+            q = np.linalg.solve(system, [1, 0, 0])
+            assert x == pytest.approx((q[2] - q.mean()).real, abs=1e-11)
+            assert v == pytest.approx((1.14j * q[2]).real, abs=1e-11)
 
 
 def test_two_blocks_on_a_belt(follow):

@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from separatrix.discovery import Options, discover
 from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.base import fit_base
@@ -52,21 +53,25 @@ def base(upper: float = 3.0, amplitude: float = 0.1) -> Model:
     return Model.from_text(CASE.format(upper=upper, amplitude=amplitude))
 
 
-def record_at(true: Model, ratio: float, scale: float, seed: int, seconds: float) -> object:
-    """A record at a drive ratio with so many times the drive."""
+def record_at(
+    true: Model, ratio: float, scale: float, seed: int, seconds: float, memory: float = 0.0
+) -> object:
+    """A record at a drive ratio with so many times the drive; noise of a sample has a share of the last one's."""
     t = np.arange(int(seconds * 100)) / 100
     start = np.array([(0.5, 0.6, 0.4)])
     drive = np.array([ratio, scale * true.parameters["drive.amplitude"].value])
     paths = ["drive.ratio", "drive.amplitude"]
     motion = true.segments(paths, drive, start, [0, t.size], t, derivatives=False)
-    x = motion.x + SIGMA * np.random.default_rng(seed).standard_normal(t.size)
+    white = SIGMA * np.random.default_rng(seed).standard_normal(t.size)
+    x = motion.x + lfilter([np.sqrt(1 - memory**2)], [1, -memory], white)
     header = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "drive_scale": scale}
     return make_record(f"r{seed}", {"t": t, "x": x}, header | {"sensor_noise_sigma_m": SIGMA})
 
 
-def records_of(true: Model, seconds: float = 6.0) -> list:
+def records_of(true: Model, seconds: float = 6.0, memory: float = 0.0) -> list:
     """Three records at ratios of their own, the last to be held out."""
-    return [record_at(true, ratio, 1.0, seed, seconds) for seed, ratio in enumerate((0.75, 0.95, 0.85))]
+    ratios = enumerate((0.75, 0.95, 0.85))
+    return [record_at(true, ratio, 1.0, seed, seconds, memory) for seed, ratio in ratios]
 
 
 def table(knots: str, at: np.ndarray, key: str, values: np.ndarray) -> dict[str, float]:
@@ -185,6 +190,17 @@ def test_three_effects_are_found_one_by_one():
     for path, value in (("quadratic_drag.coefficient", 0.06), ("cubic_spring.stiffness", 12.0)):
         found = verdict["parameters"][f"effect.{path}"]
         assert abs(found["value"] - value) < 4 * found["standard_error"]
+
+
+def test_the_memory_of_the_noise_is_seen_where_two_effects_together_leave_nothing_else():
+    """Under each of them alone it cannot be told from a gap, and would be one beside both."""
+    without = base(upper=0.6, amplitude=0.2)
+    true = without.with_effect("quadratic_drag", {"coefficient": 0.06})
+    records = records_of(true.with_effect("cubic_spring", {"stiffness": 12.0}), memory=0.7)
+    names = ("quadratic_drag", "cubic_spring")
+    verdict = discover(without, records[:2], records[2:], Options(quick=True, candidates=names))
+    assert (verdict["outcome"], set(verdict["effects"])) == ("named", set(names))
+    assert all(abs(one["memory"] - 0.7) < 0.1 for one in verdict["records"])
 
 
 def test_the_experiment_that_is_asked_for_settles_an_ambiguous_verdict():

@@ -1,0 +1,100 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The doublings in which branches of twice the period end.
+module doubling_ends
+  use body_family, only: family_t
+  use branch_point, only: branch_t, label_pd
+  use errors, only: error_t
+  use kinds, only: wp
+  use machine_family, only: machine_neighbourhood, nearest_copy
+  use orbit_sections, only: section_points
+  use periodic_orbit, only: orbit_t
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: join_doublings
+
+  !> Nearness of an end to a doubling, in multiplier and as a share of the range.
+  real(wp), parameter :: at_doubling = 1e-3_wp
+  !> The same of section points, in natural sizes: they go with the root of the parameter.
+  real(wp), parameter :: near_doubling = 3e-2_wp
+
+contains
+
+  !> Puts the ends of branches that are in a doubling where it was located on the branch of half the period: the equations are
+  !> singular there.
+  pure subroutine join_doublings(family, branches)
+    type(family_t), intent(in) :: family
+    type(branch_t), intent(inout) :: branches(:)
+    type(orbit_t) :: doubling
+    integer :: b, k
+    logical :: found
+    do b = 1, size(branches)
+      do k = 1, 2
+        if (branches(b)%ending(k) /= label_pd) cycle
+        associate (ended => branches(b)%points(merge(1, size(branches(b)%points), k == 1))%orbit)
+          call nearest_doubling(family, branches, ended, doubling, found)
+          if (.not. found) cycle
+          ended%parameter = doubling%parameter
+          ended%y = doubling%y
+          ended%multipliers = doubling%multipliers**2
+        end associate
+      end do
+    end do
+  end subroutine join_doublings
+
+  !> The doubling that an orbit ended in, of those of half its period nearby, with that section point in front that is nearest to
+  !> the orbit's: twins of a symmetric machine double at one value of the parameter.
+  pure subroutine nearest_doubling(family, branches, ended, doubling, found)
+    type(family_t), intent(in) :: family
+    type(branch_t), intent(in) :: branches(:)
+    type(orbit_t), intent(in) :: ended
+    type(orbit_t), intent(out) :: doubling
+    logical, intent(out) :: found
+    real(wp) :: least, distance, point(size(ended%y))
+    integer :: c, i
+    least = near_doubling
+    do c = 1, size(branches)
+      do i = 1, size(branches(c)%points)
+        associate (there => branches(c)%points(i))
+          if (2*there%orbit%periods /= ended%periods .or. there%label /= label_pd) cycle
+          if (minval(abs(there%orbit%multipliers + 1)) > at_doubling) cycle
+          if (abs(ended%parameter - there%orbit%parameter) >= at_doubling*family%parameter_size) cycle
+          call nearest_section_point(family, there%orbit, ended%y, point, distance)
+          if (distance >= least) cycle
+          least = distance
+          doubling = there%orbit
+          doubling%y = point
+        end associate
+      end do
+    end do
+    found = least < near_doubling
+  end subroutine nearest_doubling
+
+  !> The section point of an orbit that is nearest to `y`, and its distance in natural sizes: huge if the machine is not to be had.
+  pure subroutine nearest_section_point(family, orbit, y, nearest, distance)
+    type(family_t), intent(in) :: family
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: y(:)
+    real(wp), intent(out) :: nearest(:), distance
+    type(neighbourhood_t) :: machines
+    type(error_t), allocatable :: error
+    real(wp) :: points(size(y), orbit%periods), there
+    integer :: k
+    distance = huge(distance)
+    nearest = y
+    call machine_neighbourhood(family, orbit%parameter, machines, error)
+    if (allocated(error)) return
+    points = section_points(machines, orbit)
+    do k = 1, orbit%periods
+      points(:, k) = nearest_copy(machines%centre, points(:, k), y)
+      there = norm2((points(:, k) - y)/machines%centre%size_of)
+      if (there >= distance) cycle
+      distance = there
+      nearest = points(:, k)
+    end do
+  end subroutine nearest_section_point
+
+end module doubling_ends
