@@ -10,14 +10,17 @@ module bifurcation_curve
     set_tangent, unknowns
   use kinds, only: wp
   use orbit_margins, only: margin_t, of_gap, of_impact
+  use part_of_branch, only: event_speeds
   implicit none
   private
 
-  public :: trace_curve, can_be_followed, curve_label
+  public :: trace_curve, can_be_followed, curve_label, passes
 
   integer, parameter :: most_points = 200, most_secants = 50
   !> Steps of the curve in natural sizes; turn of the tangent in one [cosine].
   real(wp), parameter :: first_step = 1e-3_wp, largest_step = 0.03_wp, smallest_step = 1e-8_wp, least_cosine = 0.95_wp
+  !> Two labelled points are one when the parameter agrees to this share of its range, and the orbits to this in natural sizes.
+  real(wp), parameter :: same_point = 1e-8_wp, same_orbit = 1e-5_wp
   !> A point of codimension two is interpolated between so many, with values of about this.
   integer, parameter :: nodes = 6
   real(wp), parameter :: node_value = 1e-3_wp
@@ -73,6 +76,40 @@ contains
     call trace_one_way(family, plan, start, further)
     curve%points = [[(back(i), i=size(back), 1, -1)], further(2:)]
   end subroutine trace_curve
+
+  !> Whether a curve passes a labelled point, `value` being the second parameter there: its points are some distance apart, so that
+  !> it is brought to that value where it crosses it.
+  logical function passes(family, plan, curve, point, value)
+    type(family_t), intent(in) :: family
+    type(curve_plan_t), intent(in) :: plan
+    type(curve_t), intent(in) :: curve
+    type(point_t), intent(in) :: point
+    real(wp), intent(in) :: value
+    type(place_t) :: there
+    real(wp), allocatable :: along(:)
+    logical :: ok
+    integer :: i, k
+    passes = .false.
+    if (curve%label /= curve_label(point%label)) return
+    do i = 1, size(curve%points) - 1
+      associate (one => curve%points(i), next => curve%points(i + 1))
+        if (one%orbit%periods /= point%orbit%periods .or. (one%free - value)*(next%free - value) > 0) cycle
+        there%now = one
+        if (abs(next%free - value) < abs(one%free - value)) there%now = next
+      end associate
+      there%label = curve%label
+      there%monitor = margin_t()
+      call choose_monitor(family, plan, there, ok)
+      if (.not. ok) cycle
+      there%now%free = value
+      along = [(0.0_wp, k=1, unknowns(there%now) - 1), 1.0_wp]
+      call correct(family, plan, there, along, ok)
+      if (.not. ok) cycle
+      passes = abs(there%now%orbit%parameter - point%orbit%parameter) < same_point*(plan%highest(1) - plan%lowest(1)) .and. &
+        abs(event_speeds(there%now%orbit, family%sizes) - event_speeds(point%orbit, family%sizes)) < same_orbit
+      if (passes) return
+    end do
+  end function passes
 
   !> The point `length` further.
   subroutine step_on(family, plan, place, length, next, ok)

@@ -144,7 +144,7 @@ contains
       return
     end if
     call first_passed(family, trace, next, length, passed)
-    call note_bifurcations(family, trace, next, length*(1 - 1e-6_wp), points)
+    call note_bifurcations(family, trace, next, length, passed%kind /= 0, points)
     if (passed%kind /= 0) then
       call pass_margin(family, trace, next, passed, points, ending)
       return

@@ -164,16 +164,22 @@ contains
   end function time_like
 
   !> Folds, doublings and the like between two points of one sequence of events: located, and added to the points. In a fold the
-  !> parameter turns and a multiplier passes +1; where only one of these happens another branch crosses.
-  subroutine note_bifurcations(family, trace, next, length, points)
+  !> parameter turns and a multiplier passes +1; where only one of these happens another branch crosses. Where a margin is zero at
+  !> `next` (`at_margin`) multipliers may have no value: what is looked at ends just before.
+  subroutine note_bifurcations(family, trace, next, length, at_margin, points)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: trace, next
     real(wp), intent(in) :: length
+    logical, intent(in) :: at_margin
     type(point_t), allocatable, intent(inout) :: points(:)
     type(trace_t) :: end_point
+    real(wp) :: span
     integer :: steps
     logical :: ok, turns, passes
-    call step_to(family, trace, length, end_point, ok, steps)
+    ok = at_margin
+    span = length
+    if (ok) span = length*(1 - 1e-6_wp)
+    if (ok) call step_to(family, trace, span, end_point, ok, steps)
     if (.not. ok) end_point = next
     turns = changes(test_turn)
     passes = changes(test_plus)
@@ -198,9 +204,9 @@ contains
       integer, intent(in) :: label, test
       type(trace_t) :: there
       real(wp) :: distance
-      distance = length
+      distance = span
       if (label == label_bp) then
-        call locate_branch_point(family, trace, end_point, test, length, there, ok)
+        call locate_branch_point(family, trace, end_point, test, span, there, ok)
       else
         call locate(family, trace, end_point, target_t(test), distance, there, ok)
       end if

@@ -32,6 +32,8 @@ module branch_point
     type(orbit_t) :: orbit
     integer :: label = no_label
     real(wp) :: x_max = 0, x_min = 0
+    !> The second half of the orbit is the mirror image of the first.
+    logical :: symmetric = .false.
     !> Direction in which the branch goes on.
     real(wp), allocatable :: tangent(:)
   end type point_t

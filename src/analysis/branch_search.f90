@@ -16,6 +16,7 @@ module branch_search
   use matrices, only: solve
   use orbit_search, only: find_orbits, found_t
   use orbit_sections, only: section_points
+  use orbit_symmetry, only: mark_symmetry
   use part_of_branch, only: lies_on
   use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, is_admissible, move_along, &
     orbit_of_motion, orbit_t, same_sequence, scales_of_orbit
@@ -107,6 +108,9 @@ contains
     end do
     call leave_out_parts(search)
     call join_doublings(search%family, search%branches)
+    do i = 1, size(search%branches)
+      call mark_symmetry(search%family, search%branches(i))
+    end do
   end subroutine follow_seeds
 
   !> Leaves out branches that lie on another one: one may end, for want of points or of a sequence of events, where the other

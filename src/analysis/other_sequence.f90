@@ -104,6 +104,9 @@ contains
     logical, intent(out) :: known
     integer :: last
     associate (events => other%events)
+      ! It goes with its touch, which has no speed either.
+      known = events(k)%kind == event_separation
+      if (known) return
       known = is_impact(events(k)%kind) .or. events(k)%kind == event_touch_upper .or. events(k)%kind == event_touch_lower
       if (.not. known) return
       if (is_impact(events(k)%kind)) then

@@ -6,10 +6,11 @@ module part_of_branch
   use body_family, only: family_t
   use branch_point, only: branch_t, point_t
   use kinds, only: wp
+  use periodic_orbit, only: orbit_t
   implicit none
   private
 
-  public :: lies_on
+  public :: lies_on, event_speeds
 
   !> How far a branch is from the chord of a step, as a share of it: more than the turn of a step allows; and at least.
   real(wp), parameter :: off_chord = 0.05_wp, rounding = 1e-7_wp
@@ -18,10 +19,11 @@ module part_of_branch
 
 contains
 
-  !> Whether all points of a branch lie between points of another.
-  pure logical function lies_on(part, whole, family)
+  !> Whether all points of a branch, or with `mirror` [m] their mirror images about that place, lie between points of another.
+  pure logical function lies_on(part, whole, family, mirror)
     type(branch_t), intent(in) :: part, whole
     type(family_t), intent(in) :: family
+    real(wp), intent(in), optional :: mirror
     real(wp) :: ends(features, size(whole%points))
     integer :: i, k, last
     lies_on = part%points(1)%orbit%periods == whole%points(1)%orbit%periods
@@ -31,7 +33,7 @@ contains
     end do
     last = 1
     do i = 1, size(part%points)
-      call find_chord(features_of(part%points(i), family), ends, last, lies_on)
+      call find_chord(features_of(part%points(i), family, mirror), ends, last, lies_on)
       if (.not. lies_on) return
     end do
   end function lies_on
@@ -59,21 +61,36 @@ contains
 
   !> The parameter, the extremes, and sums of the states before the events: none depends on where the orbit begins, and in a graze
   !> none jumps but that of the places. In natural sizes.
-  pure function features_of(point, family) result(place)
+  pure function features_of(point, family, mirror) result(place)
     type(point_t), intent(in) :: point
     type(family_t), intent(in) :: family
+    real(wp), intent(in), optional :: mirror
     real(wp) :: place(features)
     integer :: k
     associate (orbit => point%orbit, sizes => family%sizes)
       place(:3) = [orbit%parameter/family%parameter_size, [point%x_min, point%x_max]/sizes(1)]
-      place(4:) = 0
+      place(4) = 0
       do k = 1, size(orbit%events)
-        associate (arrival => orbit%events(k)%arrival(:size(orbit%y)))
-          place(4) = place(4) + arrival(1)/sizes(1)
-          place(5) = place(5) + sum(arrival(2:))/sizes(2)
-        end associate
+        place(4) = place(4) + orbit%events(k)%arrival(1)/sizes(1)
       end do
+      place(5) = event_speeds(orbit, sizes)
+      if (.not. present(mirror)) return
+      place(2:3) = 2*mirror/sizes(1) - place([3, 2])
+      place(4) = 2*size(orbit%events)*mirror/sizes(1) - place(4)
+      place(5) = -place(5)
     end associate
   end function features_of
+
+  !> Sum of the states but the first before the events, in natural sizes: a number that tells orbits apart, does not depend on where
+  !> they begin, and changes its sign for the mirror image of a body's orbit.
+  pure real(wp) function event_speeds(orbit, sizes) result(total)
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: sizes(2)
+    integer :: k
+    total = 0
+    do k = 1, size(orbit%events)
+      total = total + sum(orbit%events(k)%arrival(2:size(orbit%y)))/sizes(2)
+    end do
+  end function event_speeds
 
 end module part_of_branch

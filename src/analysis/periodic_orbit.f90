@@ -10,7 +10,7 @@ module periodic_orbit
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use machine_family, only: fly_sections, machine_neighbourhood
+  use machine_family, only: fly_sections, machine_neighbourhood, machine_of_family
   use matrices, only: solve
   use multipliers, only: multipliers_of
   use motion_state, only: tally_t
@@ -28,6 +28,8 @@ module periodic_orbit
   integer, parameter :: most_newton = 12
   !> Newton's method has converged when a step, in natural sizes, is below this.
   real(wp), parameter :: converged_step = 1e-11_wp
+  !> Newton's steps with the same derivatives by the parameter.
+  integer, parameter :: newton_between = 4
   !> A motion with the events of an orbit at other instants than this share of 1/frequency is not that orbit.
   real(wp), parameter :: likeness = 1e-5_wp
 
@@ -156,20 +158,30 @@ contains
     miss(m + 1:) = arrived - orbit%y
   end subroutine shoot_only
 
-  !> The equations at an orbit and their derivatives by state, instants and parameter, in natural sizes.
-  pure subroutine equations(machines, orbit, scales, miss, slopes)
+  !> Derivatives of what does not fit by the parameter, from the neighbours of the machine.
+  pure function parameter_slopes(machines, orbit) result(slopes)
     type(neighbourhood_t), intent(in) :: machines
-    type(orbit_t), intent(inout) :: orbit
-    real(wp), intent(in) :: scales(:)
-    real(wp), intent(out) :: miss(:), slopes(:, :)
-    real(wp) :: near(size(miss), 4)
-    integer :: i, n
-    n = size(miss)
-    call shoot(machines%centre, orbit, miss, slopes(:, :n))
+    type(orbit_t), intent(in) :: orbit
+    real(wp), dimension(size(orbit%y) + size(orbit%events)) :: slopes, own
+    real(wp) :: near(size(own), 4)
+    integer :: i
+    call shoot_only(machines%centre, orbit, own)
     do i = 1, 4
       call shoot_only(machines%near(i), orbit, near(:, i))
     end do
-    slopes(:, n + 1) = by_difference(machines, miss, near)
+    slopes = by_difference(machines, own, near)
+  end function parameter_slopes
+
+  !> The equations at an orbit and their derivatives by state, instants and parameter, the last as given, in natural sizes.
+  pure subroutine equations(machine, orbit, scales, by_parameter, miss, slopes)
+    class(hybrid_t), intent(in) :: machine
+    type(orbit_t), intent(inout) :: orbit
+    real(wp), intent(in) :: scales(:), by_parameter(:)
+    real(wp), intent(out) :: miss(:), slopes(:, :)
+    integer :: i, n
+    n = size(miss)
+    call shoot(machine, orbit, miss, slopes(:, :n))
+    slopes(:, n + 1) = by_parameter
     do i = 1, n + 1
       slopes(:, i) = slopes(:, i)*scales(i)
     end do
@@ -193,16 +205,28 @@ contains
     logical, intent(out) :: ok
     integer, intent(out), optional :: steps
     real(wp), dimension(size(direction)) :: scales, miss, step
-    real(wp) :: slopes(size(direction), size(direction)), before, length
+    real(wp) :: slopes(size(direction), size(direction)), by_parameter(size(direction) - 1), before, length
     type(error_t), allocatable :: error
+    logical :: moved
     integer :: i, n
     n = size(direction)
     before = huge(before)
     length = huge(length)
+    moved = .false.
     do i = 1, most_newton
       if (present(steps)) steps = i
+      ! Machines take time to build: the neighbours' derivatives are kept for a while, which costs an order of convergence at most.
+      if (modulo(i, newton_between) == 1) then
+        if (moved) call machine_neighbourhood(family, orbit%parameter, machines, error)
+        if (.not. allocated(error)) by_parameter = parameter_slopes(machines, orbit)
+        moved = .false.
+      else if (moved) then
+        call renew_centre(family, orbit%parameter, machines, error)
+      end if
+      ok = .not. allocated(error)
+      if (.not. ok) return
       scales = scales_of_orbit(machines, orbit, family%parameter_size)
-      call equations(machines, orbit, scales, miss(:n - 1), slopes(:n - 1, :))
+      call equations(machines%centre, orbit, scales, by_parameter, miss(:n - 1), slopes(:n - 1, :))
       slopes(n, :) = direction
       miss(n) = 0
       call solve(slopes, -miss, step, ok)
@@ -211,9 +235,7 @@ contains
       before = length
       length = norm2(step)
       call move_along(orbit, scales*step)
-      if (abs(step(n)) > 0) call machine_neighbourhood(family, orbit%parameter, machines, error)
-      ok = .not. allocated(error)
-      if (.not. ok) return
+      moved = moved .or. abs(step(n)) > 0
       ! It has come as near as rounding lets it.
       if (length < 1e-14_wp .or. (length < converged_step .and. length >= 0.1_wp*before)) exit
       ! Or what the next step would be is nil, even if the steps shrink no faster than so far: beside a graze they do so late.
@@ -221,10 +243,23 @@ contains
       if (ok) exit
     end do
     ok = ok .or. length < converged_step
+    if (ok .and. moved) call machine_neighbourhood(family, orbit%parameter, machines, error)
+    ok = ok .and. .not. allocated(error)
     if (.not. ok) return
     call clean_rest(machines, orbit)
     call set_multipliers(machines, orbit)
   end subroutine correct_orbit
+
+  !> The machine at a value of the parameter, its neighbours as they are.
+  subroutine renew_centre(family, value, machines, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    type(neighbourhood_t), intent(inout) :: machines
+    type(error_t), allocatable, intent(out) :: error
+    class(hybrid_t), allocatable :: machine
+    call machine_of_family(family, value, machine, error)
+    if (.not. allocated(error)) call move_alloc(machine, machines%centre)
+  end subroutine renew_centre
 
   !> Adds a change of state, instants and parameter (not scaled).
   pure subroutine move_along(orbit, change)
@@ -278,7 +313,8 @@ contains
     real(wp) :: miss(size(along)), slopes(size(along), size(along)), right(size(along))
     integer :: n
     n = size(along)
-    call equations(machines, orbit, scales_of_orbit(machines, orbit, parameter_size), miss(:n - 1), slopes(:n - 1, :))
+    call equations(machines%centre, orbit, scales_of_orbit(machines, orbit, parameter_size), parameter_slopes(machines, orbit), &
+                   miss(:n - 1), slopes(:n - 1, :))
     slopes(n, :) = along
     right = 0
     right(n) = 1
@@ -297,7 +333,8 @@ contains
     real(wp) :: miss(size(tangent)), slopes(size(tangent), size(tangent)), next(size(tangent))
     integer :: i, n
     n = size(tangent)
-    call equations(machines, orbit, scales_of_orbit(machines, orbit, parameter_size), miss(:n - 1), slopes(:n - 1, :))
+    call equations(machines%centre, orbit, scales_of_orbit(machines, orbit, parameter_size), parameter_slopes(machines, orbit), &
+                   miss(:n - 1), slopes(:n - 1, :))
     slopes(n, :) = tangent
     direction = [(1/(1 + 0.3_wp*i), i=1, n)]
     do i = 1, 3

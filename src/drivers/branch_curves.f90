@@ -3,7 +3,7 @@
 
 !> `separatrix branches --free`: the labels of branches as curves over a second parameter.
 module branch_curves
-  use bifurcation_curve, only: can_be_followed, curve_label, curve_t, trace_curve
+  use bifurcation_curve, only: can_be_followed, curve_t, passes, trace_curve
   use branch_point, only: label_names, last_label, no_label, point_t
   use branch_search, only: search_t
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names, parameter_value
@@ -22,9 +22,6 @@ module branch_curves
   private
 
   public :: set_free, follow_labels, report_curves, describe_curves
-
-  !> Two labelled points are on one curve when both parameters agree to this share of their ranges.
-  real(wp), parameter :: same_point = 1e-6_wp
 
   !> The second parameter with its value in the case, and the curves.
   type, public :: curves_t
@@ -92,7 +89,7 @@ contains
     do b = 1, size(search%branches)
       do i = 1, size(search%branches(b)%points)
         associate (point => search%branches(b)%points(i))
-          if (.not. can_be_followed(point%label) .or. is_known(curves, point)) cycle
+          if (.not. can_be_followed(point%label) .or. is_known(search, curves, point)) cycle
           call trace_curve(search%family, curves%plan, point, curves%value, curve)
           if (size(curve%points) > 1) curves%list = [curves%list, curve]
         end associate
@@ -100,24 +97,16 @@ contains
     end do
   end subroutine follow_labels
 
-  !> Whether a curve of the same label and period passes a labelled point.
-  pure logical function is_known(curves, point)
+  !> Whether one of the curves passes a labelled point.
+  logical function is_known(search, curves, point)
+    type(search_t), intent(in) :: search
     type(curves_t), intent(in) :: curves
     type(point_t), intent(in) :: point
-    integer :: c, i, label
-    real(wp) :: ranges(2), apart(2)
-    ranges = curves%plan%highest - curves%plan%lowest
+    integer :: c
     is_known = .false.
-    label = curve_label(point%label)
     do c = 1, size(curves%list)
-      if (curves%list(c)%label /= label) cycle
-      do i = 1, size(curves%list(c)%points)
-        associate (there => curves%list(c)%points(i))
-          if (there%orbit%periods /= point%orbit%periods) cycle
-          apart = [there%orbit%parameter - point%orbit%parameter, there%free - curves%value]/ranges
-          is_known = is_known .or. maxval(abs(apart)) < same_point
-        end associate
-      end do
+      is_known = passes(search%family, curves%plan, curves%list(c), point, curves%value)
+      if (is_known) return
     end do
   end function is_known
 

@@ -23,7 +23,7 @@ module branches_driver
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use orbit_margins, only: is_impact
-  use orbit_words, only: word_of
+  use orbit_words, only: symmetry_text, word_of
   use periodic_orbit, only: orbit_t
   use session, only: describe_file, open_session, session_t
   use status, only: exit_bad_case, exit_done
@@ -200,7 +200,7 @@ contains
     do b = 1, size(search%branches)
       associate (line => search%branches(b))
         call session%journal%line('branch', 'branch '//to_text(b)//': period '//to_text(line%points(1)%orbit%periods)//', '// &
-          to_text(size(line%points))//' points, '//ends_text(line%ending), &
+          to_text(size(line%points))//' points, '//ends_text(line%ending)//symmetry_text(search, b), &
           '"branch": '//to_text(b)//', "ends": ['//json_text(trim(label_names(line%ending(1))))//', '// &
           json_text(trim(label_names(line%ending(2))))//']')
         do i = 1, size(line%points)
@@ -338,6 +338,9 @@ contains
     call schema%add_variable('stable', type_int8, along, units='1', long_name='all multipliers within the unit circle', &
                              flag_values=[0, 1], flag_meanings='unstable stable', &
                              data=[(merge(1.0_wp, 0.0_wp, is_stable(points(i)%orbit)), i=1, size(points))])
+    call schema%add_variable('symmetric', type_int8, along, units='1', long_name='half a period later the orbit is its mirror '// &
+                             'image', flag_values=[0, 1], flag_meanings='asymmetric symmetric', &
+                             data=[(merge(1.0_wp, 0.0_wp, points(i)%symmetric), i=1, size(points))])
     call schema%add_variable('label', type_int8, along, units='1', long_name='what the point is', &
                              flag_values=[(i, i=0, last_label)], flag_meanings=join(label_names, ' '), &
                              data=real(points%label, wp))

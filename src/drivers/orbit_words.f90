@@ -15,13 +15,44 @@ module orbit_words
     event_stick, event_touch_lower, event_touch_upper, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use one_body, only: rests_on_barrier
+  use orbit_symmetry, only: centre_of, is_mirror_image
   use periodic_orbit, only: orbit_t
+  use text, only: to_text
   implicit none
   private
 
-  public :: word_of
+  public :: symmetry_text, word_of
 
 contains
+
+  !> What of a branch is symmetric, and of which other one it is the mirror image; nothing for machines without symmetric orbits.
+  pure function symmetry_text(search, b) result(text)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: b
+    character(len=:), allocatable :: text
+    real(wp) :: centre
+    logical :: known
+    integer :: c
+    text = ''
+    call centre_of(search%branches, search%family, centre, known)
+    if (.not. known) return
+    associate (points => search%branches(b)%points)
+      text = ', not symmetric'
+      if (all(points%symmetric)) text = ', symmetric'
+      if (count(points%symmetric) > size(points)/2) return
+    end associate
+    if (is_mirror_image(search%branches(b), search%branches(b), search%family, centre)) then
+      text = ', not symmetric, with its mirror image'
+      return
+    end if
+    do c = 1, size(search%branches)
+      if (c == b) cycle
+      if (is_mirror_image(search%branches(b), search%branches(c), search%family, centre)) then
+        text = ', not symmetric, mirror image of branch '//to_text(c)
+        return
+      end if
+    end do
+  end function symmetry_text
 
   !> The event word of an orbit.
   pure integer(int64) function word_of(orbit, search) result(word)

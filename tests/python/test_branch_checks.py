@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""scripts/branch_checks.py: its quick cases, that every example is in it, and that it sees what is wrong."""
+
+import importlib
+import sys
+from dataclasses import replace
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def checks(source_dir):
+    sys.path.insert(0, str(source_dir / "scripts"))
+    yield importlib.import_module("branch_checks")
+    sys.path.remove(str(source_dir / "scripts"))
+
+
+@pytest.mark.parametrize("name", ["validation/impact_coco", "structure_two_masses"])
+def test_what_must_hold_on_branches_holds(checks, separatrix, tmp_path, name):
+    case = next(case for case in checks.CASES if case.path == name)
+    one, other = (checks.follow(separatrix, tmp_path, case, searches) for searches in (2, 3))
+    cells, wrong = checks.row(case, one, other)
+    assert wrong == []
+    assert "1 SN" in cells[4]
+    gaps, both, _ = checks.apart(case, one, other)
+    assert both > 0 and max(gaps) < 1e-10
+    # and is seen where it does not
+    moved = replace(one, places={key: values + 1e-9 for key, values in one.places.items()})
+    assert any("apart" in item for item in checks.row(case, moved, other)[1])
+    off = replace(one, multipliers=one.multipliers * (1 + 1e-6))
+    assert any("a multiplier" in item for item in checks.row(case, off, other)[1])
+    assert any("product" in item for item in checks.row(case, off, other)[1])
+
+
+def test_every_example_without_a_measured_drive_is_followed_or_refused_in_words(
+    checks, separatrix, source_dir
+):
+    lines, wrong = checks.refusals(separatrix)
+    assert wrong == []
+    assert len(lines) == len(checks.REFUSED)
+    known = {case.path for case in checks.CASES} | checks.REFUSED.keys() | checks.SAME_MACHINE
+    there = {path.stem for path in (source_dir / "examples").glob("*.toml")}
+    assert there <= known
