@@ -73,7 +73,7 @@ lint_suites() {
 echo "format: Fortran (findent, fortitude)"
 format_fortran
 c_files=()
-mapfile -t c_files < <(files_named '*.c' '*.h' '*.cpp' '*.hpp')
+mapfile -t c_files < <(files_named '*.c' '*.h' '*.cpp' '*.hpp' '*.cu')
 if $check; then
   "$tools/fortitude" check --output-format concise src apps tests || failed=1
   lint_suites || failed=1

@@ -62,7 +62,8 @@ THEIRS = {
     "coco.resonant.2": (COCO, "resonant graze w_d: w", 0.998749217772, DIGITS),
     "coco.resonant.1": (COCO, "resonant graze 2 w_d: w", 1.997498435544, DIGITS),
     "coco.tangency": (COCO, "(A_graze - A_fold)/(w - w_d)^2 at w = 1", 18.7, 0.05),
-    "coco.window": (COCO, "width of the window in A where the impacting and the free motion coexist", 2.92e-5, 5e-8),
+    "coco.window": (
+        COCO, "width of the window in A where the impacting and the free motion coexist", 2.92e-5, 5e-8),
     "coco.order": (COCO, "order of the tangency, from the gaps at the two distances", 2.0, 0.02),
     "coco.ninefold": (COCO, "the same gap at nine times the distance, over that at w = 1", 80, 1),
     "hartog.amplitude": (DEN_HARTOG, "w = 0.9: amplitude", 2.420236350574, DIGITS),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies without a spring of docs/validation.md: a ball on a table by `branches`, a gear between two walls."""
+"""Bodies without a spring in docs/validation.md: a ball on a table by `branches`, a gear between walls."""
 
 import h5py
 import numpy as np

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 BACKLASH = ((-0.1, 0.1), (-1.0, 1.0))
+CHAIN = ((-0.2, 0.05), (-2.0, 2.0))
 KELVIN_VOIGT = {"law": "kelvin_voigt", "stiffness": 1e5, "damping": 100.0, "upper": "1.1 m"}
 COULOMB = "basin_coulomb"
 
@@ -33,6 +34,7 @@ class Checks:
 
 EXACT = Checks(100, 25, 10_000, 150)
 ADAPTIVE = Checks(2, 1, 300, 60)
+CHAINS = Checks(30, 0, 5_000, 60)
 
 
 @dataclass
@@ -50,6 +52,8 @@ class Row:
     fast: tuple[int, int] = (30, 100)
     """Two maps of so many starts along either axis; their difference is timed."""
     sizes: Checks | None = None
+    bodies: int = 0
+    """Not 0: a chain of so many, see `chain`, in the place of the example."""
 
     def checks(self, quick: bool) -> Checks:
         """What is checked on how much."""
@@ -58,9 +62,9 @@ class Row:
 
     def starts(self, count: int) -> np.ndarray:
         """Start points."""
-        if self.example == COULOMB:
+        if self.example == COULOMB and not self.bodies:
             return start_points(count)
-        (x_low, x_high), (v_low, v_high) = BACKLASH
+        (x_low, x_high), (v_low, v_high) = CHAIN if self.bodies else BACKLASH
         shares = start_points(count) / (X0[1], V0[1])
         return np.column_stack(
             [x_low + (x_high - x_low) * shares[:, 0], v_low + (v_high - v_low) * (0.5 + 0.5 * shares[:, 1])]
@@ -68,7 +72,8 @@ class Row:
 
     def write(self, folder: Path) -> Path:
         """The case file."""
-        case = tomllib.loads((SOURCE / "examples" / f"{self.example}.toml").read_text())
+        example = SOURCE / "examples" / f"{self.example}.toml"
+        case = chain(self.bodies) if self.bodies else tomllib.loads(example.read_text())
         for name, change in self.changes.items():
             case[name] = change
         path = folder / f"{self.key}.toml"
@@ -78,7 +83,34 @@ class Row:
     @property
     def has_peers(self) -> bool:
         """The drivers of the peers know one body, and no table of the restitution."""
-        return self.example == COULOMB and "restitution_curve" not in self.changes.get("effect", {})
+        return (
+            self.example == COULOMB
+            and not self.bodies
+            and "restitution_curve" not in self.changes.get("effect", {})
+        )
+
+
+def chain(bodies: int) -> dict:
+    """Bodies on springs in a row: the first rubs on the ground, the last is driven and meets a stop."""
+    names = [f"body_{i + 1}" for i in range(bodies)]
+    springs = [names[max(0, i - 1) : i + 1] for i in range(bodies)]
+    return {
+        "title": f"Chain of {bodies}",
+        "body": {name: {"mass": 1.0} for name in names},
+        "spring": {
+            f"spring_{i + 1}": {"between": ends, "stiffness": 400.0, "damping": 0.2}
+            for i, ends in enumerate(springs)
+        },
+        "friction": {"base": {"between": names[:1], "force": 2.0}},
+        "contact": {"stop": {"between": names[-1:], "law": "newton", "restitution": 0.8, "upper": 0.05}},
+        "drive": {"shaker": {"law": "force", "body": names[-1], "amplitude": 8.0, "frequency": 8.0}},
+        "watch": {"body": names[-1]},
+        "run": {"duration": 50.0, "window": 12.5},
+        "axis": [
+            {"name": name, "from": low, "to": high, "count": 40}
+            for name, (low, high) in zip(("x0", "v0"), CHAIN, strict=True)
+        ],
+    }
 
 
 def effect(name: str, **parameters: float | list[float]) -> dict:
@@ -175,6 +207,33 @@ ROWS = (
         fast=(50, 200),
     ),
     Row("stribeck", "Stribeck effect, 0.2 m/s", 10_000, effect("stribeck", excess=0.5, velocity=0.2)),
+    Row(
+        "chain_2",
+        "chain of 2, friction and a stop",
+        60_000,
+        linear=True,
+        bodies=2,
+        fast=(40, 160),
+        sizes=CHAINS,
+    ),
+    Row(
+        "chain_4",
+        "chain of 4, friction and a stop",
+        25_000,
+        linear=True,
+        bodies=4,
+        fast=(40, 120),
+        sizes=CHAINS,
+    ),
+    Row(
+        "chain_8",
+        "chain of 8, friction and a stop",
+        8_000,
+        linear=True,
+        bodies=8,
+        fast=(30, 90),
+        sizes=CHAINS,
+    ),
     Row(
         "pair",
         "two bodies with backlash, 60 s",

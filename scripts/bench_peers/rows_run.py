@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import datetime
 import json
+import re
+import subprocess
 import time
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
@@ -23,9 +25,12 @@ from machine import HUNT_CROSSLEY, TOLERANCE, Outcomes, machine_of, read_case, s
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rows import Row
+    from rows import Checks, Row
 
 BATCH = 8
+VERIFIED = (
+    r"(\d+) label flips, (\d+) other impact counts, largest deviation after the duration (\S+) m, (\S+) m/s"
+)
 PEERS = {"heyoka_batch": 400, "heyoka": 200, "gsl": 300, "cvode": 30}
 """Starts of the peers in a round."""
 
@@ -102,10 +107,24 @@ class RowBench:
         self.program.timed(len(starts), "points", self.case, "--list", listed, "-o", path, *FULL, *words)
         return read_points(path)
 
+    def verified(self, sizes: Checks) -> Accuracy:
+        """A sample of a map of full runs in quadruple precision, by `separatrix verify`."""
+        path = self.basin(sizes.side, *FULL)[1]
+        command = [self.program.program, "verify", path, "--sample", str(sizes.quadruple)]
+        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        flips, counts, x, v = re.search(VERIFIED, said).groups()
+        with h5py.File(path) as file:
+            far = max(float(np.nanmax(np.abs(file[name][()]))) for name in ("x_max", "x_min"))
+            fast = float(np.nanmax(file["v_max"][()]))
+        deviation = max(float(x) / far, float(v) / fast)
+        return Accuracy(sizes.quadruple, deviation, int(counts), int(flips))
+
     def judge(self) -> None:
         """Quadruple precision, single flights, labels of settle-and-stop."""
         sizes, found = self.row.checks(self.quick), self.result.agreements
-        if sizes.quadruple:
+        if self.row.bodies:
+            found["ours"] = self.verified(sizes)
+        elif sizes.quadruple:
             starts = start_points(sizes.quadruple)
             truth = run_on_all_cores(self.reference, self.program.program, starts, self.case, sizes.share)
             found["ours"] = compare(self.points(starts), truth)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 option(SEPARATRIX_MPI "Build with MPI and parallel HDF5 (OFF: one process, serial HDF5)" ON)
 option(SEPARATRIX_TESTS "Build the tests" ON)
+option(SEPARATRIX_GPU "Let maps run on NVIDIA GPUs as well (needs nvcc)" OFF)
 option(SEPARATRIX_STATIC "Link HDF5, GSL and zlib statically, as wheels do" OFF)
 option(SEPARATRIX_FUZZ "Build the fuzzer of the readers (GCC)" OFF)
 

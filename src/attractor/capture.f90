@@ -26,6 +26,8 @@ contains
     type(strobe_t) :: later
     type(tally_t) :: unused
     integer :: reason
+    found = 0
+    if (size(catalogue) == 0) return
     found = find_capture(catalogue, section_point(moving, strobe), slipped .or. .not. rest_lasts(moving))
     if (found > 0 .or. .not. any(catalogue%by_event)) return
     later = copy_of(strobe)

@@ -339,7 +339,8 @@ contains
       outcome%features%grazing_margin = min(margin, outcome%features%grazing_margin)
     else
       outcome%reason = reason_time_over
-      box = find_box(catalogue, section_point(moving, course), outcome%window%regime)
+      box = 0
+      if (size(catalogue) > 0) box = find_box(catalogue, section_point(moving, course), outcome%window%regime)
       outcome%features = outcome%window
       if (box > 0) then
         outcome%attractor = catalogue(box)%id

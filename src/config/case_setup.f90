@@ -7,6 +7,7 @@ module case_setup
   use case_type, only: case_t
   use grid, only: grid_t, make_grid, sample_axis, two_axes
   use kinds, only: int64, wp
+  use lane_gpu, only: gpu_in_use
   use lane_types, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
   use refinement, only: refine_t
@@ -14,7 +15,7 @@ module case_setup
   implicit none
   private
 
-  public :: options_of, span_of, grid_of, output_path, automatic_tile, tile_of_blocks
+  public :: options_of, span_of, grid_of, output_path, points_of_tile, automatic_tile, tile_of_blocks
 
   !> Doubles per vector, to try a narrower kernel than the processor allows (2, 4, 8). The results are the same.
   character(len=*), parameter :: width_variable = 'SEPARATRIX_LANE_WIDTH'
@@ -41,6 +42,7 @@ contains
     options%step_budget = int(the_case%integrator%step_budget, int64)
     options%domain = the_case%run%domain
     if (the_case%integrator%lanes == 'auto') options%lane_width = lane_width()
+    options%gpu = gpu_in_use
   end function options_of
 
   !> The widest vectors of this processor, or what the environment asks for if that is narrower.
@@ -94,11 +96,20 @@ contains
     path = path//'.'//command//'.h5'
   end function output_path
 
-  !> Tile shape where the case leaves it open: about a thousand trajectories of one slice, more on a grid that would have
+  !> Points of a tile where nobody says how many: about a thousand; where some of the ranks have a GPU, up to a million, as a
+  !> tile is all that a GPU can do at once, but some tiles for every rank.
+  pure integer function points_of_tile(points, ranks, gpus)
+    integer(int64), intent(in) :: points
+    integer, intent(in) :: ranks, gpus
+    points_of_tile = 1024
+    if (gpus > 0) points_of_tile = int(max(1024_int64, min(2_int64**20, points/(4*ranks))))
+  end function points_of_tile
+
+  !> Tile shape where the case leaves it open: about so many `points` of one slice, more on a grid that would have
   !> more than `most_tiles`, because every rank keeps a list of the tiles.
-  pure function automatic_tile(grid, asked) result(tile)
+  pure function automatic_tile(grid, asked, points) result(tile)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: asked(:)
+    integer, intent(in) :: asked(:), points
     integer :: tile(size(grid%shape))
     logical :: free(size(grid%shape))
     integer :: i, starts
@@ -106,7 +117,7 @@ contains
     do i = 1, size(tile)
       free(i) = any(grid%start_axis == i) .or. starts == 0
       if (any(grid%start_axis == i)) then
-        tile(i) = max(1, nint(1024.0_wp**(1.0_wp/starts)))
+        tile(i) = max(1, nint(real(points, wp)**(1.0_wp/starts)))
       else if (starts == 0) then
         tile(i) = max(1, nint(64.0_wp**(1.0_wp/size(tile))))
       else

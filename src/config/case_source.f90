@@ -292,6 +292,7 @@ contains
       if (.not. starts_with(source%known(i), above)) cycle
       name = source%known(i)(len(above) + 1:)
       name = name(1:scan(trim(name)//'.', '.[') - 1)
+      if (len_trim(name) == 0) cycle
       if (all(names /= name)) call append(names, trim(name))
     end do
   end function names_below

@@ -7,6 +7,7 @@ module part_reader
   use case_parameters, only: row_bounds
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
+  use drive_record, only: read_record
   use kinds, only: wp
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, set_value, value_of
@@ -26,6 +27,8 @@ module part_reader
   !> Names of the places between which joints act: bodies, then points of structures.
   type :: bodies_t
     character(len=label_length), allocatable :: names(:)
+    !> Displacement of one per force at another by the modes that structures leave out [m/N].
+    real(wp), allocatable :: left_out(:, :)
   end type bodies_t
 
 contains
@@ -75,14 +78,23 @@ contains
     character(len=label_length), allocatable :: names(:)
     character(len=:), allocatable :: watched
     type(law_choice_t), allocatable :: structures(:)
+    real(wp), allocatable :: left_out(:, :)
     integer :: i, k
+    logical :: found
+    do i = 1, size(kinds_of_parts)
+      ! Tables that may be there are named where one is misspelt.
+      call know(source, trim(kinds_of_parts(i))//'.')
+      call enter_table(source, trim(kinds_of_parts(i)), found)
+    end do
     bodies%names = names_of(source, 'body')
     call check_names(source, 'body', bodies%names)
     names = names_of(source, 'structure')
     call check_names(source, 'structure', names)
     allocate (structures(0))
+    allocate (bodies%left_out(size(bodies%names), size(bodies%names)), source=0.0_wp)
     do k = 1, size(names)
-      call read_structure(source, trim(names(k)), k, structures)
+      call read_structure(source, trim(names(k)), k, structures, left_out)
+      call append_block(bodies%left_out, left_out)
     end do
     bodies%names = [bodies%names, pack(structures%label, index(structures%name, 'point:') == 1)]
     call check_columns(source, bodies%names)
@@ -169,7 +181,7 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: law, path
     integer :: i
-    logical :: found
+    logical :: found, from_record
     path = kind//'.'//name
     call enter_table(source, path, found)
     law = default
@@ -191,10 +203,12 @@ contains
     choice = law_choice(part_family, kind//':'//law)
     choice%label = name
     if (kind == 'drive') call read_body(source, path, bodies, choice)
+    from_record = .false.
+    if (choice%name == 'drive:force') call read_record(source, path, choice, from_record)
     if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
-      if (is_hidden(rows(i))) cycle
+      if (is_hidden(rows(i)) .or. from_record) cycle
       if (rows(i)%list) then
         call take_reals(source, path//'.'//trim(rows(i)%name), row_bounds(rows(i)), choice%parameters(i)%values, &
                         required=.not. rows(i)%optional)
@@ -207,8 +221,44 @@ contains
       ! Break-away friction that is not given equals sliding friction.
       if (value_of(choice, 'static_force') < 0) call set_value(choice, 'static_force', [value_of(choice, 'force')])
     end if
+    if (choice%name == 'contact:massless') call set_flexibility(source, path, bodies, choice)
     choices = [choices, choice]
   end subroutine read_part
+
+  !> A matrix as the last block on the diagonal of another.
+  pure subroutine append_block(matrix, block)
+    real(wp), allocatable, intent(inout) :: matrix(:, :)
+    real(wp), intent(in) :: block(:, :)
+    real(wp), allocatable :: larger(:, :)
+    integer :: n
+    n = size(matrix, 1)
+    allocate (larger(n + size(block, 1), n + size(block, 1)), source=0.0_wp)
+    larger(:n, :n) = matrix
+    larger(n + 1:, n + 1:) = block
+    call move_alloc(larger, matrix)
+  end subroutine append_block
+
+  !> A massless contact without a stiffness has that of the modes which the structures at its ends leave out.
+  subroutine set_flexibility(source, path, bodies, choice)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    type(bodies_t), intent(in) :: bodies
+    type(law_choice_t), intent(inout) :: choice
+    real(wp) :: flexibility
+    integer :: ends(2)
+    if (value_of(choice, 'stiffness') > 0 .or. has_problems(source)) return
+    ends = nint([value_of(choice, 'first_end'), value_of(choice, 'second_end')])
+    flexibility = 0
+    if (ends(1) > 0) flexibility = flexibility + bodies%left_out(ends(1), ends(1))
+    if (ends(2) > 0) flexibility = flexibility + bodies%left_out(ends(2), ends(2))
+    if (all(ends > 0)) flexibility = flexibility - 2*bodies%left_out(ends(1), ends(2))
+    if (flexibility > 0) then
+      call set_value(choice, 'stiffness', [1/flexibility])
+    else
+      call report(source, path//'.stiffness', 'missing, allowed more than 0 N/m, or between points of a structure of which '// &
+                  'structure.NAME.modes leaves modes out: their flexibility is the contact''s')
+    end if
+  end subroutine set_flexibility
 
   !> The watched body starts where [start] says.
   subroutine refuse_start(source, path)

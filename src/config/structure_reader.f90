@@ -5,13 +5,13 @@
 module structure_reader
   use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, list_size, report
   use case_values, only: any_number, at_least, take_integer, take_real, take_reals, take_text
-  use eigen, only: undamped_modes
   use jointed, only: most_degrees
   use kinds, only: real64, wp
   use law_table, only: label_length, law_choice, law_choice_t, part_family, set_value
   use matrix_market, only: read_matrix_market
-  use structure_block, only: is_symmetric, rigid_share, smallest_share
+  use structure_block, only: is_symmetric, smallest_share
   use structure_data, only: joined, most_file_coordinates, point_name_length, structure_data_t
+  use structure_reduction, only: coordinates_of, keep_modes
   use suggest, only: nearest_word
   use text, only: join, starts_with, to_text
   use toml_bindings, only: toml_array, toml_integer, toml_string
@@ -25,16 +25,19 @@ module structure_reader
 
 contains
 
-  !> Appends the structure and its points, whose labels are 'NAME.POINT', to `choices`.
-  subroutine read_structure(source, name, number, choices)
+  !> Appends the structure and its points, whose labels are 'NAME.POINT', to `choices`. `left_out` is the flexibility of its points
+  !> by the modes that are not kept [m/N].
+  subroutine read_structure(source, name, number, choices, left_out)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: name
     integer, intent(in) :: number
     type(law_choice_t), allocatable, intent(inout) :: choices(:)
+    real(wp), allocatable, intent(out) :: left_out(:, :)
     type(structure_data_t) :: content
-    character(len=:), allocatable :: path, law
+    character(len=:), allocatable :: path, law, problem
     integer :: problems, modes, i
     logical :: found
+    allocate (left_out(0, 0))
     path = 'structure.'//name
     problems = size(source%problems)
     call enter_table(source, path, found)
@@ -58,10 +61,17 @@ contains
       call know_all_below(source, path)
       return
     end if
-    if (modes > 0) call keep_modes(source, path, modes, content)
+    if (modes > 0) then
+      call keep_modes(modes, content, problem)
+      if (allocated(problem)) call report(source, path//'.modes', problem)
+    end if
     if (coordinates_of(content) > most_degrees) call report(source, path, 'found '//to_text(coordinates_of(content))// &
       ' coordinates, allowed at most '//to_text(most_degrees)//': modes = '//to_text(most_degrees)//' or fewer keeps the lowest')
-    if (size(source%problems) == problems) call add_choices(source, path, name, number, content, choices)
+    if (size(source%problems) > problems) return
+    call add_choices(source, path, name, number, content, choices)
+    deallocate (left_out)
+    allocate (left_out(size(content%point_names), size(content%point_names)), source=0.0_wp)
+    if (allocated(content%left_out)) left_out = real(content%left_out, wp)
   end subroutine read_structure
 
   !> A file relative to the folder of the case.
@@ -166,16 +176,6 @@ contains
       matrix = real(transpose(reshape(values, [n, n])), real64)
     end if
   end subroutine take_matrix
-
-  pure integer function coordinates_of(content) result(n)
-    type(structure_data_t), intent(in) :: content
-    n = 0
-    if (allocated(content%frequency)) then
-      n = size(content%frequency)
-    else if (allocated(content%mass)) then
-      n = size(content%mass, 1)
-    end if
-  end function coordinates_of
 
   !> Matrices of one size, symmetric, with a mass matrix that can be inverted.
   subroutine check_content(source, path, law, content)
@@ -312,41 +312,6 @@ contains
     text = ''
     if (len(meant) > 0) text = ' (did you mean "'//meant//'"?)'
   end function hint
-
-  !> The lowest modes of a structure in the place of its coordinates.
-  subroutine keep_modes(source, path, modes, content)
-    type(case_source_t), intent(inout) :: source
-    character(len=*), intent(in) :: path
-    integer, intent(in) :: modes
-    type(structure_data_t), intent(inout) :: content
-    real(wp), allocatable :: squares(:), shapes(:, :)
-    integer :: n
-    n = coordinates_of(content)
-    if (modes > n) then
-      call report(source, path//'.modes', 'found '//to_text(modes)//', allowed at most the '//to_text(n)//' there are')
-      return
-    end if
-    if (allocated(content%frequency)) then
-      content%frequency = content%frequency(:modes)
-      if (allocated(content%damping_ratio)) content%damping_ratio = content%damping_ratio(:modes)
-      if (allocated(content%damping)) content%damping = content%damping(:modes, :modes)
-      content%rows = content%rows(:, :modes)
-      return
-    end if
-    allocate (squares(n), shapes(n, n))
-    call undamped_modes(real(content%stiffness, wp), real(content%mass, wp), squares, shapes)
-    if (squares(1) < -1e-8_wp*maxval(abs(squares))) then
-      call report(source, path//'.modes', 'found a stiffness matrix that is not positive semidefinite, allowed without modes')
-      return
-    end if
-    where (squares < rigid_share*squares(n)) squares = 0
-    content%frequency = real(sqrt(squares(:modes)), real64)
-    associate (kept => real(shapes(:, :modes), real64))
-      if (allocated(content%damping)) content%damping = matmul(transpose(kept), matmul(content%damping, kept))
-      content%rows = matmul(content%rows, kept)
-    end associate
-    deallocate (content%mass, content%stiffness)
-  end subroutine keep_modes
 
   subroutine add_choices(source, path, name, number, content, choices)
     type(case_source_t), intent(inout) :: source

@@ -22,6 +22,8 @@ module structure_data
     !> Named points; row p of `rows` times the coordinates is the displacement of point p [m].
     character(len=point_name_length), allocatable :: point_names(:)
     real(real64), allocatable :: rows(:, :)
+    !> Displacement of a point per force at another by the modes that were left out [m/N].
+    real(real64), allocatable :: left_out(:, :)
   end type structure_data_t
 
   !> Reads the file `path`; `problem` is allocated if it cannot be used, and `missing` tells that it cannot be opened.

@@ -6,7 +6,7 @@ module basin_driver
   use attractors, only: last_regime, regime_names
   use basin_work, only: basin_work_t, prepare_counts, sum_counts
   use case_check, only: require_axes
-  use case_setup, only: automatic_tile, grid_of, output_path, span_of, tile_of_blocks
+  use case_setup, only: automatic_tile, grid_of, output_path, points_of_tile, span_of, tile_of_blocks
   use case_type, only: case_t
   use catalogue_report, only: attractor_text, missed_text, not_known_text
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
@@ -61,7 +61,7 @@ contains
     call open_session(command, session)
     call require_axes(session%the_case, error)
     call session%stop_if(error)
-    call prepare_basin(session%the_case, work, tile)
+    call prepare_basin(session%the_case, work, tile, session%team%size(), merge(0, session%gpus, command%shard > 0))
     call check_slices(work%grid, work%span, error)
     call session%stop_if(error)
     if (command%validate) then
@@ -90,7 +90,7 @@ contains
     call describe_basin(session, work, schema, dimensions)
     if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema, &
                                                pack_catalogues(work%catalogues, spread(.true., 1, size(work%catalogues))))
-    call open_tiles(session, path, schema, dimensions, tile, file)
+    call open_tiles(session, path, schema, dimensions, tile, file, open_shape=.not. any(session%the_case%tile > 0))
     if (command%search_only) call finish_search(session, file)
     call resume_second_look(session, file, work)
     call run_tiles(session, file, work, complete)
@@ -99,17 +99,19 @@ contains
     call end_basin(session, work, file, complete)
   end subroutine run_basin
 
-  !> Grid, span and tiles of a case.
-  subroutine prepare_basin(the_case, work, tile)
+  !> Grid, span and tiles of a case, for so many ranks of which so many have a GPU. Shares of a map are to have the same tiles,
+  !> whoever computes them: for these `gpus` is 0.
+  subroutine prepare_basin(the_case, work, tile, ranks, gpus)
     type(case_t), intent(in) :: the_case
     type(basin_work_t), intent(inout) :: work
     integer, allocatable, intent(out) :: tile(:)
+    integer, intent(in) :: ranks, gpus
     work%variables = point_values
     work%grid = grid_of(the_case, the_case%axes)
     work%span = span_of(the_case)
     work%max_period = the_case%attractors%max_period
     call prepare_refinement(the_case, work)
-    tile = automatic_tile(work%grid, the_case%tile)
+    tile = automatic_tile(work%grid, the_case%tile, points_of_tile(product(int(work%grid%shape, int64)), ranks, gpus))
     if (work%refine%active) tile = tile_of_blocks(work%grid, work%refine, the_case%tile)
   end subroutine prepare_basin
 

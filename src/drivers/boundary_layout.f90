@@ -75,7 +75,25 @@ contains
     end do
     call add_saddles(grid, planes, names, schema)
     call add_sets(names, schema)
+    call copy_second_look(reader, schema, error)
   end subroutine describe_boundary
+
+  !> From where the map searched attractors again: without it `verify` could not.
+  subroutine copy_second_look(reader, schema, error)
+    type(reader_t), intent(in) :: reader
+    type(schema_t), intent(inout) :: schema
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(int64), allocatable :: lengths(:)
+    if (.not. reader%has('/second_look/start')) return
+    call reader%read_values('/second_look/start', values, error)
+    if (.not. allocated(error)) call reader%lengths('/second_look/start', lengths, error)
+    if (allocated(error)) return
+    call schema%add_dimension('look', lengths(1))
+    call schema%add_dimension('look_column', lengths(2))
+    call schema%add_variable('start', type_int64, [character(len=name_length) :: 'look', 'look_column'], units='1', &
+      group='second_look', long_name='as in the map: points from which attractors were searched again', data=values)
+  end subroutine copy_second_look
 
   !> Adds the pieces of a plane to the table; `before` saddles belong to the planes before it.
   pure subroutine add_plane(plane, names, number, before, table)

@@ -81,7 +81,7 @@ contains
       if (share <= converged_share) cycle
       call journal%line('warning', 'warning: '//trim(machine%joints(j)%name)//': the upper half of the modes makes '// &
         to_text(nint(100*share))//' % of what yields at an impact, and a restitution does not converge with their number. '// &
-        'Compare with fewer and with more modes, or give the stop a stiffness (kelvin_voigt)')
+        'Compare with fewer and with more modes, or give the stop a stiffness (kelvin_voigt), or the point no mass (massless)')
     end do
   end subroutine warn_about_modes
 

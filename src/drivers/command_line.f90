@@ -3,7 +3,7 @@
 
 !> The command line: what was asked.
 module command_line
-  use command_table, only: belonging_to, commands, option_number, options
+  use command_table, only: belonging_to, commands, devices, option_number, options
   use errors, only: error_t, fail
   use kinds, only: wp
   use status, only: exit_usage
@@ -38,6 +38,7 @@ module command_line
     !> Seconds between lines of progress; 0 = as the journal thinks fit.
     real(wp) :: progress = 0
     integer :: ranks_per_node = 0
+    character(len=4) :: device = 'auto'
     !> `branches`: the parameter, its range, and at how many values orbits are searched.
     character(len=:), allocatable :: parameter
     real(wp) :: from = 0, to = 0
@@ -263,6 +264,9 @@ contains
       call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%time_limit, error)
     case ('--progress')
       call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%progress, error)
+    case ('--device')
+      command%device = value
+      if (.not. any(devices == value)) call fail(error, exit_usage, name//": found '"//value//"', allowed is "//join(devices, ', '))
     case ('--ranks-per-node')
       call read_integer(name, value, 1, command%ranks_per_node, error)
     case ('--sample')

@@ -87,6 +87,9 @@ module command_table
       '  --seed N        seed that chooses them (default 1)'//nl// &
       '  --max-changes P per cent of the labels rerun that may change (default 1)'//nl)]
 
+  !> What `--device` can be.
+  character(len=*), parameter, public :: devices(3) = [character(len=4) :: 'auto', 'cpu', 'gpu']
+
   character(len=*), parameter, public :: commands(size(rows)) = rows%name
 
   type, public :: option_row_t
@@ -99,7 +102,7 @@ module command_table
     character(len=130) :: help
   end type option_row_t
 
-  type(option_row_t), parameter, public :: options(35) = [ &
+  type(option_row_t), parameter, public :: options(36) = [ &
     option_row_t('--output', '-o', .true., 'basin sweep branches boundary trajectory points', &
       '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'), &
     option_row_t('--set', '', .true., 'basin sweep branches stability trajectory points', &
@@ -124,6 +127,8 @@ module command_table
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'), &
     option_row_t('--ranks-per-node', '', .true., 'basin sweep points', &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'), &
+    option_row_t('--device', '', .true., 'basin sweep points', &
+      '  --device NAME      auto (a GPU where there is one, else the processor), cpu or gpu; the results are the same bits'), &
     option_row_t('--tile-times', '', .true., 'basin sweep points', &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'), &
     option_row_t('--progress', '', .true., 'basin sweep branches boundary stability trajectory points', &

@@ -67,7 +67,7 @@ contains
     logical :: complete
     if (len(session%command%csv) > 0) call fail(error, exit_usage, '--csv belongs to the shares of a list of starts')
     call session%stop_if(error)
-    call prepare_basin(session%the_case, work, tile)
+    call prepare_basin(session%the_case, work, tile, ranks=1, gpus=0)
     call take_catalogues(shares, work, error)
     call session%stop_if(error)
     call session%begin(session%command%path, tiled=.true.)

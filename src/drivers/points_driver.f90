@@ -6,7 +6,7 @@ module points_driver
   use attractors, only: attractor_t
   use checksum, only: crc32
   use axis, only: axis_t, name_length
-  use case_setup, only: grid_of, output_path, span_of
+  use case_setup, only: grid_of, output_path, points_of_tile, span_of
   use case_type, only: case_t
   use command_line, only: command_t
   use endings, only: report_reasons
@@ -26,7 +26,7 @@ module points_driver
   use text, only: to_text
   use text_table, only: table_t
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
-  use trajectories, only: block_size, describe_regime, journey_t, run_trajectories
+  use trajectories, only: block_size, describe_regime, journey_t, run_on_device
   use trajectory, only: outcome_t
   implicit none
   private
@@ -65,6 +65,7 @@ contains
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
     real(wp) :: seconds
+    integer :: points
     logical :: complete
     call open_session(command, session)
     work%variables = point_variables
@@ -92,7 +93,11 @@ contains
     call session%begin(path, tiled=.true.)
     call describe_list(session, work%list, schema)
     if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema)
-    call open_tiles(session, path, schema, ['point'], [points_per_tile], file)
+    points = points_per_tile
+    if (session%gpus > 0 .and. command%shard == 0) then
+      points = points_of_tile(size(work%list%x0, kind=int64), session%team%size(), session%gpus)
+    end if
+    call open_tiles(session, path, schema, ['point'], [points], file, open_shape=.true.)
     call run_tiles(session, file, work, complete)
     if (command%shard > 0 .and. complete) call finish_shard(session, file)
     call end_points(session, work, file, complete)
@@ -277,24 +282,28 @@ contains
           self%ratio = ratio
         end if
       end associate
-      call run_block(self, index(1, first:last), values(first:last, :))
+      call run_block(self, index(1, first:last), values(first:last, :), error)
+      if (allocated(error)) return
       first = last + 1
     end do
   end subroutine compute_list_points
 
   !> Points of one machine.
-  subroutine run_block(work, points, values)
+  subroutine run_block(work, points, values, error)
     type(list_work_t), intent(in) :: work
     integer, intent(in) :: points(:)
     real(wp), intent(out) :: values(:, :)
-    type(outcome_t) :: outcomes(size(points))
+    type(error_t), allocatable, intent(out) :: error
+    type(outcome_t), allocatable :: outcomes(:)
     type(attractor_t) :: no_catalogue(0)
-    real(wp) :: starts(3 + size(work%starts%others), size(points))
+    real(wp), allocatable :: starts(:, :)
     integer :: i
+    allocate (outcomes(size(points)), starts(3 + size(work%starts%others), size(points)))
     do i = 1, size(points)
       starts(:, i) = point_start(work%starts, [points(i)])
     end do
-    call run_trajectories(work%journey, no_catalogue, starts, outcomes)
+    call run_on_device(work%journey, no_catalogue, starts, outcomes, error)
+    if (allocated(error)) return
     do i = 1, size(points)
       associate (outcome => outcomes(i))
         values(i, :) = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &

@@ -11,9 +11,10 @@ module session
   use case_type, only: case_t
   use case_warnings, only: warn_about
   use command_line, only: command_t
+  use device_choice, only: choose_device, device_text
   use errors, only: error_t, fail
   use files, only: give_lock, take_lock
-  use journal, only: journal_t
+  use journal, only: journal_t, json_text
   use launcher, only: launched_ranks
   use map_schema, only: schema_t
   use output_check, only: check_create, check_result, check_resume, check_table, working_path
@@ -46,6 +47,8 @@ module session
     type(provenance_t) :: provenance
     !> A process without others, for which MPI is started only when work begins.
     logical :: alone = .true.
+    !> Ranks that compute on a GPU.
+    integer :: gpus = 0
     !> Files are being written.
     logical :: writing = .false.
     !> On rank 0 of a run with a working file: its lock, and what holds it.
@@ -84,6 +87,11 @@ contains
                                                    wants_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
     if (len(command%draw) > 0) call draw_machine(session)
+    if (command%validate .or. command%dry_run .or. &
+        .not. any(command%name == [character(len=10) :: 'basin', 'sweep', 'points'])) return
+    call choose_device(session%team, trim(command%device), session%the_case, error)
+    call session%stop_if(error)
+    call device_text(session%team, session%the_case, session%provenance%device, session%gpus)
   end subroutine open_session
 
   !> Writes the sketch of the machine and ends the program. Code 73 if it cannot be created.
@@ -131,6 +139,10 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
+    ! Plain text tells of the processor only where it was asked for.
+    if (allocated(self%provenance%device)) call self%journal%line('device', 'computed by '//self%provenance%device, &
+      '"device": '//json_text(self%provenance%device)//', "gpus": '//to_text(self%gpus), &
+      plain=self%gpus > 0 .or. self%command%device /= 'auto')
     call warn_about(self%command%name, self%the_case, self%journal)
   end subroutine begin
 

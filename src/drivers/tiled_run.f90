@@ -11,6 +11,7 @@ module tiled_run
   use kinds, only: int64, wp
   use map_file, only: create_working, map_file_t, open_working, working_path
   use map_final, only: finalise
+  use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t
   use parallel, only: make_scheduler
   use point_work, only: compute_list, point_work_t, watch_t
@@ -49,33 +50,55 @@ module tiled_run
 contains
 
   !> Opens the working file: with --resume that of the interrupted run if there is one, else a new one. Ends the program
-  !> on errors.
-  subroutine open_tiles(session, path, schema, grid, tile_shape, file)
+  !> on errors. `open_shape`: the tiles of an interrupted run may have another shape, which is kept.
+  subroutine open_tiles(session, path, schema, grid, tile_shape, file, open_shape)
     type(session_t), intent(inout) :: session
     character(len=*), intent(in) :: path
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: grid(:)
     integer, intent(in) :: tile_shape(:)
     type(map_file_t), intent(out) :: file
+    logical, intent(in), optional :: open_shape
     type(error_t), allocatable :: error
+    integer(int64) :: shape_of_tiles(size(tile_shape))
     integer :: found
     ! A rank that dies takes the others with it, perhaps before they can say this.
     if (session%team%size() > 1) call session%journal%line('kept', 'the tiles done are kept in '//working_path(path)// &
       '; after an interruption the same command with --resume (without --force) goes on')
     ! Rank 0 decides, before it creates what the others would see.
+    shape_of_tiles = tile_shape
     found = 0
     if (file_exists(working_path(path))) found = 1
     call session%team%broadcast(found)
     if (session%command%resume .and. found == 1) then
       call inspect_interrupted(session, path, schema, error)
       call session%stop_if(error)
-      call open_working(path, schema, grid, int(tile_shape, int64), session%team, file, error)
+      if (present(open_shape)) then
+        if (open_shape .and. session%team%is_root()) call read_tile_shape(working_path(path), shape_of_tiles, error)
+        call session%stop_if(error)
+        call session%team%broadcast_integers(shape_of_tiles)
+      end if
+      call open_working(path, schema, grid, shape_of_tiles, session%team, file, error)
     else
-      call create_working(path, schema, grid, int(tile_shape, int64), session%command%force, session%team, file, &
+      call create_working(path, schema, grid, shape_of_tiles, session%command%force, session%team, file, &
                           error, shares=max(1, session%command%shard_count))
     end if
     call session%stop_if(error)
   end subroutine open_tiles
+
+  !> The shape of the tiles of an interrupted run, if it has as many axes.
+  subroutine read_tile_shape(part, tile_shape, error)
+    character(len=*), intent(in) :: part
+    integer(int64), intent(inout) :: tile_shape(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(reader_t) :: reader
+    real(wp), allocatable :: found(:)
+    call open_final(part, reader, error)
+    if (.not. allocated(error)) call reader%read_values('/tiles/tile_shape', found, error)
+    if (.not. allocated(error)) call reader%close(error)
+    if (allocated(error)) return
+    if (size(found) == size(tile_shape)) tile_shape = nint(found, int64)
+  end subroutine read_tile_shape
 
   !> Computes every tile that is not yet done. `complete` is false after a stop.
   subroutine run_tiles(session, file, work, complete)
@@ -162,6 +185,10 @@ contains
     else
       allocate (values(points, work%variables))
       call compute_list(work, index, values, whole, error, watch)
+    end if
+    if (allocated(error)) then
+      if (error%code == exit_resumable) error%message = error%message//'; the tiles done are kept in '// &
+        working_path(file%path)//'; the same command with --resume (without --force) goes on, with --device cpu without a GPU'
     end if
     call session%abort_if(error)
     if (.not. whole) return

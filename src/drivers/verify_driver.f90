@@ -6,8 +6,10 @@
 module verify_driver
   use angle_units, only: unit_of
   use attractors, only: regime_names
+  use audit, only: audit_t, sampled
   use axis, only: axis_t
   use basin, only: basin_points, catalogue_t, slice_cache_t
+  use boundary_audit, only: audit_boundary, check_boundary
   use case_reader, only: load_case_text
   use case_setup, only: grid_of, options_of, span_of
   use case_type, only: case_t
@@ -24,7 +26,6 @@ module verify_driver
   use point_columns, only: point_table, point_values
   use point_list, only: point_list_t
   use points_driver, only: open_list_journey, read_further
-  use random, only: uniform
   use reference, only: run_reference
   use refinement, only: origin_contradicted
   use restoring_law, only: position_is_angle
@@ -42,21 +43,6 @@ module verify_driver
   private
 
   public :: run_verify
-
-  !> What the rerun of the sample showed.
-  type :: audit_t
-    integer :: points = 0, differing = 0, flips = 0, impact_count_differs = 0
-    !> Of a refined map: points that were inferred, and those of them that were inferred wrongly.
-    integer :: inferred = 0, inferred_differing = 0
-    !> Points whose label changes: flips, and what was inferred wrongly.
-    integer :: changes = 0
-    !> Every point was run again.
-    logical :: whole = .false.
-    real(wp) :: x_deviation = 0, v_deviation = 0
-    !> The positions are angles.
-    logical :: is_angle = .false.
-    character(len=:), allocatable :: first_difference
-  end type audit_t
 
   !> Deviations [m] above it are explained to the reader.
   real(wp), parameter :: told_deviation = 1e-6_wp
@@ -86,7 +72,10 @@ contains
     if (.not. allocated(error)) call reader%read_text('/provenance/resolved_case', resolved, error)
     if (.not. allocated(error)) call load_case_text(resolved, command%path//' (resolved case)', no_overrides, &
                                                     the_case, error)
-    if (.not. allocated(error)) call check_invariants(reader, kind, points, error)
+    if (.not. allocated(error)) then
+      if (kind == 'boundary') call check_boundary(reader, points, error)
+      if (kind /= 'boundary') call check_invariants(reader, kind, points, error)
+    end if
     if (.not. allocated(error)) then
       audit%is_angle = position_is_angle(the_case%laws)
       select case (kind)
@@ -95,6 +84,8 @@ contains
       case ('sweep')
         if (reader%has('/branch_regime')) call audit_map(reader, journal, the_case, sweep_axes(the_case), 'branch_', &
                                                          command%sample, command%seed, audit, error)
+      case ('boundary')
+        call audit_boundary(reader, journal, the_case, command%sample, command%seed, audit, error)
       case ('points')
         call audit_points(reader, the_case, command%sample, command%seed, audit, error)
       end select
@@ -181,25 +172,6 @@ contains
       call journal%progress(int(i, int64))
     end do
   end subroutine audit_map
-
-  !> Indices of point `i` of the sample: each point once where the sample is the `whole`, else a random one.
-  pure function sampled(shape, whole, seed, i) result(index)
-    integer, intent(in) :: shape(:), seed, i
-    logical, intent(in) :: whole
-    integer :: index(size(shape))
-    real(wp) :: random_numbers(size(shape))
-    integer :: k, left
-    if (.not. whole) then
-      call uniform(int(seed, int64), int(i, int64), random_numbers)
-      index = 1 + int(random_numbers*shape)
-      return
-    end if
-    left = i - 1
-    do k = 1, size(shape)
-      index(k) = 1 + modulo(left, shape(k))
-      left = left/shape(k)
-    end do
-  end function sampled
 
   !> A map has the lengths of the axes of its case; the starts of a sweep are one dimension of the file.
   subroutine check_lengths(path, lengths, shape, error)
@@ -375,7 +347,7 @@ contains
     integer, intent(in) :: datasets
     integer(int64), intent(in) :: points
     type(audit_t), intent(in) :: audit
-    character(len=:), allocatable :: all_of
+    character(len=:), allocatable :: all_of, deviations
     all_of = ''
     if (audit%whole) all_of = 'all '
     if (command%json) then
@@ -393,6 +365,13 @@ contains
       '  checksums of '//to_text(datasets)//' datasets agree', &
       '  invariants hold at '//to_text(points)//merge(' events', ' points', kind == 'trajectory')
     if (audit%points == 0) return
+    deviations = ', '//to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
+                 to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
+                 unit_of('m/s', audit%is_angle)
+    ! Of a boundary the labels on its two sides are all that is asked.
+    if (kind == 'boundary') deviations = ''
+    if (audit%wider > 0) deviations = '; '//to_text(audit%wider)//' of the others lie further out than the file says, by no '// &
+                                      'more than a hundred times'
     if (audit%inferred > 0) write (output_unit, '(a)') &
       '  '//to_text(audit%inferred)//' inferred points computed: '//to_text(audit%inferred_differing)// &
       ' differ; so, with 95 % confidence, at most '// &
@@ -400,10 +379,7 @@ contains
     write (output_unit, '(a)') &
       '  '//all_of//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file'// &
       trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
-      '  against quadruple precision: '//to_text(audit%flips)//' label flips, '// &
-      to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
-      to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
-      unit_of('m/s', audit%is_angle)
+      '  against quadruple precision: '//to_text(audit%flips)//' label flips'//deviations
     if (audit%x_deviation > told_deviation .and. audit%flips == 0) write (output_unit, '(a)') &
       '  a deviation so large with the same label: the phase on the cycle, or chaos, hangs on the last digits of the start'
     if (.not. audit%whole) write (output_unit, '(a)') &

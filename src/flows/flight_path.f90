@@ -24,7 +24,8 @@ module flight_path
     !> Time of the start since the section [s].
     real(wp) :: start = 0
     !> Amplitudes of the exponentials, harmonics at the start, powers of the time since then.
-    complex(wp), allocatable :: amplitude(:), turning(:)
+    complex(wp) :: amplitude(2*most_degrees)
+    complex(wp), allocatable :: turning(:)
     real(wp) :: powers(most_degrees, 0:3) = 0
     !> Constant forces on the coordinates and their rates [N, N/s].
     real(wp) :: force(most_degrees) = 0, force_rate(most_degrees) = 0
@@ -152,7 +153,6 @@ contains
     speed(:free) = matmul(transpose(flow%basis), speed(:n))
     push(:free) = matmul(transpose(flow%basis), push(:n))
     push_rate(:free) = matmul(transpose(flow%basis), push_rate(:n))
-    allocate (path%amplitude(size(flow%exponent)))
     do k = 1, size(flow%exponent)
       lambda = flow%exponent(k)
       path%amplitude(k) = sum(flow%left(k, :f)*flow%frequency*place(:f)) + sum(flow%left(k, f + 1:)*speed(:f + d))

@@ -10,7 +10,7 @@ module guard_search
   use elementary, only: exponential, logarithm, sine_cosine
   use flight_path, only: force_powers, path_t, place_powers
   use guards, only: joint_guard_t, most_guards
-  use jointed, only: jointed_t
+  use jointed, only: jointed_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
@@ -23,17 +23,22 @@ module guard_search
   !> Remainder of the quintic: |y - H| <= max|y^(6)| L^6/46080 in the middle of a panel.
   real(wp), parameter :: remainder = 46080
   integer, parameter :: most_steps = 200
+  integer, parameter :: most_terms = 2*most_degrees, most_functions = most_guards + 1
+  !> After so many panels their length is looked at again: what was fast may have died away.
+  integer, parameter :: panels_between = 8
 
-  !> All functions of a path that are looked at, as sums: the guards, and after them watched coordinates.
+  !> All functions of a path that are looked at, as sums: the guards, and after them watched coordinates. Made for every flight:
+  !> what can be large has a fixed size, which costs nothing.
   type, public :: search_t
-    integer :: guards = 0, functions = 0
-    complex(wp), allocatable :: exponent(:), term(:, :), turn(:, :)
-    real(wp), allocatable :: decay(:), size_of_exponent(:), size_of_term(:, :)
+    integer :: guards, functions, terms
+    complex(wp) :: exponent(most_terms), term(most_terms, most_functions)
+    complex(wp), allocatable :: turn(:, :)
+    real(wp) :: decay(most_terms), size_of_exponent(most_terms), size_of_term(most_terms, most_functions)
     !> Angular frequency of the first harmonic [rad/s].
-    real(wp) :: frequency = 0
-    real(wp), allocatable :: power(:, :)
+    real(wp) :: frequency
+    real(wp) :: power(0:3, most_functions)
     !> Bounds from the powers and harmonics on derivatives 0 to 6.
-    real(wp), allocatable :: steady(:, :)
+    real(wp) :: steady(0:6, most_functions)
   end type search_t
 
 contains
@@ -46,25 +51,24 @@ contains
     type(joint_guard_t), intent(in) :: list(:)
     integer, intent(in) :: count_guards, watched
     type(search_t), intent(out) :: search
-    real(wp) :: place(0:3), force(0:3), w
-    integer :: g, k, m, order
+    real(wp) :: place(0:3), force(0:3), w, largest
+    integer :: g, k, m, n, order
     search%guards = count_guards
     search%functions = count_guards + 1
-    search%exponent = flow%exponent
+    search%terms = size(flow%exponent)
+    n = search%terms
+    search%exponent(:n) = flow%exponent
     search%frequency = machine%frequency
-    search%decay = real(flow%exponent)
-    search%size_of_exponent = modulus(flow%exponent)
-    associate (functions => search%functions, terms => size(flow%exponent), harmonics => size(path%turning))
-      allocate (search%term(terms, functions), search%size_of_term(terms, functions), search%turn(harmonics, functions), &
-                search%power(0:3, functions), search%steady(0:6, functions))
-    end associate
+    search%decay(:n) = real(flow%exponent)
+    search%size_of_exponent(:n) = flow%size_of_exponent
+    allocate (search%turn(size(path%turning), search%functions))
     do g = 1, count_guards
       associate (guard => list(g))
         place = place_powers(machine, path, guard%joint)
         search%power(:, g) = guard%place*place
         search%power(0:2, g) = search%power(0:2, g) + guard%speed*[1, 2, 3]*place(1:3)
         search%power(0, g) = search%power(0, g) + guard%constant
-        search%term(:, g) = (guard%place + guard%speed*flow%exponent)*flow%joint_shape(:, guard%joint)
+        search%term(:n, g) = (guard%place + guard%speed*flow%exponent)*flow%joint_shape(:, guard%joint)
         do m = 1, size(path%turning)
           w = m*machine%frequency
           search%turn(m, g) = (guard%place + guard%speed*cmplx(0.0_wp, w, wp))*flow%joint_response(m, guard%joint)
@@ -72,23 +76,24 @@ contains
         if (guard%held > 0) then
           force = force_powers(machine, flow, path, guard%held)
           search%power(:, g) = search%power(:, g) + guard%force*force
-          search%term(:, g) = search%term(:, g) + guard%force*flow%force_shape(:, guard%held)
+          search%term(:n, g) = search%term(:n, g) + guard%force*flow%force_shape(:, guard%held)
           search%turn(:, g) = search%turn(:, g) + guard%force*flow%force_response(:, guard%held)
         end if
       end associate
     end do
     g = search%functions
     search%power(:, g) = path%powers(watched, :)
-    search%term(:, g) = flow%shape(watched, :)
+    search%term(:n, g) = flow%shape(watched, :)
     search%turn(:, g) = flow%response(watched, :)
     do g = 1, search%functions
-      search%term(:, g) = search%term(:, g)*path%amplitude
-      search%size_of_term(:, g) = modulus(search%term(:, g))
+      search%term(:n, g) = search%term(:n, g)*path%amplitude(:n)
+      search%size_of_term(:n, g) = modulus(search%term(:n, g))
       search%turn(:, g) = search%turn(:, g)*path%turning
       search%steady(:, g) = 0
       do k = 1, size(path%turning)
+        largest = modulus(search%turn(k, g))
         do order = 0, 6
-          search%steady(order, g) = search%steady(order, g) + modulus(search%turn(k, g))*(k*machine%frequency)**order
+          search%steady(order, g) = search%steady(order, g) + largest*(k*machine%frequency)**order
         end do
       end do
     end do
@@ -152,10 +157,16 @@ contains
     real(wp) :: p(0:3), last
     integer :: k
     bound = search%steady(order, g)
-    do k = 1, size(search%exponent)
-      bound = bound + search%size_of_term(k, g)*search%size_of_exponent(k)**order &
-              *exponential(search%decay(k)*t + max(search%decay(k), 0.0_wp)*length)
-    end do
+    if (t > 0 .or. length > 0) then
+      do k = 1, search%terms
+        bound = bound + search%size_of_term(k, g)*search%size_of_exponent(k)**order &
+                *exponential(search%decay(k)*t + max(search%decay(k), 0.0_wp)*length)
+      end do
+    else
+      do k = 1, search%terms
+        bound = bound + search%size_of_term(k, g)*search%size_of_exponent(k)**order
+      end do
+    end if
     p = abs(search%power(:, g))
     last = t + length
     select case (order)
@@ -182,12 +193,12 @@ contains
     logical, intent(out) :: fallen(:)
     real(wp), intent(inout) :: extremes(2), top_speed
     integer, intent(out) :: evaluations
-    complex(wp) :: growth(size(search%exponent)), turning(size(search%turn, 1))
+    complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp), dimension(0:3, search%functions) :: here, there
     real(wp), dimension(most_guards) :: certified, root
     real(wp) :: a, b, length, tie
     logical :: idle(most_guards)
-    integer :: g
+    integer :: g, panels
     evaluations = 1
     fallen = .false.
     a = 0
@@ -195,7 +206,8 @@ contains
     do g = 1, search%functions
       here(:, g) = derivatives(search, g, a, growth, turning)
     end do
-    length = panel_length(search, duration)
+    length = panel_length(search, 0.0_wp, duration)
+    panels = 0
     tie = 8*spacing(max(origin, origin + duration))
     time = duration
     certified = 0
@@ -244,6 +256,11 @@ contains
                  top_speed, evaluations)
       a = b
       here = there
+      panels = panels + 1
+      if (mod(panels, panels_between) == 0 .and. time > a) then
+        b = panel_length(search, a, time - a)
+        if (b > 2*length) length = b
+      end if
     end do
   end subroutine find_first
 
@@ -263,7 +280,7 @@ contains
     logical, intent(in) :: stale, wants_speed
     real(wp), intent(inout) :: extremes(2), top_speed
     integer, intent(inout) :: evaluations
-    complex(wp) :: growth(size(search%exponent)), turning(size(search%turn, 1))
+    complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp) :: last(0:3), d(0:3)
     last = there
     if (stale) then
@@ -285,7 +302,7 @@ contains
     pure function turning_point(order) result(found)
       integer, intent(in) :: order
       real(wp) :: found(0:3), low, high, at_low, at_high, t
-      complex(wp) :: now(size(search%exponent)), turn(size(search%turn, 1))
+      complex(wp) :: now(search%terms), turn(size(search%turn, 1))
       integer :: i
       low = a
       high = b
@@ -307,16 +324,16 @@ contains
     end function turning_point
   end subroutine watch
 
-  !> Length of the panels: the quintic is to be good to about a thousandth of each guard's size.
-  pure real(wp) function panel_length(search, duration) result(length)
+  !> Length of the panels from the time `t` on: the quintic is to be good to about a thousandth of each guard's size.
+  pure real(wp) function panel_length(search, t, duration) result(length)
     type(search_t), intent(in) :: search
-    real(wp), intent(in) :: duration
+    real(wp), intent(in) :: t, duration
     real(wp) :: size_now, sixth
     integer :: g
     length = duration
     do g = 1, search%functions
-      sixth = bound(search, g, 6, 0.0_wp, 0.0_wp)
-      size_now = bound(search, g, 0, 0.0_wp, 0.0_wp)
+      sixth = bound(search, g, 6, t, 0.0_wp)
+      size_now = bound(search, g, 0, t, 0.0_wp)
       if (.not. sixth*length**6 > 46*size_now) cycle
       length = min(length, exponential(logarithm(46*size_now/sixth)/6))
     end do
@@ -385,7 +402,7 @@ contains
     real(wp), intent(in) :: a, b
     real(wp), intent(out) :: root
     integer, intent(inout) :: evaluations
-    complex(wp) :: growth(size(search%exponent)), turning(size(search%turn, 1))
+    complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp) :: d(0:3), third, t, step, falling
     integer :: i
     root = huge(root)

@@ -36,12 +36,12 @@ module guards
 
 contains
 
-  !> The guards of a state.
+  !> The guards of a state, at the beginning of `list`.
   pure subroutine guards_of(machine, flow, state, list, count_guards)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(jointed_state_t), intent(in) :: state
-    type(joint_guard_t), intent(out) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards
     integer :: j, phase, held
     real(wp) :: level, d, k

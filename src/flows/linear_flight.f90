@@ -35,7 +35,7 @@ contains
     type(mode_flow_t), intent(in) :: flow
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
-    type(joint_guard_t), intent(out) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards
     logical, intent(out) :: fallen(most_guards)
     type(path_t), intent(out) :: path

@@ -38,6 +38,7 @@ module mode_flow
     !> Exponents, shapes in the coordinates (of a conjugate pair one, twofold), and rows that give their amplitudes
     !> from basis coordinates times frequency and their speeds.
     complex(wp), allocatable :: exponent(:), shape(:, :), left(:, :)
+    real(wp), allocatable :: size_of_exponent(:)
     !> Amplitude of the damped rigid coordinates per amplitude of the exponentials.
     complex(wp), allocatable :: drift(:, :)
     !> Periodic response of the coordinates to the harmonics.
@@ -317,6 +318,7 @@ contains
       flow%shape(:, i) = matmul(flow%basis(:, :f), twice*vectors(f + 1:2*f, k)/flow%exponent(i)) &
                          + matmul(flow%basis(:, f + 1:f + d), flow%drift(:, i))
     end do
+    flow%size_of_exponent = modulus(flow%exponent)
   end subroutine set_exponentials
 
   !> Periodic response to the harmonics of the drive.

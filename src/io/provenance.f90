@@ -17,6 +17,8 @@ module provenance
   type, public :: provenance_t
     !> Set by the program.
     character(len=:), allocatable :: version, commit, compiler, flags, c_flags, mpi
+    !> What computes: processor or GPU.
+    character(len=:), allocatable :: device
     !> Set by `start_provenance`.
     character(len=:), allocatable :: command, hosts, started
     integer :: ranks = 1, host_count = 1
@@ -74,6 +76,7 @@ contains
     call schema%add_attribute('provenance', 'hosts', self%hosts)
     call schema%add_attribute('provenance', 'host_count', self%host_count)
     call schema%add_attribute('provenance', 'processor', cpu_name())
+    if (allocated(self%device)) call schema%add_attribute('provenance', 'device', self%device)
     call schema%add_attribute('provenance', 'environment', environment_text())
     call schema%add_attribute('provenance', 'started', self%started)
   end subroutine describe

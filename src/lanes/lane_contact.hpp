@@ -24,14 +24,14 @@ struct contact_expansion {
 };
 
 // The side that is pressed: 1 above, -1 below.
-inline vec side_of(const lane_group &g) { return pick(g.place < 1.5, vec(1.0), vec(-1.0)); }
+LANE_DEVICE inline vec side_of(const lane_group &g) { return pick(g.place < 1.5, vec(1.0), vec(-1.0)); }
 
-inline vec surface_of(const lane_machine &m, const lane_group &g) {
+LANE_DEVICE inline vec surface_of(const lane_machine &m, const lane_group &g) {
   return pick(g.place < 1.5, vec(m.upper), vec(m.lower));
 }
 
 // Damping of the law of a contact.
-inline vec damping_of(const lane_machine &m, const lane_group &g) {
+LANE_DEVICE inline vec damping_of(const lane_machine &m, const lane_group &g) {
   const lane_contact &c = m.contact;
   return c.by_impact > 0 ? pick(g.touch > 0.0, c.damping / g.touch, vec{}) : vec(c.damping);
 }
@@ -41,10 +41,12 @@ inline vec damping_of(const lane_machine &m, const lane_group &g) {
 struct foot_series {
   vec taylor[order], power[order][order];
 
-  void start(const lane_machine &m, vec time) { expand_foot(m, time, int(m.contact.foot_terms) + 1, taylor); }
+  LANE_DEVICE void start(const lane_machine &m, vec time) {
+    expand_foot(m, time, int(m.contact.foot_terms) + 1, taylor);
+  }
 
   // Coefficient k, where `time` has those up to k, the first being 0.
-  vec next(const lane_machine &m, const vec *time, int k) {
+  LANE_DEVICE vec next(const lane_machine &m, const vec *time, int k) {
     const int terms = int(m.contact.foot_terms);
     if (k == 0)
       return taylor[0];
@@ -72,7 +74,7 @@ LANE_LEAF vec power_of(int power, const vec *u, const vec *square, vec *cube, in
 }
 
 // Expands the contacts of the lanes from where they are.
-inline void expand_contact(const lane_machine &m, const lane_group &g, contact_expansion &p) {
+LANE_DEVICE inline void expand_contact(const lane_machine &m, const lane_group &g, contact_expansion &p) {
   LANE_COUNT(evaluations, vec_size);
   const lane_contact &c = m.contact;
   const vec side = side_of(g), damping = damping_of(m, g);
@@ -113,7 +115,8 @@ inline void expand_contact(const lane_machine &m, const lane_group &g, contact_e
 
 // Length of a step over which the terms shrink by exp(-shrinking) from one to the next, compared with the
 // speed and with the depth that it can reach; at most so long that the polynomial of the foot holds.
-inline vec contact_length(const lane_machine &m, const lane_group &g, const contact_expansion &p) {
+LANE_DEVICE inline vec contact_length(const lane_machine &m, const lane_group &g,
+                                      const contact_expansion &p) {
   const double smallest = 1e-290, stiffness = m.contact.log_stiffness;
   const double power = m.contact.twice_exponent + 2;
   vec u = logarithm(p.u[0] + smallest), v = logarithm(magnitude(g.v) + smallest);
@@ -144,8 +147,8 @@ struct contact_stride {
 };
 
 // Looks for the first event of the contacts `pressed` within a step of `length`.
-inline contact_stride look_along_contact(const lane_machine &m, const contact_expansion &p, mask pressed,
-                                         vec length, const lane_group &g) {
+LANE_DEVICE inline contact_stride look_along_contact(const lane_machine &m, const contact_expansion &p,
+                                                     mask pressed, vec length, const lane_group &g) {
   contact_stride t;
   const vec side = side_of(g);
   mask inward = g.direction * side > 0.0;
@@ -192,7 +195,8 @@ inline contact_stride look_along_contact(const lane_machine &m, const contact_ex
 }
 
 // Does the formula push all the way?
-inline mask pushes(const lane_machine &m, mask asked, const contact_stride &t, const lane_group &g) {
+LANE_DEVICE inline mask pushes(const lane_machine &m, mask asked, const contact_stride &t,
+                               const lane_group &g) {
   const lane_contact &c = m.contact;
   if (c.linear > 0 || !(c.damping > 0))
     return ~mask{};
@@ -206,7 +210,8 @@ inline mask pushes(const lane_machine &m, mask asked, const contact_stride &t, c
 
 // What follows the steps `due` that end with an event, or go on. Returns the lanes that the scalar code must
 // look at.
-inline mask take_contact_events(const lane_machine &m, const contact_stride &t, mask due, lane_group &g) {
+LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const contact_stride &t, mask due,
+                                            lane_group &g) {
   const vec side = side_of(g), surface = surface_of(m, g);
   vec u, f1, f2, w, slope;
   value_at<order>(t.u, t.end, u, f1, f2);
@@ -237,7 +242,7 @@ inline mask take_contact_events(const lane_machine &m, const contact_stride &t, 
 // A step of the contacts `pressed`; `limit`: of its length, for the next attempt where one could not be
 // proven. Returns the lanes that have come to where they are to stop; adds to `left` those that the scalar
 // code must look at.
-inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left, lane_group &g) {
+LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left, lane_group &g) {
   contact_expansion p;
   expand_contact(m, g, p);
   vec natural = contact_length(m, g, p), length = pick(limit < natural, limit, natural);
@@ -254,10 +259,13 @@ inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left
 }
 
 // Are the contacts to go on next, and not the free flights? Where there are more of them.
-inline bool contacts_first(mask pressed, mask flying) { return 2 * count(pressed) > count(flying); }
+LANE_DEVICE inline bool contacts_first(mask pressed, mask flying) {
+  return 2 * count(pressed) > count(flying);
+}
 
 // Steps on with all lanes of one vector until one has stopped or is left to the scalar code.
-void fly_in_series(const lane_machine &m, int first, lane_batch &batch) {
+LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &regions, int first,
+                               lane_batch &batch) {
   const double shortest = 1e-12 * m.period;
   lane_group g;
   load<true>(batch, first, g);
@@ -265,13 +273,14 @@ void fly_in_series(const lane_machine &m, int first, lane_batch &batch) {
   mask flying = g.status == lane_flying, sent = flying;
   // A step that could not be proven is taken in halves.
   vec limit = m.stride, contact_limit = 1e300;
-  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+  int rounds = 0;
+  while (any(sent) && !any(sent & (g.status != lane_flying)) && !is_due_back(rounds)) {
     mask pressed = sent & (g.place > 0.5), left = {};
     if (contacts_first(pressed, sent)) {
       mask there = press_on(m, pressed, contact_limit, left, g);
       put(g.status, left, lane_left);
       if (any(there))
-        stop_or_pass(m.period, m.domain, there, g.x, g.v, batch, g);
+        stop_or_pass(m.period, m.domain, there, g.x, g.v, regions, g);
       continue;
     }
     flying = sent & ~pressed;
@@ -299,7 +308,7 @@ void fly_in_series(const lane_machine &m, int first, lane_batch &batch) {
     put(g.status, left, lane_left);
     mask there = proven & ~left & last & ~(t.turns | t.hits | t.slows);
     if (any(there))
-      stop_or_pass(m.period, m.domain, there, g.x, g.v, batch, g);
+      stop_or_pass(m.period, m.domain, there, g.x, g.v, regions, g);
   }
   store<true>(g, first, batch);
 }

@@ -55,7 +55,8 @@ LANE_LEAF mask positive_between(vec span, vec w0, vec rate0, vec curl0, vec w1, 
 }
 
 // A body set off: the free part of its motion. One within a Stribeck layer is left to the scalar code.
-template <bool damping, bool layer, class machine> inline void begin_flight(const machine &m, lane_group &g) {
+template <bool damping, bool layer, class machine>
+LANE_DEVICE inline void begin_flight(const machine &m, lane_group &g) {
   if constexpr (layer)
     put(g.status, (g.status == lane_fresh) & (g.direction * g.v < m.layer.edge), lane_left);
   mask fresh = g.status == lane_fresh;
@@ -82,8 +83,8 @@ template <bool damping, bool layer, class machine> inline void begin_flight(cons
 
 // Keeps the event that is `step` after the evaluated point, where `accept`.
 template <bool damping, bool layer, class machine>
-inline void keep_event(const machine &m, const kinematics &k, mask accept, mask hit, vec span, vec step,
-                       lane_group &g) {
+LANE_DEVICE inline void keep_event(const machine &m, const kinematics &k, mask accept, mask hit, vec span,
+                                   vec step, lane_group &g) {
   vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, re = k.re, im = k.im;
   turn_on<damping, 3>(m, step, re, im);
   put(g.found, accept, 1);
@@ -102,7 +103,7 @@ inline void keep_event(const machine &m, const kinematics &k, mask accept, mask 
 // Finds the ends of the flights of `seek`: a turning point, or the barrier if that lies before it. Returns
 // the lanes whose search failed.
 template <bool damping, bool layer, class machine>
-inline mask find_events(const machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
+LANE_DEVICE inline mask find_events(const machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
   vec s = pick(upward, g.up_span, g.down_span), low = layer ? g.skip : vec{}, high = 1e300;
   mask hit = pick(upward, g.up_hits, g.down_hits) > 0.5;
   if constexpr (machine::modal) {
@@ -154,7 +155,7 @@ inline mask find_events(const machine &m, mask seek, mask upward, vec barrier, l
 // Is each of so many equal pieces of the flights proven to have no event on the way? With a layer: from its
 // edge to its edge, the speed staying above.
 template <bool damping, bool layer, class machine>
-inline mask prove_pieces(const machine &m, int pieces, vec bound, const lane_group &g) {
+LANE_DEVICE inline mask prove_pieces(const machine &m, int pieces, vec bound, const lane_group &g) {
   vec h = (1.0 / pieces) * (layer ? g.reach - g.skip : g.span), d = g.direction;
   double level = 0;
   if constexpr (layer)
@@ -177,7 +178,7 @@ inline mask prove_pieces(const machine &m, int pieces, vec bound, const lane_gro
 
 // Of flights `asked` out of a barrier that may not pull: does it push on the whole way? The others are let
 // pass.
-inline mask prove_pushing(const lane_modes &f, mask asked, vec bound, const lane_group &g) {
+LANE_DEVICE inline mask prove_pushing(const lane_modes &f, mask asked, vec bound, const lane_group &g) {
   mask proven = ~asked;
   vec d = g.direction, sixth = f.sixth_periodic + f.sixth_free * free_size(g) + f.lead * bound;
   for (int pieces = 1; pieces <= most_pieces && any(~proven); pieces *= 2) {
@@ -202,7 +203,7 @@ inline mask prove_pushing(const lane_modes &f, mask asked, vec bound, const lane
 
 // Of the flights `found` just now: which are proven to have no event on the way?
 template <bool damping, bool layer, class machine>
-inline mask prove(const machine &m, mask found, const lane_group &g) {
+LANE_DEVICE inline mask prove(const machine &m, mask found, const lane_group &g) {
   vec bound = derivative_bound(m, g);
   mask proven = prove_pieces<damping, layer>(m, 1, bound, g);
   for (int pieces = 2; pieces <= most_pieces && any(found & ~proven); pieces *= 2)
@@ -215,7 +216,8 @@ inline mask prove(const machine &m, mask found, const lane_group &g) {
 // The events of the lanes `due`: Newton's impact or the reversal of friction, and the flight that follows.
 // Returns those that the scalar code must look at: sticking, chatter, a body that has left the domain.
 template <bool damping, bool layer>
-inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrier, lane_group &g) {
+LANE_DEVICE inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrier,
+                                    lane_group &g) {
   mask hit = g.hits > 0.5;
   vec w = g.direction * g.end_v, gap = g.direction * (barrier - g.end_x);
   vec push = -g.direction * g.end_a - m.kinetic;
@@ -223,7 +225,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
   if (m.restitution_law != constant_restitution && any(due & hit))
     restitution = restitution_at(m, w);
   mask plain = pick(hit, restitution * w > m.slow, push > m.break_away) & (magnitude(g.end_x) < m.domain);
-  turning turn;
+  turning turn = {};
   bool turns = layer && any(due & ~hit);
   if (turns) {
     turn = turn_in_layer(m, due & ~hit, g);
@@ -280,7 +282,7 @@ inline mask take_events(const lane_machine &m, mask due, mask upward, vec barrie
 // Finds what the flights of `seek` end with, and proves that it is the first. Returns the lanes where that
 // failed.
 template <bool damping, bool layer, class machine>
-inline mask look_ahead(const machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
+LANE_DEVICE inline mask look_ahead(const machine &m, mask seek, mask upward, vec barrier, lane_group &g) {
   mask left = {};
   for (int attempt = 0; attempt < (layer ? 2 : 1) && any(seek); attempt++) {
     if (attempt > 0) {
@@ -300,14 +302,16 @@ inline mask look_ahead(const machine &m, mask seek, mask upward, vec barrier, la
 
 // Flies the lanes of one vector until one has stopped or is left to the scalar code. They pass the sections
 // together, so that those set off together, whose first flights take longer to find, stay together.
-template <bool damping> void fly(const lane_machine &m, int first, lane_batch &batch) {
+template <bool damping>
+LANE_DEVICE void fly(const lane_machine &m, const lane_regions &regions, int first, lane_batch &batch) {
   lane_group g;
   load<false>(batch, first, g);
   begin_flight<damping, false>(m, g);
   mask flying = g.status == lane_flying, sent = flying;
-  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+  int rounds = 0;
+  while (any(sent) && !any(sent & (g.status != lane_flying)) && !is_due_back(rounds)) {
     flying = sent;
-    while (any(flying)) {
+    while (any(flying) && !is_due_back(rounds)) {
       mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
       vec barrier = pick(upward, m.upper, m.lower);
       if (any(seek))
@@ -319,20 +323,22 @@ template <bool damping> void fly(const lane_machine &m, int first, lane_batch &b
       put(g.status, left, lane_left);
       flying = flying & ~left;
     }
-    take_stops<damping>(m, g.status == lane_flying, batch, g);
+    take_stops<damping>(m, (g.status == lane_flying) & ~flying, regions, g);
   }
   store<false>(g, first, batch);
 }
 
 // The same with a Stribeck layer. Turnings are dear here, so no lane waits for another at a section, but one
 // that has come to a turning waits until all have. Before that the impacts are taken, and then the stops.
-void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
+LANE_DEVICE void fly_through_layers(const lane_machine &m, const lane_regions &regions, int first,
+                                    lane_batch &batch) {
   lane_group g;
   load<true>(batch, first, g);
   mask sent = (g.status == lane_fresh) | (g.status == lane_flying);
   begin_flight<false, true>(m, g);
   mask flying = g.status == lane_flying;
-  while (any(flying) && !any(sent & ~flying)) {
+  int rounds = 0;
+  while (any(flying) && !any(sent & ~flying) && !is_due_back(rounds)) {
     mask upward = g.direction > 0.0, seek = flying & (g.found < 0.5), left = {};
     vec barrier = pick(upward, m.upper, m.lower);
     if (any(seek))
@@ -343,7 +349,7 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
     if (!any(due) && any(stops)) {
       mask within = stops & ((g.until < g.start + g.skip) | (g.until > g.start + g.reach));
       left = left | within;
-      take_stops<false>(m, stops & ~within, batch, g);
+      take_stops<false>(m, stops & ~within, regions, g);
     } else if (!any(due))
       due = flying;
     if (any(due))
@@ -356,7 +362,8 @@ void fly_through_layers(const lane_machine &m, int first, lane_batch &batch) {
 
 // The same where the equation changes with the mode: a flight begins anew after every event. Contacts without
 // a closed form are expanded in series.
-void fly_through_modes(const lane_machine &m, int first, lane_batch &batch) {
+LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &regions, int first,
+                                   lane_batch &batch) {
   const bool in_series = m.contact.stiffness > 0;
   lane_group g;
   lane_modes f(m);
@@ -365,15 +372,16 @@ void fly_through_modes(const lane_machine &m, int first, lane_batch &batch) {
   begin_flight<true, false>(f, g);
   mask flying = g.status == lane_flying, sent = flying;
   vec limit = 1e300;
-  while (any(sent) && !any(sent & (g.status != lane_flying))) {
+  int rounds = 0;
+  while (any(sent) && !any(sent & (g.status != lane_flying)) && !is_due_back(rounds)) {
     mask passed = {};
     flying = sent;
-    while (any(flying)) {
+    while (any(flying) && !is_due_back(rounds)) {
       mask pressed = in_series ? flying & (g.place > 0.5) : mask{}, left = {};
       if (in_series && contacts_first(pressed, flying)) {
         mask there = press_on(m, pressed, limit, left, g);
         if (any(there))
-          stop_or_pass(m.period, m.domain, there, g.x, g.v, batch, g);
+          stop_or_pass(m.period, m.domain, there, g.x, g.v, regions, g);
         passed = passed | there;
         flying = flying & ~left & ~there;
         put(g.status, left, lane_left);
@@ -393,30 +401,68 @@ void fly_through_modes(const lane_machine &m, int first, lane_batch &batch) {
       f.enter(g.status == lane_fresh, g);
       begin_flight<true, false>(f, g);
     }
-    take_stops<true>(f, (g.status == lane_flying) & ~passed, batch, g);
+    take_stops<true>(f, (g.status == lane_flying) & ~passed & ~flying, regions, g);
   }
   store<true>(g, first, batch);
 }
 
-void fly_group(const lane_machine &m, int first, lane_batch &batch) {
+// How the bodies of a machine fly.
+enum flight { plain, damped, layered, modal, in_series };
+
+LANE_DEVICE inline flight flight_of(const lane_machine &m) {
   if (m.law.series > 0)
-    fly_in_series(m, first, batch);
-  else if (m.several_modes > 0)
-    fly_through_modes(m, first, batch);
-  else if (m.layer.excess > 0)
-    fly_through_layers(m, first, batch);
-  else if (m.decay > 0)
-    fly<true>(m, first, batch);
-  else
-    fly<false>(m, first, batch);
+    return in_series;
+  if (m.several_modes > 0)
+    return modal;
+  if (m.layer.excess > 0)
+    return layered;
+  return m.decay > 0 ? damped : plain;
 }
+
+template <flight kind>
+LANE_DEVICE inline void fly_group(const lane_machine &m, const lane_regions &regions, int first,
+                                  lane_batch &batch) {
+  if constexpr (kind == in_series)
+    fly_in_series(m, regions, first, batch);
+  else if constexpr (kind == modal)
+    fly_through_modes(m, regions, first, batch);
+  else if constexpr (kind == layered)
+    fly_through_layers(m, regions, first, batch);
+  else
+    fly<kind == damped>(m, regions, first, batch);
+}
+
+template <flight kind>
+inline void fly_batch(const lane_machine &m, const lane_regions &regions, lane_batch &batch) {
+  for (int first = 0; first < lanes; first += vec_size)
+    fly_group<kind>(m, regions, first, batch);
+}
+
+// Calls FUNCTION<kind of the machine's flights> with what follows.
+#define LANE_FOR_FLIGHT(machine, FUNCTION, ...)                                                              \
+  switch (flight_of(machine)) {                                                                              \
+  case plain:                                                                                                \
+    FUNCTION<plain>(__VA_ARGS__);                                                                            \
+    break;                                                                                                   \
+  case damped:                                                                                               \
+    FUNCTION<damped>(__VA_ARGS__);                                                                           \
+    break;                                                                                                   \
+  case layered:                                                                                              \
+    FUNCTION<layered>(__VA_ARGS__);                                                                          \
+    break;                                                                                                   \
+  case modal:                                                                                                \
+    FUNCTION<modal>(__VA_ARGS__);                                                                            \
+    break;                                                                                                   \
+  case in_series:                                                                                            \
+    FUNCTION<in_series>(__VA_ARGS__);                                                                        \
+    break;                                                                                                   \
+  }
 
 } // namespace
 
 #define SEPARATRIX_LANE_KERNEL(name)                                                                         \
-  extern "C" void name(const lane_machine *m, lane_batch *batch) {                                           \
-    for (int first = 0; first < lanes; first += vec_size)                                                    \
-      fly_group(*m, first, *batch);                                                                          \
+  extern "C" void name(const lane_machine *m, const lane_regions *regions, lane_batch *batch) {              \
+    LANE_FOR_FLIGHT(*m, fly_batch, *m, *regions, *batch)                                                     \
   }
 
 #endif

@@ -24,7 +24,7 @@ struct course {
   vec acceleration[5], time[4];
 };
 
-inline course course_of(vec rate, vec curl, vec snap, vec crackle, vec pop) {
+LANE_DEVICE inline course course_of(vec rate, vec curl, vec snap, vec crackle, vec pop) {
   course c = {rate, curl, snap, crackle, pop, {}, {}};
   vec unit = 1.0 / rate, g1 = curl * unit, g2 = snap * unit, g3 = crackle * unit, g4 = pop * unit;
   vec square = g1 * g1, power = unit;
@@ -43,17 +43,17 @@ inline course course_of(vec rate, vec curl, vec snap, vec crackle, vec pop) {
   return c;
 }
 
-inline vec acceleration_at(const course &c, vec speed) {
+LANE_DEVICE inline vec acceleration_at(const course &c, vec speed) {
   const vec *k = c.acceleration;
   return k[0] + speed * (k[1] + speed * (k[2] + speed * (k[3] + speed * k[4])));
 }
 
-inline vec time_at(const course &c, vec speed) {
+LANE_DEVICE inline vec time_at(const course &c, vec speed) {
   return speed * (c.time[0] + speed * (c.time[1] + speed * (c.time[2] + speed * c.time[3])));
 }
 
 // Speed, acceleration and its rate at a time.
-inline void follow(const course &c, vec t, vec &speed, vec &rate, vec &curl) {
+LANE_DEVICE inline void follow(const course &c, vec t, vec &speed, vec &rate, vec &curl) {
   vec half = 0.5 * t, third = (1.0 / 3) * t, fourth = 0.25 * t, fifth = 0.2 * t;
   speed = t * (c.rate + half * (c.curl + third * (c.snap + fourth * (c.crackle + fifth * c.pop))));
   rate = c.rate + t * (c.curl + half * (c.snap + third * (c.crackle + fourth * c.pop)));
@@ -72,7 +72,8 @@ struct nodes {
 };
 
 // From what is known of 1/D: P, and with it a better 1/D for the lanes `seek`. Returns the largest change.
-template <bool outward> inline vec improve(const lane_machine &m, const course &c, mask seek, nodes &n) {
+template <bool outward>
+LANE_DEVICE inline vec improve(const lane_machine &m, const course &c, mask seek, nodes &n) {
   const lane_layer &l = m.layer;
   const double (&table)[layer_nodes][layer_nodes] = outward ? l.from_rest : l.from_edge;
   vec lost[layer_nodes] = {}, moment[layer_nodes] = {}, total = {}, change = {};
@@ -100,7 +101,8 @@ template <bool outward> inline vec improve(const lane_machine &m, const course &
 
 // The passage of a body whose Coulomb course is c. Inward the time runs backwards, from rest to the edge.
 // `bound` is that of the seventh derivative of the position.
-template <bool outward> passage pass_layer(const lane_machine &m, const course &c, mask due, vec bound) {
+template <bool outward>
+LANE_DEVICE passage pass_layer(const lane_machine &m, const course &c, mask due, vec bound) {
   const lane_layer &l = m.layer;
   const double *first = outward ? l.first_from_rest : l.first_from_edge;
   const double *second = outward ? l.second_from_rest : l.second_from_edge;
@@ -142,7 +144,7 @@ template <bool outward> passage pass_layer(const lane_machine &m, const course &
 
 // Where the flights of a machine with a layer are Coulomb's to the end: up to the edge of the layer, or to
 // the barrier. Returns the lanes where the edge was not found.
-inline mask find_edge(const lane_machine &m, mask found, lane_group &g) {
+LANE_DEVICE inline mask find_edge(const lane_machine &m, mask found, lane_group &g) {
   vec d = g.direction, speed, rate, curl;
   course c = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, vec{}, vec{});
   vec t = time_at(c, m.layer.edge);
@@ -166,7 +168,7 @@ struct turning {
   mask sound;
 };
 
-inline turning turn_in_layer(const lane_machine &m, mask due, const lane_group &g) {
+LANE_DEVICE inline turning turn_in_layer(const lane_machine &m, mask due, const lane_group &g) {
   const double stiffness = m.natural * m.natural;
   vec end_s, end_c, end_p;
   end_derivatives(m, g, end_s, end_c, end_p);

@@ -22,12 +22,12 @@ struct lane_modes {
   vec bound_periodic, bound_free, sixth_periodic, sixth_free;
   vec cosine[most_harmonics], sine[most_harmonics];
 
-  explicit lane_modes(const lane_machine &m)
+  LANE_DEVICE explicit lane_modes(const lane_machine &m)
       : machine(m), drive_frequency(m.drive_frequency), period(m.period), domain(m.domain),
         harmonics(m.harmonics) {}
 
   // Takes over the coefficients of the modes that the lanes `changed` have come to.
-  void enter(mask changed, const lane_group &g) {
+  LANE_DEVICE void enter(mask changed, const lane_group &g) {
     for (int k = 0; k < lane_modes_count; k++) {
       const lane_mode &t = machine.mode[k];
       const double heading = k % 2 == 0 ? 1 : -1;
@@ -60,7 +60,7 @@ struct lane_modes {
 // Once the force of a barrier that may not pull has fallen to zero, does it stay so until the body is out?
 // It does while the speed w outwards is far more than the barrier's time constant `lead` times what the
 // acceleration can be until then.
-inline mask leaves_for_good(const lane_modes &f, const lane_group &g, vec w) {
+LANE_DEVICE inline mask leaves_for_good(const lane_modes &f, const lane_group &g, vec w) {
   const lane_machine &m = f.machine;
   const double stiffness = m.natural * m.natural;
   vec a = magnitude(g.end_a);
@@ -70,7 +70,7 @@ inline mask leaves_for_good(const lane_modes &f, const lane_group &g, vec w) {
 
 // The events of the lanes `due`: impact, reversal of friction, or a change between free and pressed. Returns
 // those that the scalar code must look at; the others are `lane_fresh` in the mode that follows.
-inline mask take_mode_events(const lane_modes &f, mask due, lane_group &g) {
+LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_group &g) {
   const lane_machine &m = f.machine;
   mask hit = g.hits > 0.5, impact = hit & (f.leads_to < 0.0), passage = hit & (f.leads_to >= 0.0);
   mask free = g.place < 0.5;

@@ -6,8 +6,8 @@
 #ifndef SEPARATRIX_LANE_MOTION_HPP
 #define SEPARATRIX_LANE_MOTION_HPP
 
+#include "lane_elementary.hpp"
 #include "lane_types.hpp"
-#include "lane_vectors.hpp"
 
 #include <cstddef>
 
@@ -20,12 +20,14 @@ enum {
   plain_members = offsetof(lane_fields<double[lanes]>, place) / sizeof(double[lanes])
 };
 
-template <bool all> inline void load(const lane_batch &batch, int first, lane_group &g) {
+template <bool all> LANE_DEVICE inline void load(const lane_batch &batch, int first, lane_group &g) {
+  LANE_UNROLL
   for (int i = 0; i < (all ? members : plain_members); i++)
     memcpy((vec *)&g + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
 }
 
-template <bool all> inline void store(const lane_group &g, int first, lane_batch &batch) {
+template <bool all> LANE_DEVICE inline void store(const lane_group &g, int first, lane_batch &batch) {
+  LANE_UNROLL
   for (int i = 0; i < (all ? members : plain_members); i++)
     memcpy((double *)&batch.fields + i * lanes + first, (const vec *)&g + i, sizeof(vec));
 }
@@ -36,7 +38,7 @@ struct kinematics {
 };
 
 template <bool damping, class machine>
-inline kinematics evaluate(const machine &m, const lane_group &g, vec elapsed) {
+LANE_DEVICE inline kinematics evaluate(const machine &m, const lane_group &g, vec elapsed) {
   LANE_COUNT(evaluations, vec_size);
   kinematics k;
   vec turn_s, turn_c, sine, cosine;
@@ -77,7 +79,7 @@ inline kinematics evaluate(const machine &m, const lane_group &g, vec elapsed) {
 
 // exp(lambda step) (re + i im) for a step short enough for so many terms.
 template <bool damping, int terms, class machine>
-inline void turn_on(const machine &m, vec step, vec &re, vec &im) {
+LANE_DEVICE inline void turn_on(const machine &m, vec step, vec &re, vec &im) {
   vec a = re, b = im;
   for (int n = terms; n >= 1; n--) {
     vec part = (1.0 / n) * step;
@@ -90,18 +92,19 @@ inline void turn_on(const machine &m, vec step, vec &re, vec &im) {
 }
 
 // At least |Z|, at most 8 % more.
-inline vec free_size(const lane_group &g) {
+LANE_DEVICE inline vec free_size(const lane_group &g) {
   vec re = magnitude(g.z_re), im = magnitude(g.z_im);
   return re + im - 0.5857864376269049 * pick(re < im, re, im);
 }
 
 // Bound on the seventh derivative of the position.
-template <class machine> inline vec derivative_bound(const machine &m, const lane_group &g) {
+template <class machine> LANE_DEVICE inline vec derivative_bound(const machine &m, const lane_group &g) {
   return m.bound_periodic + m.bound_free * free_size(g);
 }
 
 // Derivatives 4 to 6 of the position at the end of the flight, without damping.
-inline void end_derivatives(const lane_machine &m, const lane_group &g, vec &snap, vec &crackle, vec &pop) {
+LANE_DEVICE inline void end_derivatives(const lane_machine &m, const lane_group &g, vec &snap, vec &crackle,
+                                        vec &pop) {
   vec sine, cosine;
   sine_cosine((g.start + g.span) * m.drive_frequency, sine, cosine);
   const double stiffness = m.natural * m.natural, fourth = stiffness * stiffness;

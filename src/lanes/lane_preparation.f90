@@ -15,6 +15,7 @@ module lane_preparation
   use motion_state, only: flight_adaptive
   use oscillator, only: oscillator_t
   use rest, only: chatter_speed
+  use structure_preparation, only: prepare_structure_lanes
   implicit none
   private
 
@@ -38,20 +39,23 @@ module lane_preparation
 
 contains
 
-  !> Lanes for one body, if its options ask for lanes: in closed form where its equation is linear in every mode of slip, or
-  !> has a thin Stribeck layer, without a harmonic at resonance; else in series where all forces have one.
+  !> Lanes for a jointed structure or one body, if its options ask for lanes. One body: in closed form where its equation is linear
+  !> in every mode of slip, or has a thin Stribeck layer, without a harmonic at resonance; else in series where all forces have one.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
-    if (flow%width <= 0 .or. .not. is_one_body(moving)) return
+    if (flow%width <= 0) return
+    if (allocated(moving%jointed)) call prepare_structure_lanes(moving%jointed, flow)
+    if (.not. is_one_body(moving)) return
+    flow%gpu = moving%options%gpu
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)
     else
       call prepare_modes(moving, flow)
     end if
     if (flow%available .or. moving%exact .and. .not. moving%layer > 0) return
-    flow = lane_flow_t(width=flow%width)
+    flow = lane_flow_t(width=flow%width, gpu=flow%gpu)
     call prepare_series(moving, flow)
   end subroutine prepare_lanes
 

@@ -5,13 +5,13 @@
 #ifndef SEPARATRIX_LANE_RESTITUTION_HPP
 #define SEPARATRIX_LANE_RESTITUTION_HPP
 
+#include "lane_elementary.hpp"
 #include "lane_types.hpp"
-#include "lane_vectors.hpp"
 
 namespace {
 
 // Value of a curve; as `value_at` of `curve_law.f90`.
-inline vec curve_at(const lane_curve &c, vec x) {
+LANE_DEVICE inline vec curve_at(const lane_curve &c, vec x) {
   const int last = int(c.count) - 1;
   vec from = c.at[0], width = c.at[1] - c.at[0], left = c.value[0], right = c.value[1], start = c.slope[0],
       end = c.slope[1];
@@ -33,7 +33,7 @@ inline vec curve_at(const lane_curve &c, vec x) {
 }
 
 // Restitution at an impact speed w; as `restitution_at` of `contact_law.f90`.
-inline vec restitution_at(const lane_machine &m, vec w) {
+LANE_DEVICE inline vec restitution_at(const lane_machine &m, vec w) {
   vec k = m.restitution;
   if (m.restitution_law == linear_restitution) {
     k = m.restitution - m.coefficients[0] * w;

@@ -59,7 +59,7 @@ LANE_LEAF vec chain(const vec *a, const vec *b, int k) {
 }
 
 // The motion of the foot of the spring, so many coefficients.
-inline void expand_foot(const lane_machine &m, vec time, int terms, vec *foot) {
+LANE_DEVICE inline void expand_foot(const lane_machine &m, vec time, int terms, vec *foot) {
   vec sine, cosine;
   sine_cosine(time * m.drive_frequency, sine, cosine);
   for (int k = 0; k < terms; k++)
@@ -86,7 +86,8 @@ struct excess_series {
   vec u[order], square[order], value[order];
 };
 
-inline vec next_excess(const lane_law &l, int i, mask within, vec d, const vec *v, int k, excess_series &e) {
+LANE_DEVICE inline vec next_excess(const lane_law &l, int i, mask within, vec d, const vec *v, int k,
+                                   excess_series &e) {
   e.u[k] = (1 / l.velocity[i]) * d * v[k];
   const bool squared = l.exponent[i] > 1.5;
   e.square[k] = squared ? square_of(e.u, k) : e.u[k];
@@ -151,7 +152,7 @@ struct force_series {
 };
 
 // Expands the motion of every lane from where it is, in time.
-inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
+LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
   LANE_COUNT(evaluations, vec_size);
   vec foot[order];
   force_series forces;
@@ -166,7 +167,7 @@ inline void expand(const lane_machine &m, const lane_group &g, mask within, expa
 }
 
 // Length of a step over which the terms shrink so. The last few are asked, as one may happen to be small.
-inline vec step_length(const lane_machine &m, const expansion &p) {
+LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
   const double smallest = 1e-290;
   vec least = 1e300;
   for (int k = order - 3; k <= order; k++) {
@@ -180,7 +181,7 @@ inline vec step_length(const lane_machine &m, const expansion &p) {
 // series grow up to order 2 (v/v_s)^2 before they shrink, so that the last one says little. For |x| <= 0.5
 // what is left out of exp(-(u + x)^2) is below exp(r^2) (0.5/r)^18 = 1e-10 (Cauchy, r = 2.5); above u = 6.2
 // it is nil.
-inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
+LANE_DEVICE inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
   vec room = 1e300;
   for (int i = 0; i < 2; i++) {
     if (!(l.excess[i] > 0) || l.exponent[i] < 1.5)
@@ -193,7 +194,7 @@ inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
 }
 
 // Does the speed keep within that over the step?
-inline mask keeps_within(const vec (&c)[order], vec end, vec room) {
+LANE_DEVICE inline mask keeps_within(const vec (&c)[order], vec end, vec room) {
   vec power = end, sum = {};
   for (int k = 1; k < order; k++) {
     sum += magnitude(c[k]) * power;
@@ -203,7 +204,8 @@ inline mask keeps_within(const vec (&c)[order], vec end, vec room) {
 }
 
 // A polynomial over a step, in the fraction of the step, with its derivatives.
-template <int degree> inline void value_at(const vec (&c)[degree + 1], vec s, vec &f, vec &f1, vec &f2) {
+template <int degree>
+LANE_DEVICE inline void value_at(const vec (&c)[degree + 1], vec s, vec &f, vec &f1, vec &f2) {
   f = c[degree];
   f1 = {};
   f2 = {};
@@ -217,7 +219,8 @@ template <int degree> inline void value_at(const vec (&c)[degree + 1], vec s, ve
 
 // Where the polynomials of `seek` that are positive at 0 and not at `high` fall to zero, by Halley's steps
 // within brackets. Returns the lanes that were not found.
-template <int degree> inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, vec &root) {
+template <int degree>
+LANE_DEVICE inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, vec &root) {
   vec low = {}, s = high;
   for (int round = 0; round < most_root_rounds && any(seek); round++) {
     vec f, f1, f2;
@@ -239,7 +242,7 @@ template <int degree> inline mask fall(const vec (&c)[degree + 1], mask seek, ve
 // Is a polynomial positive between 0 and `end`, where it may vanish? Its chord less the bound t (end - t)/2
 // times its second derivative is, if the value at one end exceeds half of that derivative; else its Bernstein
 // coefficients are asked.
-inline mask positive_until(const vec (&c)[order], mask asked, vec end) {
+LANE_DEVICE inline mask positive_until(const vec (&c)[order], mask asked, vec end) {
   enum { degree = order - 1 };
   vec b[order], power = end, curvature = {}, last = c[0];
   b[0] = c[0];
@@ -275,8 +278,9 @@ struct stride_of_lanes {
 };
 
 // Looks for the first event of the lanes `flying` within a step of `length`.
-inline stride_of_lanes look_for_events(const lane_machine &m, const expansion &p, mask flying, mask within,
-                                       vec barrier, vec length, const lane_group &g) {
+LANE_DEVICE inline stride_of_lanes look_for_events(const lane_machine &m, const expansion &p, mask flying,
+                                                   mask within, vec barrier, vec length,
+                                                   const lane_group &g) {
   stride_of_lanes t;
   vec d = g.direction, power = 1.0, gap[order + 1];
   t.length = length;
@@ -318,8 +322,8 @@ inline stride_of_lanes look_for_events(const lane_machine &m, const expansion &p
 }
 
 // What follows the steps `due`. Returns the lanes that the scalar code must look at.
-inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, mask due, vec barrier,
-                               lane_group &g) {
+LANE_DEVICE inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, mask due,
+                                           vec barrier, lane_group &g) {
   const bool soft = m.contact.stiffness > 0;
   vec x, scaled_v, scaled_a;
   value_at<order>(t.x, t.end, x, scaled_v, scaled_a);

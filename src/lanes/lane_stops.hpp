@@ -9,11 +9,17 @@
 
 namespace {
 
+// A GPU's thread comes back after so many rounds and is sent on, as no launch may last for long. Longer than
+// a step is halved.
+enum { most_rounds_away = 256 };
+
+LANE_LEAF bool is_due_back(int &rounds) { return vec_size == 1 && ++rounds > most_rounds_away; }
+
 // The attractors that have captured points on the section, 0 = none; as `find_capture` of `attractors.f90`.
-inline vec captors(const lane_batch &batch, vec x, vec v) {
+LANE_DEVICE inline vec captors(const lane_regions &regions, vec x, vec v) {
   vec captor = {};
-  for (int i = batch.regions - 1; i >= 0; i--) {
-    const lane_region &r = batch.region[i];
+  for (int i = regions.count - 1; i >= 0; i--) {
+    const lane_region &r = regions.region[i];
     vec dx = (x - r.x) * r.stretch_x, dv = (v - r.v) * r.stretch_v;
     vec square = r.metric_xx * dx * dx + 2 * r.metric_xv * dv * dx + r.metric_vv * dv * dv;
     put(captor, square <= r.reach, r.attractor);
@@ -23,13 +29,13 @@ inline vec captors(const lane_batch &batch, vec x, vec v) {
 
 // Lanes `there`, where they are to stop, at x and v. At the end of a period the clock starts anew, and those
 // that need not stop pass.
-inline void stop_or_pass(double period, double domain, mask there, vec x, vec v, const lane_batch &batch,
-                         lane_group &g) {
+LANE_DEVICE inline void stop_or_pass(double period, double domain, mask there, vec x, vec v,
+                                     const lane_regions &regions, lane_group &g) {
   mask section = there & (g.until >= period);
-  vec captor = captors(batch, x, v);
+  vec captor = captors(regions, x, v);
   mask passing =
       section & (g.sections > 0.5) & (magnitude(x) <= domain) & ((captor < 0.5) | (g.leaves < 0.5));
-  passing = batch.complete ? passing : mask{};
+  passing = regions.complete ? passing : mask{};
   put(g.flights, there, g.flights + 1.0);
   put(g.x, there, x);
   put(g.v, there, v);
@@ -44,13 +50,13 @@ inline void stop_or_pass(double period, double domain, mask there, vec x, vec v,
 
 // The same for flights in closed form.
 template <bool damping, class machine>
-inline void take_stops(const machine &m, mask there, const lane_batch &batch, lane_group &g) {
+LANE_DEVICE inline void take_stops(const machine &m, mask there, const lane_regions &regions, lane_group &g) {
   if (!any(there))
     return;
   kinematics k = evaluate<damping>(m, g, g.until - g.start);
   if constexpr (machine::modal)
     k.x += m.origin;
-  stop_or_pass(m.period, m.domain, there, k.x, k.v, batch, g);
+  stop_or_pass(m.period, m.domain, there, k.x, k.v, regions, g);
 }
 
 } // namespace

@@ -6,11 +6,13 @@
 module lane_types
   use curve_law, only: most_knots
   use kinds, only: wp
+  use structure_types, only: structure_machine_t
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_size_t, c_sizeof
   implicit none
   private
 
-  public :: widest_lanes, lane_sizes, separatrix_fly_lanes, machine_t, mode_t, contact_series_t, restitution_curve_t, region_t
+  public :: widest_lanes, lane_sizes, separatrix_fly_lanes, machine_t, mode_t, contact_series_t, restitution_curve_t, region_t, &
+    regions_t
 
   integer, parameter, public :: lane_count = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64
 
@@ -75,6 +77,12 @@ module lane_types
       reach = 0
   end type region_t
 
+  !> Mirrors `lane_regions` of lane_types.hpp.
+  type, bind(c) :: regions_t
+    integer(c_int) :: count = 0, complete = 1
+    type(region_t) :: region(most_regions)
+  end type regions_t
+
   !> Mirrors `lane_batch` of lane_types.hpp.
   type, bind(c), public :: lane_batch_t
     real(c_double), dimension(lane_count) :: status = lane_idle, until = 0, time = 0, x = 0, v = 0, start = 0, &
@@ -83,8 +91,6 @@ module lane_types
       flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
       budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, touch = 0, z = 0, skip = 0, &
       reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
-    integer(c_int) :: regions = 0, complete = 1
-    type(region_t) :: region(most_regions)
   end type lane_batch_t
 
   !> A machine ready to fly in lanes.
@@ -93,11 +99,15 @@ module lane_types
     logical :: available = .false.
     !> Doubles per vector.
     integer :: width = 2
+    !> The GPU that flies them, -1: none, vectors do.
+    integer :: gpu = -1
     type(machine_t) :: machine
     !> A body must be so fast [m/s] to be put into a lane: out of its Stribeck layer.
     real(wp) :: slowest = 0
     !> With a Stribeck layer.
     logical :: layered = .false.
+    !> A jointed structure.
+    type(structure_machine_t), allocatable :: structure
   end type lane_flow_t
 
   interface
@@ -106,16 +116,17 @@ module lane_types
       integer(c_int) :: width
     end function separatrix_lane_width
 
-    !> Bytes of lane_machine and lane_batch as C++ has them.
-    pure subroutine separatrix_lane_sizes(machine, batch) bind(c)
+    !> Bytes of lane_machine, lane_regions and lane_batch as C++ has them.
+    pure subroutine separatrix_lane_sizes(machine, regions, batch) bind(c)
       import :: c_size_t
-      integer(c_size_t), intent(out) :: machine, batch
+      integer(c_size_t), intent(out) :: machine, regions, batch
     end subroutine separatrix_lane_sizes
 
-    pure subroutine separatrix_fly_lanes(width, machine, batch) bind(c)
-      import :: c_int, lane_batch_t, machine_t
+    pure subroutine separatrix_fly_lanes(width, machine, regions, batch) bind(c)
+      import :: c_int, lane_batch_t, machine_t, regions_t
       integer(c_int), value :: width
       type(machine_t), intent(in) :: machine
+      type(regions_t), intent(in) :: regions
       type(lane_batch_t), intent(inout) :: batch
     end subroutine separatrix_fly_lanes
   end interface
@@ -129,11 +140,12 @@ contains
 
   !> Whether both sides of the boundary to C++ agree on the sizes of what they share.
   logical function lane_sizes()
-    integer(c_size_t) :: machine, batch
-    type(machine_t) :: here
-    type(lane_batch_t) :: there
-    call separatrix_lane_sizes(machine, batch)
-    lane_sizes = machine == c_sizeof(here) .and. batch == c_sizeof(there)
+    integer(c_size_t) :: machine, regions, batch
+    type(machine_t) :: one_machine
+    type(regions_t) :: one_table
+    type(lane_batch_t) :: one_batch
+    call separatrix_lane_sizes(machine, regions, batch)
+    lane_sizes = machine == c_sizeof(one_machine) .and. regions == c_sizeof(one_table) .and. batch == c_sizeof(one_batch)
   end function lane_sizes
 
 end module lane_types

@@ -5,6 +5,8 @@
 #ifndef SEPARATRIX_LANE_TYPES_HPP
 #define SEPARATRIX_LANE_TYPES_HPP
 
+#include <cstdint>
+
 enum {
   lanes = 16,
   most_harmonics = 64,
@@ -162,12 +164,28 @@ struct lane_region {
   double attractor, x, v, stretch_x, stretch_v, metric_xx, metric_xv, metric_vv, reach;
 };
 
+// What the lanes can be captured by; a point in several belongs to the first. Unless these are all, every
+// lane stops at every section.
+struct lane_regions {
+  int count, complete;
+  lane_region region[most_regions];
+};
+
 struct lane_batch {
   lane_fields<double[lanes]> fields;
-  // What the lanes can be captured by; a point in several belongs to the first. Unless these are all, every
-  // lane stops at every section.
-  int regions, complete;
-  lane_region region[most_regions];
+};
+
+// Bodies on a GPU, see `lane_gpu.hpp`: by CUDA, or on the host for tests. 0 = all went well, else `message`
+// says what has failed.
+struct lane_gpu {
+  // Devices that can be used; where there are none, `message` may say why.
+  int (*count)(char *message, int size);
+  void (*name)(int device, char *text, int size);
+  // Makes both halves on a device, of at most `wanted` batches each; `batches`: as many as there are.
+  int (*open)(int device, int64_t wanted, lane_batch *halves[2], int64_t *batches, char *message, int size);
+  // Sends the first `batches` of a half to fly; waits until they are back.
+  int (*send)(int half, int64_t batches, const lane_machine *, const lane_regions *, char *message, int size);
+  int (*wait)(int half, char *message, int size);
 };
 
 #endif

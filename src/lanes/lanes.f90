@@ -7,7 +7,7 @@
 module lanes
   use kinds, only: wp
   use lane_types, only: lane_batch_t, lane_flow_t, lane_fresh, lane_left, machine_t, most_regions, region_t, &
-    separatrix_fly_lanes
+    regions_t, separatrix_fly_lanes
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use, intrinsic :: iso_c_binding, only: c_int
   implicit none
@@ -19,17 +19,17 @@ contains
 
   !> The lanes can be captured by attractor number `attractor` near its point [x, v]: where the square of the distance from
   !> that, in scaled coordinates and a metric (xx, xv, vv), is at most `reach`. The first of several takes precedence.
-  pure subroutine add_region(batch, attractor, point, scale, metric, reach)
-    type(lane_batch_t), intent(inout) :: batch
+  pure subroutine add_region(regions, attractor, point, scale, metric, reach)
+    type(regions_t), intent(inout) :: regions
     integer, intent(in) :: attractor
     real(wp), intent(in) :: point(2), scale(2), metric(3), reach
-    if (batch%regions == most_regions) then
-      batch%complete = 0
+    if (regions%count == most_regions) then
+      regions%complete = 0
       return
     end if
-    batch%regions = batch%regions + 1
-    batch%region(batch%regions) = region_t(real(attractor, wp), point(1), point(2), 1/scale(1), 1/scale(2), metric(1), &
-                                           metric(2), metric(3), reach)
+    regions%count = regions%count + 1
+    regions%region(regions%count) = region_t(real(attractor, wp), point(1), point(2), 1/scale(1), 1/scale(2), metric(1), &
+                                             metric(2), metric(3), reach)
   end subroutine add_region
 
   !> Puts a slipping body into a lane, which will fly it to the section. `new`: without memory of flights before.
@@ -107,10 +107,11 @@ contains
   end subroutine take_counts
 
   !> Flies every occupied lane until it has stopped or is left to the event loop.
-  pure subroutine fly_lanes(flow, batch)
+  pure subroutine fly_lanes(flow, regions, batch)
     type(lane_flow_t), intent(in) :: flow
+    type(regions_t), intent(in) :: regions
     type(lane_batch_t), intent(inout) :: batch
-    call separatrix_fly_lanes(int(flow%width, c_int), flow%machine, batch)
+    call separatrix_fly_lanes(int(flow%width, c_int), flow%machine, regions, batch)
   end subroutine fly_lanes
 
 end module lanes

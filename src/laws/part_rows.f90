@@ -17,8 +17,9 @@ module part_rows
     'spring:pendulum']
   character(len=law_length), parameter :: frictions(5) = [character(len=law_length) :: 'friction:coulomb', &
     'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic']
-  character(len=law_length), parameter :: contacts(2) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt']
-  character(len=law_length), parameter :: joints(10) = [springs, frictions, contacts]
+  character(len=law_length), parameter :: contacts(3) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt', &
+    'contact:massless']
+  character(len=law_length), parameter :: joints(11) = [springs, frictions, contacts]
   !> Contacts with the laws of one body, which keep their parameters.
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
@@ -28,7 +29,7 @@ module part_rows
   character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
   character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
 
-  type(law_row_t), parameter, public :: part_laws(31) = [ &
+  type(law_row_t), parameter, public :: part_laws(32) = [ &
     law_row_t('body', 'structure', 'several bodies and structures, with springs, joints and drives between them', &
               'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
     law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
@@ -51,13 +52,15 @@ module part_rows
     law_row_t('part', contacts(1), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
               'Glocker, Set-Valued Force Laws (2001)'), &
     law_row_t('part', contacts(2), 'stops with spring K and damper D', ''), &
+    law_row_t('part', contacts(3), 'rigid stops met by a point without mass: no impacts, the modes left out give way', &
+              'Monjaraz-Tec, Gross, Krack, J. Vib. Acoust. 144 (2022)'), &
     (law_row_t('part', 'contact:'//other_contacts(i)%name, other_contacts(i)%meaning, other_contacts(i)%source), i=1, 12), &
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
     law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', '')]
 
   !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
   !> drive, one place.
-  type(parameter_row_t), parameter, public :: part_parameters(184) = [ &
+  type(parameter_row_t), parameter, public :: part_parameters(189) = [ &
     parameter_row_t('body', 'structure', 'in_sequence', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other'), &
     (parameter_row_t('part', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
@@ -89,9 +92,9 @@ module part_rows
     (parameter_row_t('part', points(i), 'row', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
                      'its displacement for one of each coordinate'), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the first body between'), i=1, 10), &
+                     'number of the first body between'), i=1, 11), &
     (parameter_row_t('part', joints(i), 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the second body between'), i=1, 10), &
+                     'number of the second body between'), i=1, 11), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
                      .false., 'number of the first body between'), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
@@ -132,12 +135,14 @@ module part_rows
                     'K'), &
     parameter_row_t('part', contacts(2), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
                     'D'), &
+    parameter_row_t('part', contacts(3), 'stiffness', 'N/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
+                    'that of the modes which structure.NAME.modes leaves out, if 0'), &
     parameter_row_t('part', contacts(2), 'tension', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
                     '1: the force may pull, 0: it ends where it would'), &
     (parameter_row_t('part', contacts(i), 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &
-                     'largest value of second minus first'), i=1, 2), &
+                     'largest value of second minus first'), i=1, 3), &
     (parameter_row_t('part', contacts(i), 'lower', 'm', none_below, none_above, .false., .true., none_below, .false., &
-                     'smallest value of second minus first'), i=1, 2), &
+                     'smallest value of second minus first'), i=1, 3), &
     (parameter_row_t('part', drives(i), 'body', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
                      'number of the body'), i=1, 2), &
     (parameter_row_t('part', drives(i), 'frequency', 'rad/s', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &

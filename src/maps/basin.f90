@@ -16,7 +16,7 @@ module basin
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
-  use trajectories, only: block_size, describe_all, journey_t, run_trajectories
+  use trajectories, only: block_size, describe_all, journey_t, run_on_device
   use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   implicit none
   private
@@ -167,7 +167,8 @@ contains
       associate (members => pack([(i, i=1, size(slices))], left .and. slices == slices(first)))
         left(members) = .false.
         if (size(catalogues) > 0) then
-          call slice_points(grid, cache%journey, catalogues(slices(first) + 1)%attractors, index, members, values)
+          call slice_points(grid, cache%journey, catalogues(slices(first) + 1)%attractors, index, members, values, error)
+          if (allocated(error)) return
         else
           call lone_points(grid, max_period, cache%journey, index, members, values)
         end if
@@ -176,19 +177,22 @@ contains
   end subroutine basin_points
 
   !> Points of one slice with a catalogue.
-  subroutine slice_points(grid, journey, catalogue, index, members, values)
+  subroutine slice_points(grid, journey, catalogue, index, members, values, error)
     type(grid_t), intent(in) :: grid
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
-    type(outcome_t) :: outcomes(size(members))
-    real(wp) :: starts(3 + size(grid%others), size(members))
+    type(error_t), allocatable, intent(out) :: error
+    type(outcome_t), allocatable :: outcomes(:)
+    real(wp), allocatable :: starts(:, :)
     integer :: i
+    allocate (outcomes(size(members)), starts(3 + size(grid%others), size(members)))
     do i = 1, size(members)
       starts(:, i) = point_start(grid, index(:, members(i)))
     end do
-    call run_trajectories(journey, catalogue, starts, outcomes)
+    call run_on_device(journey, catalogue, starts, outcomes, error)
+    if (allocated(error)) return
     do i = 1, size(members)
       values(members(i), :) = outcome_values(outcomes(i))
     end do

@@ -5,18 +5,19 @@
 !> next start. The outcome of a start does not depend on the others.
 module trajectories
   use attractors, only: attractor_t
+  use errors, only: error_t
+  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_lane, take_from_lane
   use kinds, only: wp
+  use lane_gpu, only: await_half, gpu_half_t, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
-  use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
   use motion, only: motion_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus
   use status, only: reason_left_domain
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_turn, go_to_stop, outcome_t, pass_stop, &
     phase_over, phase_window, run_trajectory, sections_ahead, span_t
   implicit none
   private
 
-  public :: run_trajectories, block_size
+  public :: run_trajectories, run_on_device, block_size
 
   !> What is asked of the statistics window of a motion that is not captured.
   integer, parameter, public :: describe_regime = 1, describe_all = 2
@@ -30,6 +31,9 @@ module trajectories
     integer :: describe = describe_all
   end type journey_t
 
+  !> Starts that a GPU is given at a time, where a tile has so many: its pool is refilled many times.
+  integer, parameter :: gpu_block = 2**22
+
   !> The trajectory in a lane: number of its start (0 = none), and whether the extremes of its window went unseen.
   type :: passenger_t
     integer :: start = 0
@@ -39,15 +43,30 @@ module trajectories
 
 contains
 
-  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_strobe` takes; one column each).
+  !> `run_trajectories` on the GPU of the journey, if it has one. Code 75 if that fails; then there are no outcomes.
+  subroutine run_on_device(journey, catalogue, starts, outcomes, error)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    type(outcome_t), intent(out) :: outcomes(:)
+    type(error_t), allocatable, intent(out) :: error
+    if (journey%flow%available .and. journey%flow%gpu >= 0) then
+      call run_on_gpu(journey, catalogue, starts, outcomes, error)
+    else
+      call run_trajectories(journey, catalogue, starts, outcomes)
+    end if
+  end subroutine run_on_device
+
+  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_strobe` takes; one column each), by this
+  !> processor.
   pure subroutine run_trajectories(journey, catalogue, starts, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(out) :: outcomes(:)
     type(passenger_t) :: passengers(lane_count)
-    type(lane_batch_t) :: batch
-    integer :: lane, i, next
+    type(fleet_t) :: lanes
+    integer :: i, next
     if (.not. journey%flow%available) then
       do i = 1, size(starts, 2)
         call run_trajectory(journey%moving, catalogue, journey%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i), &
@@ -55,38 +74,113 @@ contains
       end do
       return
     end if
-    call set_regions(catalogue, batch)
+    call open_fleet(journey%moving, lanes)
+    call set_regions(journey%moving, catalogue, lanes)
     next = 1
-    do lane = 1, lane_count
-      call board(journey, catalogue, starts, lane, next, passengers(lane), batch, outcomes)
-    end do
+    call board_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
     do while (any(passengers%start > 0))
-      call fly_lanes(journey%flow, batch)
-      do lane = 1, lane_count
-        if (passengers(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
-        call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, &
-                    outcomes(passengers(lane)%start))
-        if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, &
-                                                                    passengers(lane), batch, outcomes)
-      end do
+      call fly_fleet(journey%flow, lanes)
+      call attend_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
     end do
   end subroutine run_trajectories
+
+  !> A GPU's lanes: while one half of them flies, the other is attended to.
+  subroutine run_on_gpu(journey, catalogue, starts, outcomes, error)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    type(outcome_t), intent(inout) :: outcomes(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(passenger_t), allocatable :: passengers(:, :, :)
+    type(gpu_half_t) :: halves(2)
+    type(fleet_t) :: lanes
+    integer :: next, half, batches, k
+    logical :: away(2)
+    call open_gpu(journey%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
+    if (allocated(error)) return
+    call open_fleet(journey%moving, lanes)
+    call set_regions(journey%moving, catalogue, lanes)
+    batches = size(halves(1)%batches)
+    allocate (passengers(lane_count, batches, 2))
+    next = 1
+    do half = 1, 2
+      do k = 1, batches
+        lanes%batch = lane_batch_t()
+        call board_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
+        halves(half)%batches(k) = lanes%batch
+      end do
+      away(half) = any(passengers(:, :, half)%start > 0)
+      if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
+      if (allocated(error)) return
+    end do
+    half = 1
+    do while (any(away))
+      if (away(half)) then
+        call await_half(half, error)
+        if (allocated(error)) return
+        do k = 1, batches
+          lanes%batch = halves(half)%batches(k)
+          call attend_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
+          halves(half)%batches(k) = lanes%batch
+        end do
+        away(half) = any(passengers(:, :, half)%start > 0)
+        if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
+        if (allocated(error)) return
+      end if
+      half = 3 - half
+    end do
+  end subroutine run_on_gpu
+
+  !> The first starts of a batch.
+  pure subroutine board_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    integer, intent(inout) :: next
+    type(passenger_t), intent(inout) :: passengers(:)
+    type(fleet_t), intent(inout) :: lanes
+    type(outcome_t), intent(inout) :: outcomes(:)
+    integer :: lane
+    do lane = 1, lane_count
+      call board(journey, catalogue, starts, lane, next, passengers(lane), lanes, outcomes)
+    end do
+  end subroutine board_all
+
+  !> The lanes of a batch that has been flown: those that have stopped or are left, and the next starts.
+  pure subroutine attend_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    integer, intent(inout) :: next
+    type(passenger_t), intent(inout) :: passengers(:)
+    type(fleet_t), intent(inout) :: lanes
+    type(outcome_t), intent(inout) :: outcomes(:)
+    integer :: lane
+    do lane = 1, lane_count
+      if (passengers(lane)%start == 0 .or. lanes%batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
+      call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), lanes, &
+                  outcomes(passengers(lane)%start))
+      if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, passengers(lane), &
+                                                                  lanes, outcomes)
+    end do
+  end subroutine attend_all
 
   !> Trajectories worth asking for at a time: enough to keep the lanes full, or one by one.
   pure integer function block_size(journey)
     type(journey_t), intent(in) :: journey
     block_size = merge(4*lane_count, 1, journey%flow%available)
+    if (journey%flow%available .and. journey%flow%gpu >= 0) block_size = gpu_block
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
-  pure subroutine board(journey, catalogue, starts, lane, next, passenger, batch, outcomes)
+  pure subroutine board(journey, catalogue, starts, lane, next, passenger, lanes, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: lane
     integer, intent(inout) :: next
     type(passenger_t), intent(inout) :: passenger
-    type(lane_batch_t), intent(inout) :: batch
+    type(fleet_t), intent(inout) :: lanes
     type(outcome_t), intent(inout) :: outcomes(:)
     do while (next <= size(starts, 2))
       passenger%start = next
@@ -97,27 +191,27 @@ contains
         call go_on(journey, catalogue, start, passenger, outcome)
       end associate
       if (passenger%course%phase /= phase_over) then
-        call occupy_lane(journey%flow, lane, passenger%course%state, .true., batch)
-        call send_on(journey, passenger%course, outcomes(passenger%start), lane, batch)
+        call put_into_lane(journey%moving, journey%flow, lane, passenger%course, .true., lanes)
+        call send_on(journey, passenger%course, outcomes(passenger%start), lane, lanes%batch)
         return
       end if
     end do
     passenger%start = 0
-    batch%status(lane) = lane_idle
+    lanes%batch%status(lane) = lane_idle
   end subroutine board
 
-  !> Tells the lanes what they can be captured by: a slipping body, by a cycle.
-  pure subroutine set_regions(catalogue, batch)
+  !> Tells the lanes what they can be captured by: what moves, by a cycle.
+  pure subroutine set_regions(moving, catalogue, lanes)
+    type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
-    type(lane_batch_t), intent(inout) :: batch
+    type(fleet_t), intent(inout) :: lanes
     integer :: k, i
     do k = 1, size(catalogue)
       associate (a => catalogue(k))
         if (a%rests .or. a%any_place) cycle
-        if (a%coordinates > 2) batch%complete = 0
-        if (a%coordinates > 2) cycle
         do i = 1, a%period
-          call add_region(batch, k, a%points(:2, i), a%scale(:2), a%metric(:3, i), a%capture_radius**2)
+          call add_capture(moving, lanes, k, a%points(:a%coordinates, i), a%scale(:a%coordinates), &
+                           a%metric(:(a%coordinates*(a%coordinates + 1))/2, i), a%capture_radius**2)
         end do
       end associate
     end do
@@ -140,22 +234,21 @@ contains
   end subroutine send_on
 
   !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
-  pure subroutine attend(journey, catalogue, start, lane, passenger, batch, outcome)
+  pure subroutine attend(journey, catalogue, start, lane, passenger, lanes, outcome)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: start(:)
     integer, intent(in) :: lane
     type(passenger_t), intent(inout) :: passenger
-    type(lane_batch_t), intent(inout) :: batch
+    type(fleet_t), intent(inout) :: lanes
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped, left, taken
-    left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
-    associate (course => passenger%course)
+    left = lanes%batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
+    associate (course => passenger%course, batch => lanes%batch)
       course%elapsed = batch%elapsed(lane)
       course%captured = nint(batch%captor(lane))
       outcome%settle_time = batch%settled(lane)
-      call lane_state(batch, lane, course%state)
-      call take_counts(batch, lane, course%tally)
+      call take_from_lane(journey%moving, lane, lanes, course%strobe_t, course%tally)
       if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
@@ -173,7 +266,7 @@ contains
       end if
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
       batch%status(lane) = lane_flying
-      if (taken) call occupy_lane(journey%flow, lane, course%state, .false., batch)
+      if (taken) call put_into_lane(journey%moving, journey%flow, lane, course, .false., lanes)
       call send_on(journey, course, outcome, lane, batch)
     end associate
   end subroutine attend
@@ -203,12 +296,11 @@ contains
     end associate
   end subroutine go_on
 
-  !> Whether a lane can take a course: it slips fast enough, and nobody needs the extremes of its window.
+  !> Whether a lane can take a course, and nobody needs the extremes of its window.
   pure logical function flies(journey, course)
     type(journey_t), intent(in) :: journey
     type(course_t), intent(in) :: course
-    flies = (course%state%mode == mode_slip_plus .or. course%state%mode == mode_slip_minus) .and. &
-      abs(course%state%v) >= journey%flow%slowest .and. course%phase /= phase_over .and. &
+    flies = flies_in_lane(journey%moving, journey%flow, course%strobe_t) .and. course%phase /= phase_over .and. &
       (course%phase /= phase_window .or. course%captured > 0 .or. journey%describe == describe_regime)
   end function flies
 

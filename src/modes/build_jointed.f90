@@ -4,7 +4,7 @@
 !> From the parts of a case to a jointed structure.
 module build_jointed
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
-  use contact_law, only: contact_of
+  use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use elementary, only: sine_cosine
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
@@ -233,7 +233,12 @@ contains
                 number(joint%upper)//' m')
       return
     end if
-    joint%contact = contact_of(law_of_one(choice), felt_mass(machine%mass, given, row))
+    if (choice%name == 'contact:massless') then
+      ! A point without mass on the flexibility of the modes left out is a spring that only pushes.
+      joint%contact = contact_t(kind=contact_kelvin_voigt, soft=.true., stiffness=value_of(choice, 'stiffness'))
+    else
+      joint%contact = contact_of(law_of_one(choice), felt_mass(machine%mass, given, row))
+    end if
     joint%kind = merge(joint_soft, joint_contact, joint%contact%soft)
     call add_joint(machine, joint)
   end subroutine add_contact

@@ -30,7 +30,7 @@ contains
     type(options_t), intent(in) :: options
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
-    type(joint_guard_t), intent(out) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards, reason
     logical, intent(out) :: fallen(most_guards)
     type(watch_t), intent(inout) :: watch

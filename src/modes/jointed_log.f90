@@ -4,7 +4,6 @@
 !> What is written down of the motion of a jointed structure when asked: samples, events, and where the energy went.
 module jointed_log
   use contact_law, only: contact_at_speed, contact_force, contact_t
-  use eigen, only: modulus
   use flight_path, only: path_at, path_t
   use jointed, only: joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
   use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, turning_at
@@ -22,6 +21,9 @@ module jointed_log
     0.66999052179242813240133287955162_wp, 0.93056815579702628761197324444640_wp]
   real(wp), parameter :: weight(4) = [0.17392742256872692868653197461100_wp, 0.32607257743127307131346802538900_wp, &
     0.32607257743127307131346802538900_wp, 0.17392742256872692868653197461100_wp]
+
+  !> Decay times after which nothing is left of an exponential.
+  real(wp), parameter :: gone = merge(70, 140, epsilon(1.0_wp) > 1e-20_wp)
 
 contains
 
@@ -90,7 +92,7 @@ contains
     call put_column(log%sample_coordinates, log%samples, [state%q(:machine%n), state%v(:machine%n)])
   end subroutine log_sample
 
-  !> Adds up the powers from `first` to `last` [s after the start of the path].
+  !> Adds up the powers from `first` to `last` [s after the start of the path], by panels for what is still fast there.
   pure subroutine book_flight(machine, flow, path, start, first, last, log)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -107,7 +109,7 @@ contains
       ! A step of a marched flight is a polynomial.
       fastest = 0
     else if (flow%modal) then
-      fastest = max(fastest, maxval([0.0_wp, modulus(flow%exponent)]))
+      fastest = max(fastest, maxval([0.0_wp, pack(flow%size_of_exponent, -real(flow%exponent)*first < gone)]))
     else
       fastest = max(fastest, flow%rate)
     end if

@@ -59,6 +59,8 @@ module motion_state
     real(wp) :: domain = 1e6_wp
     !> Doubles per vector where many bodies fly together; 0 = one by one.
     integer :: lane_width = 0
+    !> The GPU on which many bodies fly together; -1: in vectors.
+    integer :: gpu = -1
   end type options_t
 
   !> Counts and extremes since the last reset.

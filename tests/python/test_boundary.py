@@ -3,6 +3,7 @@
 """The command `boundary`: curves that part the labels, the same with any ranks, and what it refuses."""
 
 import subprocess
+import zlib
 from pathlib import Path
 
 import h5py
@@ -257,3 +258,31 @@ def test_nothing_is_replaced_without_force(run, coulomb, curves):
     assert ended.returncode == 64
     ended = run("boundary", coulomb, "--set", "drive.ratio=1.1")
     assert ended.returncode == 64 and "--set belongs" in ended.stderr
+
+
+def test_verify_runs_starts_on_both_sides_again(run, curves):
+    told = run("verify", curves, "--sample", 40)
+    assert told.returncode == 0, told.stderr
+    assert "40 points run again: 0 differ from the file" in told.stdout
+    assert "against quadruple precision: 0 label flips\n" in told.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "value", "said"),
+    [
+        ("x0", 20, 0.9, "points rerun differ from the file"),
+        ("label_one", 0, 7, "point 0: has not the labels of its piece"),
+        ("first", 1, 3, "piece 1: does not begin where the one before ends"),
+        ("saddle", 5, 0, "point 5: is part of the stable set of no saddle"),
+        ("saddles/multipliers", (0, 1), 1.5, "saddle 1: its multipliers are not those of a saddle"),
+    ],
+)
+def test_verify_tells_what_is_wrong_in_a_boundary(run, curves, tmp_path, name, place, value, said):
+    path = tmp_path / "wrong.h5"
+    path.write_bytes(curves.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file[name][place] = value
+        file[name].attrs.modify("checksum", np.uint32(zlib.crc32(file[name][()].tobytes())))
+    told = run("verify", path)
+    assert told.returncode == 74
+    assert said in told.stderr

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from program import succeed
 from scipy.linalg import expm
+from separatrix import style
+from separatrix.figures import boundary
 from separatrix.library import Model
 from separatrix.open import decode_flags, decode_words, open_result, table
 from separatrix.simulate import search_slices
@@ -82,6 +84,13 @@ def test_starts_beside_the_boundary_of_two_masses_have_the_labels_of_its_sides(m
             for k, name in enumerate(("x0", "v0")):
                 starts[:, k] = result[name].values + sign * 1e-8 * (result["across"].values == k)
             np.testing.assert_array_equal(catalogue.labels(starts)["attractor"], result[side].values)
+
+
+def test_the_figure_does_not_mark_a_saddle_that_is_not_in_the_slice(masses):
+    with open_result(masses / "curves.h5") as result, style.context():
+        figure = boundary.figures(masses / "curves.h5", result, "title")["boundary"]
+        texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        assert "boundary: stable set of saddle 1" in texts and "saddle" not in texts
 
 
 def test_an_equilibrium_is_no_saddle(separatrix, source_dir, tmp_path):

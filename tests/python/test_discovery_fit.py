@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
+from separatrix.discovery.decision import decide as decide_module
 from separatrix.discovery.decision import partial as partial_module
 from separatrix.discovery.decision import rounds
 from separatrix.discovery.decision.where import benjamini_hochberg
@@ -17,6 +18,7 @@ from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, gauss_newton_step
 from separatrix.discovery.fitting.problem import Evaluation
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.measured.smoother import impact_table, smooth
@@ -316,3 +318,33 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     found = rounds.run_round(bench, again, None, 0, 1, earlier, everything=True)
     assert {one.name for one in found.judged} == {"dahl", "viscous"}
     assert fitted_now == ([("viscous", True), ("dahl", False)] if renewed else [("dahl", False)])
+
+
+def test_the_noise_is_measured_again_where_several_effects_leave_nothing_else(monkeypatch):
+    """Its memory passes for a gap as long as no single effect comes near it; the search then begins anew."""
+    settled, closed = [], iter([False, True])
+    pair = SimpleNamespace(fitted=SimpleNamespace(fit=SimpleNamespace(like_noise=lambda _: True)))
+    single = SimpleNamespace(gates={"adequate": False, "detect": True, "stable": True})
+    base = Fitted((), None, SimpleNamespace(), SimpleNamespace(values=None, starts=None), ())
+
+    def renewing(bench, found, at, known, everything=False):
+        settled.append(known)
+        return found
+
+    monkeypatch.setattr(
+        decide_module,
+        "run_round",
+        lambda bench, base, *_: SimpleNamespace(base=base, judged=[single], foretold=None),
+    )
+    monkeypatch.setattr(decide_module, "_renewing", renewing)
+    monkeypatch.setattr(decide_module, "_begun", lambda bench, found: SimpleNamespace(rounds=[found]))
+    monkeypatch.setattr(decide_module, "_lead", lambda *_: (single, []))
+    monkeypatch.setattr(decide_module, "_shaped", lambda *_: None)
+    monkeypatch.setattr(decide_module, "with_more", lambda *_: (pair, [], next(closed)))
+    monkeypatch.setattr(decide_module, "_noise_renewed", lambda *_: True)
+    monkeypatch.setattr(decide_module, "minimise", lambda *_, **__: "fitted again")
+    monkeypatch.setattr(decide_module, "_conclude", lambda bench, decision, *found: (decision, *found))
+    bench = SimpleNamespace(options=Options(quick=True), foretell=lambda _: None)
+    decision, best, rivals = decide_module.decide(bench, base)
+    assert (best, rivals, settled) == (pair, [], [False, True])
+    assert decision.rounds[0].base.fit == "fitted again"

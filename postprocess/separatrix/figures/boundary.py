@@ -149,6 +149,8 @@ def _notes(result: xr.Dataset) -> list[str]:
         for k, (period, word, values, reached) in enumerate(rows, 1)
         if reached > 0
     ]
+    if "saddles_section" in result and listed:
+        notes.append("saddles are not marked: they have more coordinates than the picture")
     return notes + listed[:_MOST_LISTED]
 
 
@@ -238,6 +240,9 @@ def _draw_saddles(
 
 def _on_section(result: xr.Dataset, place: dict[str, float]) -> bool:
     """Whether the starts of a panel are on the section at crank angle 0, where the saddles are given."""
+    if "saddles_section" in result:
+        # in 2n dimensions: nothing puts them into the slice
+        return False
     start = resolved_case(result).get("start", {})
     angle = place.get("crank_angle", start.get("crank_angle", 0.0) if isinstance(start, dict) else 0.0)
     return bool(np.isclose(np.sin(float(angle) / 2), 0, atol=1e-12))

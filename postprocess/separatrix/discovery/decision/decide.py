@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
@@ -53,10 +53,13 @@ class Decision:
         return self.accepted[0] if self.accepted else self.added
 
 
-def decide(bench: Bench, base: Fitted) -> Decision:
-    """Add effects until what is left is noise or nothing in the catalogue helps."""
+def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
+    """Add effects until what is left is noise or nothing in the catalogue helps.
+
+    With `settled` noise it is not measured again.
+    """
     foretold = bench.foretell(base)
-    first = _renewing(bench, run_round(bench, base, foretold, 0.2, 0.6), 0.6)
+    first = _renewing(bench, run_round(bench, base, foretold, 0.2, 0.6), 0.6, settled)
     decision = _begun(bench, first)
     if not first.judged:
         return _without_name(bench, decision)
@@ -68,7 +71,7 @@ def decide(bench: Bench, base: Fitted) -> Decision:
     if shaped is None and not (best.gates["adequate"] or bench.options.quick):
         # the linear screen may have passed over the effect that closes the gap
         whole = run_round(bench, first.base, first.foretold, 0.75, 0.8, first, everything=True)
-        whole = _renewing(bench, whole, 0.8, everything=True)
+        whole = _renewing(bench, whole, 0.8, settled, everything=True)
         better, others = _lead(bench, whole)
         decision = _begun(bench, whole)
         if _detected(better):
@@ -82,8 +85,17 @@ def decide(bench: Bench, base: Fitted) -> Decision:
         shaped = _shaped(bench, found)
     if shaped is not None:
         return _conclude(bench, decision, *shaped)
-    more = with_more(bench, decision.rounds, best) if bench.options.most_effects > 1 else None
-    return _give_up(decision) if more is None else _conclude(bench, decision, *more)
+    if bench.options.most_effects < 2:
+        return _give_up(decision)
+    *more, closed = with_more(bench, decision.rounds, best)
+    if closed:
+        return _conclude(bench, decision, *more)
+    if not settled and more[0].fitted.fit.like_noise(2) and _noise_renewed(bench, more[0]):
+        # the memory of the noise is seen only where several effects together leave nothing else
+        base = decision.rounds[0].base
+        fit = minimise(base.problem, base.fit.values, base.fit.starts, patient=True)
+        return decide(bench, replace(base, fit=fit), settled=True)
+    return _give_up(decision)
 
 
 def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
@@ -116,10 +128,10 @@ def _begun(bench: Bench, first: Round) -> Decision:
     return Decision("none", [], [], [], [first], gap, first.foretold)
 
 
-def _renewing(bench: Bench, found: Round, at: float, everything: bool = False) -> Round:
+def _renewing(bench: Bench, found: Round, at: float, settled: bool, everything: bool = False) -> Round:
     """The round again, for as long as it shows that its base can be fitted better."""
     for _ in range(_RENEWALS):
-        lower = renewed(bench, found)
+        lower = renewed(bench, found, settled)
         if lower is None:
             break
         told = bench.foretell(lower, found.foretold)
@@ -141,7 +153,19 @@ def _detected(one: Judged) -> bool:
     return one.gates["detect"] and one.gates["stable"]
 
 
-def renewed(bench: Bench, first: Round) -> Fitted | None:
+def _noise_renewed(bench: Bench, best: Judged) -> bool:
+    """Measure the noise of all records by a better machine; whether it changed."""
+    changed = renew_noise(bench.training, best.fitted.problem, best.fitted.fit, bench.scales.mass)
+    if bench.held_out is not None and best.prediction is not None:
+        if changed:
+            held = best.prediction
+            renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
+            copy_noise(bench.training, bench.held_out)
+        changed |= limit_noise(bench.training, bench.held_out)
+    return changed
+
+
+def renewed(bench: Bench, first: Round, settled: bool = False) -> Fitted | None:
     """The base fitted again where candidates show that the noise is another or that it was not at its best.
 
     A candidate may have left a minimum that the base was caught in: what the base reaches from there is no
@@ -152,13 +176,7 @@ def renewed(bench: Bench, first: Round) -> Fitted | None:
     best = next((one for one in first.judged if one.fitted.fit.converged), None)
     if best is None:
         return None
-    changed = renew_noise(bench.training, best.fitted.problem, best.fitted.fit, bench.scales.mass)
-    if bench.held_out is not None and best.prediction is not None:
-        if changed:
-            held = best.prediction
-            renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
-            copy_noise(bench.training, bench.held_out)
-        changed |= limit_noise(bench.training, bench.held_out)
+    changed = not settled and _noise_renewed(bench, best)
     fits = [minimise(base.problem, base.fit.values, base.fit.starts, patient=True)]
     for one in lowest_misfit:
         values = shared_values(base, one.fitted)

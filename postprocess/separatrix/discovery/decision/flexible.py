@@ -53,9 +53,24 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
 def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) -> Iterator[Judged]:
     """The table of a family on as many knots as the evidence pays for; nothing where none converges.
 
-    What is no name need not converge where not `strict`: what it foretells is its proof.
+    What is no name need not converge where not `strict`: what it foretells is its proof. One that was fitted
+    on this base stands.
     """
     known = _begun(found, member.family)
+    same = [
+        one
+        for effect, begun, how, one in found.tables
+        if (effect, how) == (member.effect, strict) and begun is known
+    ]
+    best = same[0] if same else _fit_table(bench, found, member, known, strict)
+    if not same:
+        found.tables.append((member.effect, known, strict, best))
+    if best is not None:
+        yield found.judge(best.fitted, best.prediction)
+
+
+def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict: bool) -> Judged | None:
+    """The table of a family, from a `known` machine."""
     best = None
     seen = member.seen(known)
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
@@ -88,8 +103,7 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
             best = one
         if best is not None:
             known = best.fitted
-    if best is not None:
-        yield best
+    return best
 
 
 def _saturated(one: Fitted, more: Fitted) -> bool:

@@ -62,6 +62,8 @@ class Round:
     # why some effects make no sense for this machine
     absent: dict[str, str]
     judged: list[Judged] = field(default_factory=list)
+    # families as functions that were fitted on this base: effect, machine begun from, whether strictly
+    tables: list[tuple[str, Fitted, bool, Judged | None]] = field(default_factory=list)
 
     def judge(self, fitted: Fitted, prediction: Prediction | None) -> Judged:
         """Evidence over the base of this round."""
@@ -80,8 +82,11 @@ def run_round(
     last: float,
     earlier: Round | None = None,
     everything: bool = False,
+    without: frozenset[str] = frozenset(),
 ) -> Round:
     """Screen all candidates on top of `base` and refit those that matter, or `everything` that is seen.
+
+    Those of `without` are not fitted.
 
     An `earlier` round and its fits stand where its base was this very fit; the fits are carried on where the
     base was fitted again.
@@ -97,9 +102,12 @@ def run_round(
     rival = max(ends, key=lambda one: one.training).fitted if ends else None
     if rival is None and base.fit.like_noise(2):
         rival = base
-    chosen = choose(base, found.screened, options, everything)
+    chosen = [name for name in choose(base, found.screened, options, everything) if name not in without]
     if stands:
         chosen = [name for name in chosen if name not in known]
+    # those that led before first: others may be out of the race at once
+    led = list(known)
+    chosen.sort(key=lambda name: led.index(name) if name in led else len(led))
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
         fitted = refit(

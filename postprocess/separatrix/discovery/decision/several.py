@@ -11,7 +11,7 @@ from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_r
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.refit import Fitted, refit
+from separatrix.discovery.fitting.refit import Fitted, hopeless, refit
 from separatrix.discovery.fitting.screen import screen, signature
 
 _PAIRS = 6
@@ -19,33 +19,37 @@ _PAIRS = 6
 _CLOSES = 0.5
 
 
-def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, list[Judged]] | None:
-    """Several effects that close the gap together, and their rivals; None where none do.
+def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, list[Judged], bool]:
+    """The best several effects, their rivals, and whether they close the gap together.
 
     On top of the best effect a second is tried, and the pairs that the screen finds; then a third, and so on,
     as long as each is needed and closes most of what was left. The rounds are added to `rounds`.
     """
     first, found = rounds[0], best
+    close: list[Judged] = []
     while len(found.fitted.names) < bench.options.most_effects:
         grown = [one for one in _grown(bench, rounds, found) if admissible(one, first.base, bench.options)[0]]
         if not grown:
-            return None
+            break
         larger, close = choice(bench, first.base, first.foretold, grown, foremost)
         pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
         judge_ceiling(bench, larger)
         larger.gates["drop"] = _all_needed(bench, first, larger, found)
         if larger.gates["adequate"] and larger.gates["drop"]:
-            return larger, close
+            return larger, close, True
         if not (larger.gates["drop"] and larger.fitted.fit.converged and _closes_most(found, larger)):
-            return None
+            break
         found = larger
-    return None
+    return found, close, False
 
 
 def _grown(bench: Bench, rounds: list[Round], found: Judged) -> list[Judged]:
     """Sets of effects with one more than `found`; pairs of any two as well."""
     first = rounds[0]
-    rounds.append(run_round(bench, found.fitted, found.prediction, 0.8, 0.9))
+    limit = hopeless(first.base)
+    # what comes nowhere near the records alone, as a soft barrier where impacts are hard, is no second effect
+    lost = frozenset(one.name for one in first.judged if one.fitted.fit.far_off(limit))
+    rounds.append(run_round(bench, found.fitted, found.prediction, 0.8, 0.9, without=lost))
     sets = [over_base(bench, first.base, first.foretold, one) for one in rounds[-1].judged]
     if len(found.fitted.names) > 1:
         return sets

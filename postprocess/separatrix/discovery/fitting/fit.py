@@ -38,6 +38,7 @@ _FALLS = 10.0
 _HEARD = 3
 _LOST = 100.0
 _OVER = 5.0
+_SPARED = 3
 
 
 @dataclass
@@ -177,7 +178,7 @@ def minimise(
             descent.damping, stalled, begun_anew = _MILD, most_stalls - 1, True
         elif not stalled:
             begun_anew = False
-        if hopeless is not None and iterations >= _HEARD and descent.hopeless(hopeless):
+        if hopeless is not None and iterations > _HEARD and descent.hopeless(hopeless):
             break
     if not rough:
         descent.renew()
@@ -277,9 +278,12 @@ class _Descent:
             self.current, self.kept = self.problem.evaluate(values, starts), None
 
     def behind(self, beat: float) -> bool:
-        """Whether the squares are above `beat` by far more than the next steps may gain."""
-        squares = _cost(self.current, self.inside, self.scale, robust=False)
-        return squares - beat > max(_LOST, _OVER * self.decrement)
+        """Whether the squares are above `beat` by far more than the next steps may gain.
+
+        A few segments may be caught in a wrong minimum and are left out.
+        """
+        squares = np.sort(_costs(self.current, self.scale, robust=False)[self.inside.any(axis=1)])
+        return bool(squares[:-_SPARED].sum() - beat > max(_LOST, _OVER * self.decrement))
 
     def hopeless(self, limit: float) -> bool:
         """Whether steps gain little far above the wanted chi^2."""

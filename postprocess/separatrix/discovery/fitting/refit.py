@@ -28,6 +28,8 @@ _FEW = 0.1
 WORSE = 1.0
 # share of chi^2 by which two fits of one minimum may differ
 _SAME = 1e-3
+# share of chi^2 by which two fits that are far behind may differ and another start not be worth it
+_ALIKE = 0.05
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -76,13 +78,13 @@ def refit(
     """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
 
     Where a `rival` (the base itself, perhaps) already leaves nothing but noise, a candidate that is clearly
-    worse after its first start is not tried further. A fit `known` from another noise is only carried on
-    where it is good or out of the race.
+    worse after its first start is not tried further. A fit `known` from another noise is carried on, and
+    tried from the base of now where it is neither good nor out of the race.
     """
     best = None
     if known is not None:
         best = carried_on(data, candidate, known)
-        out = best.fit.far_off(_hopeless(base)) or (rival is not None and beaten(best, rival))
+        out = best.fit.far_off(hopeless(base)) or (rival is not None and beaten(best, rival))
         if out or _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
@@ -97,11 +99,10 @@ def refit(
                 return rough
         else:
             problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
-        if not fit.far_off(_hopeless(base)):
+        if not fit.far_off(hopeless(base)):
             fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        # from afar to the same minimum: there is no need of another start
-        agreed = best is not None and kind == "far" and _same_minimum(found, best)
+        agreed = best is not None and _agree(kind, found, best, base, rival)
         if best is None or _better(found, best):
             best = found
         best.tries = tries
@@ -112,12 +113,13 @@ def refit(
             break
         if settled and gain_over(best, rival)[0] < -_BEATEN:
             break
-        if quick and tries == 2:
+        if known is not None or (quick and tries == 2):
+            # the other starts of a fit that is known were tried then
             break
     return _above_base(data, best, base, candidate)
 
 
-def _hopeless(base: Fitted) -> float:
+def hopeless(base: Fitted) -> float:
     """Reduced chi^2 from which on a candidate is given up."""
     return _HOPELESS * max(1.0, base.fit.reduced_chi2)
 
@@ -169,6 +171,22 @@ def _same_minimum(one: Fitted, other: Fitted) -> bool:
     return bool(both and abs(gain_over(one, other)[0]) < max(WORSE, _SAME * one.fit.total))
 
 
+def _agree(kind: str, one: Fitted, other: Fitted, base: Fitted, rival: Fitted | None) -> bool:
+    """Whether two starts of one candidate make another one needless.
+
+    They led to the same minimum, one from afar; or both are hopeless, or alike and far behind a converged
+    rival.
+    """
+    if kind == "far" and _same_minimum(one, other):
+        return True
+    if one.fit.far_off(hopeless(base)) and other.fit.far_off(hopeless(base)):
+        return True
+    alike = abs(one.fit.total - other.fit.total) < _ALIKE * one.fit.total
+    if not alike or rival is None or not rival.fit.converged:
+        return False
+    return all(gain_over(fitted, rival)[0] < -2 * _BEATEN for fitted in (one, other))
+
+
 def _better(one: Fitted, other: Fitted) -> bool:
     """Whether a fit follows clearly more segments, or as many and those more closely."""
     counts = [fitted.fit.good.sum() for fitted in (one, other)]
@@ -195,10 +213,8 @@ def _try(
         stages = list(range(data.last + 1))
         nominal = np.array([one.value for one in candidate.free])
         values = np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
-    most, hopeless = min(most, 12), _hopeless(base)
-    return fit_stages(
-        data, candidate.model, candidate.free, values, stages=stages, most=most, hopeless=hopeless
-    )
+    most, limit = min(most, 12), hopeless(base)
+    return fit_stages(data, candidate.model, candidate.free, values, stages=stages, most=most, hopeless=limit)
 
 
 def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:

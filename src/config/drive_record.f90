@@ -1,0 +1,98 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A measured force on a body of several: record = "FILE.csv" of a [drive.NAME], in the place of its frequency and series. The
+!> record is one period; what its harmonics leave is told.
+module drive_record
+  use case_source, only: case_source_t, find, know, report
+  use case_values, only: take_integer, take_text
+  use constants, only: two_pi
+  use elementary, only: sine_cosine
+  use force_record, only: read_force
+  use kinds, only: wp
+  use law_table, only: law_choice_t, set_value
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: read_record, series_of
+
+  !> Harmonics of a record that says nothing of them; more than this share of the record left is refused then.
+  integer, parameter :: usual_harmonics = 32, most_harmonics = 256
+  real(wp), parameter :: most_left = 0.05_wp
+
+contains
+
+  !> Takes frequency and series of a drive out of its record; `found` is false if it has none.
+  subroutine read_record(source, path, choice, found)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    type(law_choice_t), intent(inout) :: choice
+    logical, intent(out) :: found
+    character(len=9), parameter :: others(6) = [character(len=9) :: 'frequency', 'mean', 'amplitude', 'angle', 'cosine', 'sine']
+    character(len=:), allocatable :: file, problem
+    real(wp), allocatable :: force(:), cosine(:), sine(:)
+    real(wp) :: interval, mean, left
+    integer :: harmonics, i
+    found = find(source, path//'.record') > 0
+    if (.not. found) return
+    file = ''
+    call take_text(source, path//'.record', file)
+    harmonics = usual_harmonics
+    call take_integer(source, path//'.harmonics', 1, harmonics, highest=most_harmonics)
+    do i = 1, size(others)
+      call know(source, path//'.'//trim(others(i)))
+      if (find(source, path//'.'//trim(others(i))) > 0) call report(source, path//'.'//trim(others(i)), &
+        'found beside a record, allowed one or the other')
+    end do
+    if (len(file) == 0) return
+    if (index(file, '/') /= 1) file = source%name(:index(source%name, '/', back=.true.))//file
+    call read_force(file, interval, force, problem)
+    if (allocated(problem)) then
+      call report(source, path//'.record', problem)
+      return
+    else if (size(force) < 3) then
+      call report(source, path//'.record', 'found '//to_text(size(force))//' samples, allowed 3 or more: one period')
+      return
+    end if
+    call series_of(force, min(harmonics, (size(force) - 1)/2), mean, cosine, sine, left)
+    if (left > most_left .and. find(source, path//'.harmonics') == 0) then
+      call report(source, path//'.record', 'found a record of which '//to_text(usual_harmonics)//' harmonics leave '// &
+                  to_text(nint(100*left))//' %, allowed with the number of harmonics said: '//path//'.harmonics, 1 to '// &
+                  to_text(most_harmonics))
+    end if
+    call set_value(choice, 'frequency', [two_pi/(interval*size(force))])
+    call set_value(choice, 'mean', [mean])
+    call set_value(choice, 'cosine', cosine)
+    call set_value(choice, 'sine', sine)
+  end subroutine read_record
+
+  !> Mean and harmonics of samples at equal steps over one period, and the root mean square of what they leave, as a share of
+  !> that of the samples about their mean.
+  pure subroutine series_of(samples, harmonics, mean, cosine, sine, left)
+    real(wp), intent(in) :: samples(:)
+    integer, intent(in) :: harmonics
+    real(wp), intent(out) :: mean, left
+    real(wp), allocatable, intent(out) :: cosine(:), sine(:)
+    real(wp) :: rest(size(samples)), s, c, whole
+    integer :: k, m, n
+    n = size(samples)
+    allocate (cosine(harmonics), sine(harmonics), source=0.0_wp)
+    mean = sum(samples)/n
+    rest = samples - mean
+    whole = sum(rest**2)
+    do m = 1, harmonics
+      do k = 1, n
+        call sine_cosine(two_pi*modulo(m*(k - 1), n)/n, s, c)
+        cosine(m) = cosine(m) + 2*(samples(k) - mean)*c/n
+        sine(m) = sine(m) + 2*(samples(k) - mean)*s/n
+      end do
+      do k = 1, n
+        call sine_cosine(two_pi*modulo(m*(k - 1), n)/n, s, c)
+        rest(k) = rest(k) - cosine(m)*c - sine(m)*s
+      end do
+    end do
+    left = sqrt(sum(rest**2)/max(whole, tiny(whole)))
+  end subroutine series_of
+
+end module drive_record

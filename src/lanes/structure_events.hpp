@@ -1,0 +1,257 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// What lanes of jointed structures do between flights: impacts, sticking and sliding, the flights that
+// follow, stops. What several joints would have to decide together is left to the scalar code.
+#ifndef SEPARATRIX_STRUCTURE_EVENTS_HPP
+#define SEPARATRIX_STRUCTURE_EVENTS_HPP
+
+#include "structure_search.hpp"
+
+namespace {
+
+// Amplitudes of the flights that set off from the state and the phases of `fresh`. Returns those that no mode
+// in lanes has.
+template <class size>
+inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh, structure_group &g) {
+  structure_bases b;
+  mask unknown = fresh;
+  put(g.s.start, fresh, g.s.time);
+  put(g.s.found, fresh, 0);
+  harmonics_at(m, z, g.s.start, b);
+  for (int key = 0; key < modes_of(m); key++) {
+    mask in = in_mode(m, z, key, fresh, g.s);
+    const structure_mode &t = m.mode[key];
+    if (t.known < 0.5 || !any(in))
+      continue;
+    unknown = unknown & ~in;
+    vec place[most_coordinates], speed[most_coordinates];
+    for (int i = 0; i < z.coordinates; i++) {
+      place[i] = g.s.q[i];
+      speed[i] = g.s.v[i];
+      for (int n = 0; n < z.waves; n++) {
+        double w = (n + 1) * m.drive_frequency;
+        place[i] -= t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
+        speed[i] += w * (t.wave_re[n][i] * b.sine[n] + t.wave_im[n][i] * b.cosine[n]);
+      }
+    }
+    for (int j = 0; j < z.joints; j++) {
+      if (m.joint[j].slides < 0.5)
+        continue;
+      vec held = {};
+      for (int i = 0; i < z.coordinates; i++)
+        held += m.joint[j].row[i] * place[i];
+      put(g.s.held[j], in, held);
+    }
+    for (int i = 0; i < z.coordinates; i++) {
+      vec still = t.still[i];
+      for (int j = 0; j < z.joints; j++)
+        if (m.joint[j].slides > 0.5)
+          still += t.still_by_joint[j][i] * pull_of(g.s, j);
+      place[i] -= still;
+    }
+    for (int k = 0; k < z.terms; k++) {
+      vec re = {}, im = {};
+      for (int i = 0; i < z.coordinates; i++) {
+        re += t.from_place_re[i][k] * place[i] + t.from_speed_re[i][k] * speed[i];
+        im += t.from_place_im[i][k] * place[i] + t.from_speed_im[i][k] * speed[i];
+      }
+      put(g.s.re[k], in, re);
+      put(g.s.im[k], in, im);
+    }
+  }
+  return unknown;
+}
+
+// Does the chatter of a gap that opens at speed u, with its acceleration and the rate of that, end so soon
+// that the scalar code may complete it? As in `jointed_transition.f90`, with room for rounding.
+inline mask chatters_out(const structure_machine &m, const structure_joint &joint, vec u, vec a, vec rate) {
+  if (joint.restitution >= 1)
+    return mask{};
+  vec last = 2 * u / (-a * (1 - joint.restitution));
+  return (a < 0.0) & (last <= 1.001 * m.chatter_time) &
+         (last * magnitude(rate) <= -1.001 * a * m.chatter_share);
+}
+
+// Flights of the lanes `fresh`. Returns those that do not start as their phases say: joints that should stick
+// but do not, or a chatter that ends.
+template <class size>
+inline mask set_off(const structure_machine &m, const size &z, mask fresh, structure_group &g) {
+  mask wrong = set_amplitudes(m, z, fresh, g);
+  enter_modes(m, z, fresh & ~wrong, g);
+  look_from_start(m, z, fresh, g);
+  const outlook &o = g.first;
+  for (int j = 0; j < z.joints; j++) {
+    const structure_joint &joint = m.joint[j];
+    mask above = g.s.left == double(j + 1), below = g.s.left == -double(j + 1);
+    mask even = joint.even > 0.5 ? g.s.rising == double(j + 1) : mask{};
+    vec room = joint.slides > 0.5 ? pick(g.s.phase[j] == 0.0, joint.tie, m.slowest) : vec(joint.tie);
+    // What has just been zero must rise, all else be above.
+    mask clear_below = pick(below, pick(even, o.f2[j], o.f1[j]) > 0.0, o.f[j] > g.low[j] + room);
+    mask clear_above = pick(above, o.f1[j] < 0.0, o.f[j] < g.high[j] - room);
+    if (joint.slides > 0.5 || joint.has_lower > 0.5)
+      wrong = wrong | (fresh & ~clear_below);
+    if (joint.slides > 0.5 || joint.has_upper > 0.5)
+      wrong = wrong | (fresh & ~clear_above);
+    if (joint.slides > 0.5)
+      continue;
+    wrong = wrong | (fresh & above & chatters_out(m, joint, -o.f1[j], -o.f2[j], o.f3[j]));
+    wrong = wrong | (fresh & below & chatters_out(m, joint, o.f1[j], o.f2[j], o.f3[j]));
+  }
+  return wrong;
+}
+
+// Sticking or sliding of joint j where `at` it was found.
+inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rare, mask &stuck,
+                           structure_group &g) {
+  const structure_joint &joint = m.joint[j];
+  vec d = g.s.phase[j];
+  mask slid = at & (d != 0.0), gave_way = at & (d == 0.0);
+  // What would hold it.
+  vec force = -(g.s.end_f1[j] * g.felt_mass[j] + joint.kinetic);
+  mask holds = magnitude(force)<joint.upper - joint.tie, turns = force> joint.upper + joint.tie;
+  rare = rare | (slid & ~holds & ~turns);
+  stuck = slid & holds;
+  put(g.s.phase[j], slid, pick(holds, 0, -d));
+  put(g.s.left, slid & turns, -double(j + 1));
+  put(g.s.phase[j], gave_way, -g.s.side);
+  put(g.s.left, gave_way, -double(j + 1));
+  put(g.s.rising, gave_way, j + 1);
+}
+
+// Newton's impact of contact j where `at` it was found.
+template <class size>
+inline void strike(const structure_machine &m, const size &z, int j, mask at, mask &rare,
+                   structure_group &g) {
+  const structure_joint &joint = m.joint[j];
+  vec change = -(1 + joint.restitution) * g.s.end_f1[j];
+  for (int i = 0; i < z.coordinates; i++)
+    put(g.s.v[i], at, g.s.v[i] + change * joint.kick[i]);
+  for (int i = 0; i < z.joints; i++) {
+    if (m.joint[i].slides < 0.5 || joint.cross[i] == 0)
+      continue;
+    mask slides = g.s.phase[i] != 0.0;
+    vec before = pick(slides, g.s.phase[i] * g.s.end_f[i], 0), kick = change * joint.cross[i],
+        after = before + kick;
+    rare = rare | (at & (magnitude(after) <= 1e-12 * (magnitude(before) + magnitude(kick))));
+    put(g.s.phase[i], at, pick(after > 0.0, 1, -1));
+  }
+  put(g.s.left, at, g.s.side * double(j + 1));
+}
+
+// The events of the lanes `due` and the flights that follow. Returns the lanes that the scalar code must look
+// at: they are where their last flight began.
+template <class size>
+inline mask take_events(const structure_machine &m, const size &z, mask due, structure_group &g) {
+  vec q[most_coordinates], v[most_coordinates], phase[most_joints], time = g.s.time, left = g.s.left,
+                                                                    speed = {};
+  structure_bases b;
+  mask rare = {}, struck = {}, stuck = {}, changed = {};
+  for (int i = 0; i < z.coordinates; i++) {
+    q[i] = g.s.q[i];
+    v[i] = g.s.v[i];
+  }
+  for (int j = 0; j < z.joints; j++)
+    phase[j] = g.s.phase[j];
+  harmonics_at(m, z, g.s.start + g.s.span, b);
+  place_at(m, z, due, g.s, g.s.end_re, g.s.end_im, b, g.s.q, g.s.v);
+  put(g.s.time, due, g.s.start + g.s.span);
+  put(g.s.left, due, 0);
+  put(g.s.rising, due, 0);
+  for (int i = 0; i < z.coordinates; i++)
+    rare = rare | (due & ~(magnitude(g.s.q[i]) < m.domain));
+  for (int j = 0; j < z.joints; j++) {
+    mask at = due & (g.s.joint == double(j + 1)), now = {};
+    if (!any(at))
+      continue;
+    changed = changed | at;
+    if (m.joint[j].slides > 0.5) {
+      slide_or_stick(m, j, at, rare, now, g);
+      stuck = stuck | now;
+    } else {
+      // The scalar code counts impacts that follow each other so fast.
+      rare = rare | (at & (g.s.span < m.burst_gap));
+      strike(m, z, j, at, rare, g);
+      put(speed, at, magnitude(g.s.end_f1[j]));
+      struck = struck | at;
+    }
+  }
+  LANE_COUNT(events, count(changed));
+  rare = rare | set_off(m, z, due & ~rare, g);
+  if (any(rare)) {
+    for (int i = 0; i < z.coordinates; i++) {
+      put(g.s.q[i], rare, q[i]);
+      put(g.s.v[i], rare, v[i]);
+    }
+    for (int j = 0; j < z.joints; j++)
+      put(g.s.phase[j], rare, phase[j]);
+    put(g.s.time, rare, time);
+    put(g.s.left, rare, left);
+  }
+  put(g.c.flights, changed & ~rare, g.c.flights + 1.0);
+  put(g.s.sticks, stuck & ~rare, g.s.sticks + 1.0);
+  struck = struck & ~rare;
+  put(g.c.impacts, struck, g.c.impacts + 1.0);
+  put(g.c.speed_sum, struck, g.c.speed_sum + speed);
+  put(g.c.last_speed, struck, speed);
+  return rare;
+}
+
+// The attractors that have captured points on the section, 0 = none; as `squared_distance` of
+// `attractors.f90`.
+template <class size>
+inline vec captors(const size &z, const structure_batch &batch, const vec (&q)[most_coordinates],
+                   const vec (&v)[most_coordinates]) {
+  vec captor = {};
+  for (int r = batch.regions - 1; r >= 0; r--) {
+    const structure_region &region = batch.region[r];
+    vec d[most_section], square = {};
+    for (int i = 0; i < z.coordinates; i++) {
+      d[i] = (q[i] - region.point[i]) * region.stretch[i];
+      d[z.coordinates + i] = (v[i] - region.point[z.coordinates + i]) * region.stretch[z.coordinates + i];
+    }
+    for (int j = 0, at = 0; j < 2 * z.coordinates; j++) {
+      vec row = {};
+      for (int i = 0; i < j; i++)
+        row += region.metric[at + i] * d[i];
+      square += d[j] * (2 * row + region.metric[at + j] * d[j]);
+      at += j + 1;
+    }
+    put(captor, square <= region.reach, region.attractor);
+  }
+  return captor;
+}
+
+// Lanes `there`, where they are to stop: those that need not stop at the section pass; see `stop_or_pass` of
+// lane_stops.hpp.
+template <class size>
+inline void take_stops(const structure_machine &m, const size &z, mask there, bool complete,
+                       const structure_batch &batch, structure_group &g) {
+  structure_bases b;
+  vec re[most_terms], im[most_terms];
+  bases_at(m, z, g, g.c.until - g.s.start, b);
+  for (int k = 0; k < z.terms; k++) {
+    re[k] = g.s.re[k] * b.re[k] - g.s.im[k] * b.im[k];
+    im[k] = g.s.re[k] * b.im[k] + g.s.im[k] * b.re[k];
+  }
+  place_at(m, z, there, g.s, re, im, b, g.s.q, g.s.v);
+  mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5);
+  for (int i = 0; i < z.coordinates; i++)
+    passing = passing & (magnitude(g.s.q[i]) <= m.domain);
+  passing = complete ? passing : mask{};
+  vec captor = any(passing) ? captors(z, batch, g.s.q, g.s.v) : vec{};
+  passing = passing & ((captor < 0.5) | (g.c.leaves < 0.5));
+  put(g.c.flights, there, g.c.flights + 1.0);
+  put(g.s.time, there, pick(section, vec{}, g.c.until));
+  put(g.s.left, there, 0);
+  put(g.s.start, section, g.s.start - m.period);
+  put(g.c.elapsed, passing, g.c.elapsed + m.period);
+  put(g.c.captor, passing, captor);
+  put(g.c.settled, passing, pick(captor < 0.5, -1, pick(g.c.settled < 0.0, g.c.elapsed, g.c.settled)));
+  put(g.c.sections, passing, g.c.sections - 1.0);
+  put(g.c.status, there & ~passing, lane_stopped);
+}
+
+} // namespace
+
+#endif

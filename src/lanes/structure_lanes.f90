@@ -1,0 +1,150 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Exact flight for a batch of jointed structures at once, in vectors (the kernel is C++: `structure_kernel.hpp`). What module
+!> `lanes` says of one body holds here.
+module structure_lanes
+  use jointed, only: joint_contact, joint_friction
+  use jointed_motion, only: jointed_motion_t
+  use jointed_state, only: jointed_state_t
+  use kinds, only: wp
+  use lane_types, only: lane_batch_t, lane_flow_t, lane_fresh
+  use motion_state, only: tally_t
+  use structure_types, only: structure_batch_t, structure_machine_t, structure_region_t, structure_regions
+  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_sizeof
+  implicit none
+  private
+
+  public :: structure_sizes, structure_flies, add_structure_region, occupy_structure_lane, structure_lane_state, &
+    take_structure_counts, fly_structure_lanes
+
+  interface
+    !> Bytes of structure_machine and structure_batch as C++ has them.
+    pure subroutine separatrix_structure_sizes(machine, batch) bind(c)
+      import :: c_size_t
+      integer(c_size_t), intent(out) :: machine, batch
+    end subroutine separatrix_structure_sizes
+
+    pure subroutine separatrix_fly_structures(width, machine, control, batch) bind(c)
+      import :: c_int, lane_batch_t, structure_batch_t, structure_machine_t
+      integer(c_int), value :: width
+      type(structure_machine_t), intent(in) :: machine
+      type(lane_batch_t), intent(inout) :: control
+      type(structure_batch_t), intent(inout) :: batch
+    end subroutine separatrix_fly_structures
+  end interface
+
+contains
+
+  !> Whether both sides of the boundary to C++ agree on the sizes of what they share.
+  logical function structure_sizes()
+    integer(c_size_t) :: machine, batch
+    type(structure_machine_t), allocatable :: here
+    type(structure_batch_t), allocatable :: there
+    allocate (here, there)
+    call separatrix_structure_sizes(machine, batch)
+    structure_sizes = machine == c_sizeof(here) .and. batch == c_sizeof(there)
+  end function structure_sizes
+
+  !> Whether a lane can take a structure: all contacts are open, and its mode is one that lanes know.
+  pure logical function structure_flies(flow, moving, state) result(flies)
+    type(lane_flow_t), intent(in) :: flow
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    integer :: j, key, bit
+    flies = state%q(1) - state%q(1) == 0
+    key = 0
+    bit = 0
+    do j = 1, size(moving%machine%joints)
+      select case (moving%machine%joints(j)%kind)
+      case (joint_contact)
+        flies = flies .and. state%phase(j) == 0
+      case (joint_friction)
+        if (state%phase(j) == 0) key = ibset(key, bit)
+        bit = bit + 1
+      end select
+    end do
+    flies = flies .and. flow%structure%mode(key + 1)%known > 0
+  end function structure_flies
+
+  !> The lanes can be captured by attractor number `attractor` near its `point` (coordinates, speeds): where the square of the
+  !> distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`.
+  pure subroutine add_structure_region(batch, attractor, point, scale, metric, reach)
+    type(structure_batch_t), intent(inout) :: batch
+    integer, intent(in) :: attractor
+    real(wp), intent(in) :: point(:), scale(:), metric(:), reach
+    if (batch%regions == structure_regions) then
+      batch%complete = 0
+      return
+    end if
+    batch%regions = batch%regions + 1
+    associate (region => batch%region(batch%regions), n => size(point))
+      region = structure_region_t(attractor=real(attractor, wp), reach=reach)
+      region%point(:n) = point
+      region%stretch(:n) = 1/scale
+      region%metric(:size(metric)) = metric
+    end associate
+  end subroutine add_structure_region
+
+  !> Puts a structure into a lane, which will fly it to the section.
+  pure subroutine occupy_structure_lane(moving, lane, state, control, batch)
+    type(jointed_motion_t), intent(in) :: moving
+    integer, intent(in) :: lane
+    type(jointed_state_t), intent(in) :: state
+    type(lane_batch_t), intent(inout) :: control
+    type(structure_batch_t), intent(inout) :: batch
+    integer :: j
+    control%status(lane) = lane_fresh
+    control%until(lane) = moving%machine%period
+    associate (n => moving%machine%n)
+      batch%q(lane, :n) = state%q(:n)
+      batch%v(lane, :n) = state%v(:n)
+    end associate
+    batch%time(lane) = state%time
+    batch%left(lane) = 0
+    batch%rising(lane) = 0
+    do j = 1, size(moving%machine%joints)
+      batch%phase(lane, j) = state%phase(j)
+      if (state%left(j) == 0) cycle
+      ! A slide sets off from its lower limit; of two joints at their limits one is taken for an event just past.
+      batch%left(lane) = merge(-j, sign(j, state%left(j)), moving%machine%joints(j)%kind == joint_friction)
+    end do
+  end subroutine occupy_structure_lane
+
+  !> The structure in a lane: where it stopped, or at the start of the flight that is left to the event loop.
+  pure subroutine structure_lane_state(moving, batch, lane, state)
+    type(jointed_motion_t), intent(in) :: moving
+    type(structure_batch_t), intent(in) :: batch
+    integer, intent(in) :: lane
+    type(jointed_state_t), intent(inout) :: state
+    integer :: j
+    associate (n => moving%machine%n)
+      state%q(:n) = batch%q(lane, :n)
+      state%v(:n) = batch%v(lane, :n)
+    end associate
+    state%time = batch%time(lane)
+    do j = 1, size(moving%machine%joints)
+      state%phase(j) = nint(batch%phase(lane, j))
+      state%left(j) = 0
+      if (nint(abs(batch%left(lane))) == j) state%left(j) = nint(sign(1.0_wp, batch%left(lane)))
+    end do
+  end subroutine structure_lane_state
+
+  !> Moves what lanes count of structures beyond that of one body to a tally.
+  pure subroutine take_structure_counts(batch, lane, tally)
+    type(structure_batch_t), intent(inout) :: batch
+    integer, intent(in) :: lane
+    type(tally_t), intent(inout) :: tally
+    tally%sticks = tally%sticks + nint(batch%sticks(lane), kind(tally%sticks))
+    batch%sticks(lane) = 0
+  end subroutine take_structure_counts
+
+  !> Flies every occupied lane until it has stopped or is left to the event loop.
+  pure subroutine fly_structure_lanes(flow, control, batch)
+    type(lane_flow_t), intent(in) :: flow
+    type(lane_batch_t), intent(inout) :: control
+    type(structure_batch_t), intent(inout) :: batch
+    call separatrix_fly_structures(int(flow%width, c_int), flow%structure, control, batch)
+  end subroutine fly_structure_lanes
+
+end module structure_lanes

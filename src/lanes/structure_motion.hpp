@@ -1,0 +1,308 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// The motion of jointed structures between events, in lanes: sums of complex exponentials and harmonics; see
+// `structure_mode`.
+#ifndef SEPARATRIX_STRUCTURE_MOTION_HPP
+#define SEPARATRIX_STRUCTURE_MOTION_HPP
+
+#include "lane_elementary.hpp"
+#include "lane_types.hpp"
+#include "structure_types.hpp"
+
+namespace {
+
+const double unlimited = 1e300;
+
+// What the caller tells the lanes, and what they count for it; members of `lane_fields`.
+struct structure_control {
+  vec status, until, sections, budget, leaves, elapsed, captor, settled, flights, impacts, speed_sum,
+      last_speed;
+
+  template <class each> void exchange(lane_fields<double[lanes]> &f, int first, each move) {
+    move(f.status + first, status);
+    move(f.until + first, until);
+    move(f.sections + first, sections);
+    move(f.budget + first, budget);
+    move(f.leaves + first, leaves);
+    move(f.elapsed + first, elapsed);
+    move(f.captor + first, captor);
+    move(f.settled + first, settled);
+    move(f.flights + first, flights);
+    move(f.impacts + first, impacts);
+    move(f.speed_sum + first, speed_sum);
+    move(f.last_speed + first, last_speed);
+  }
+};
+
+// How much there is of everything, so that loops have their ends.
+template <int n, int t, int j, int w> struct fixed_size {
+  enum { coordinates = n, terms = t, joints = j, waves = w };
+  explicit fixed_size(const structure_machine &) {}
+};
+
+struct any_size {
+  int coordinates, terms, joints, waves;
+  explicit any_size(const structure_machine &m)
+      : coordinates(int(m.coordinates)), terms(0), joints(int(m.joints)), waves(int(m.waves)) {
+    for (const structure_mode &t : m.mode)
+      terms = t.terms > terms ? int(t.terms) : terms;
+  }
+};
+
+// A function of each joint, and its derivatives.
+struct outlook {
+  vec f[most_joints], f1[most_joints], f2[most_joints], f3[most_joints];
+};
+
+// Exponentials and harmonics at an instant.
+struct structure_bases {
+  vec re[most_terms], im[most_terms], cosine[most_waves], sine[most_waves];
+};
+
+// Lanes of one vector. After the fields: coefficients of the modes that they are in, times the amplitudes.
+struct structure_group {
+  structure_control c;
+  structure_fields<vec> s;
+  vec decay[most_terms], turn[most_terms], square[most_terms];
+  vec part_re[most_joints][most_terms], part_im[most_joints][most_terms];
+  vec swing_re[most_joints][most_waves], swing_im[most_joints][most_waves];
+  // Limits of the functions, bound on their sixth derivatives, mass that a joint feels.
+  vec constant[most_joints], low[most_joints], high[most_joints], sixth[most_joints], felt_mass[most_joints];
+  // Length of the panels [s], and what turns the exponentials and harmonics from one to the next.
+  vec panel;
+  structure_bases step;
+  // The functions at the start.
+  outlook first;
+};
+
+// The lanes of `among` that are in mode number `key`.
+template <class size>
+inline mask in_mode(const structure_machine &m, const size &z, int key, mask among,
+                    const structure_fields<vec> &s) {
+  int bit = 0;
+  for (int j = 0; j < z.joints; j++) {
+    if (m.joint[j].slides < 0.5)
+      continue;
+    mask sticks = s.phase[j] == 0.0;
+    among = among & (key >> bit & 1 ? sticks : ~sticks);
+    bit++;
+  }
+  return among;
+}
+
+inline int modes_of(const structure_machine &m) {
+  int modes = 1;
+  for (int j = 0; j < int(m.joints); j++)
+    modes *= m.joint[j].slides > 0.5 ? 2 : 1;
+  return modes;
+}
+
+// At least |re + i im|, at most 8 % more.
+inline vec size_above(vec re, vec im) {
+  re = magnitude(re);
+  im = magnitude(im);
+  return re + im - 0.5857864376269049 * pick(re < im, re, im);
+}
+
+// cos and sin of the harmonics where the first has `c` and `s`.
+template <class size> inline void set_waves(const size &z, vec c, vec s, structure_bases &b) {
+  vec cosine = c, sine = s;
+  for (int m = 0; m < z.waves; m++) {
+    b.cosine[m] = cosine;
+    b.sine[m] = sine;
+    vec next = cosine * c - sine * s;
+    sine = sine * c + cosine * s;
+    cosine = next;
+  }
+}
+
+template <class size>
+inline void harmonics_at(const structure_machine &m, const size &z, vec time, structure_bases &b) {
+  if (z.waves == 0)
+    return;
+  vec c, s;
+  sine_cosine(time * m.drive_frequency, s, c);
+  set_waves(z, c, s, b);
+}
+
+// `elapsed` after the start of the flight.
+template <class size>
+inline void bases_at(const structure_machine &m, const size &z, const structure_group &g, vec elapsed,
+                     structure_bases &b) {
+  LANE_COUNT(evaluations, vec_size);
+  for (int k = 0; k < z.terms; k++) {
+    vec sine, cosine, shrink = exponential(-g.decay[k] * elapsed);
+    sine_cosine(g.turn[k] * elapsed, sine, cosine);
+    b.re[k] = shrink * cosine;
+    b.im[k] = shrink * sine;
+  }
+  harmonics_at(m, z, g.s.start + elapsed, b);
+}
+
+// The functions of the joints with three derivatives, or with `fourth` one more.
+template <class size>
+inline void functions_at(const structure_machine &m, const size &z, const structure_group &g,
+                         const structure_bases &b, outlook &o, vec *fourth = nullptr) {
+  for (int j = 0; j < z.joints; j++) {
+    vec f = g.constant[j], f1 = {}, f2 = {}, f3 = {}, f4 = {};
+    for (int k = 0; k < z.terms; k++) {
+      vec y = g.part_re[j][k] * b.re[k] - g.part_im[j][k] * b.im[k];
+      vec across = g.part_re[j][k] * b.im[k] + g.part_im[j][k] * b.re[k];
+      vec twice = 2 * g.decay[k], y1 = -g.decay[k] * y - g.turn[k] * across;
+      vec y2 = -g.square[k] * y - twice * y1;
+      f += y;
+      f1 += y1;
+      f2 += y2;
+      vec y3 = -g.square[k] * y1 - twice * y2;
+      f3 += y3;
+      if (fourth)
+        f4 -= g.square[k] * y2 + twice * y3;
+    }
+    for (int n = 0; n < z.waves; n++) {
+      double w = (n + 1) * m.drive_frequency, w2 = w * w;
+      vec part = g.swing_re[j][n] * b.cosine[n] - g.swing_im[j][n] * b.sine[n];
+      vec slope = g.swing_re[j][n] * b.sine[n] + g.swing_im[j][n] * b.cosine[n];
+      f += part;
+      f1 -= w * slope;
+      f2 -= w2 * part;
+      f3 += (w2 * w) * slope;
+      if (fourth)
+        f4 += (w2 * w2) * part;
+    }
+    o.f[j] = f;
+    o.f1[j] = f1;
+    o.f2[j] = f2;
+    o.f3[j] = f3;
+    if (fourth)
+      fourth[j] = f4;
+  }
+}
+
+// What a joint adds to `still` and `level`: its direction, or its coordinate where it is held.
+inline vec pull_of(const structure_fields<vec> &s, int j) {
+  return pick(s.phase[j] == 0.0, s.held[j], s.phase[j]);
+}
+
+// The lanes of `among`, whose bases are `b`: coordinates and speeds.
+template <class size>
+inline void place_at(const structure_machine &m, const size &z, mask among, const structure_fields<vec> &s,
+                     const vec (&re)[most_terms], const vec (&im)[most_terms], const structure_bases &b,
+                     vec (&q)[most_coordinates], vec (&v)[most_coordinates]) {
+  for (int key = 0; key < modes_of(m); key++) {
+    mask in = in_mode(m, z, key, among, s);
+    if (!any(in))
+      continue;
+    const structure_mode &t = m.mode[key];
+    for (int i = 0; i < z.coordinates; i++) {
+      vec place = t.still[i], speed = {};
+      for (int j = 0; j < z.joints; j++)
+        if (m.joint[j].slides > 0.5)
+          place += t.still_by_joint[j][i] * pull_of(s, j);
+      for (int n = 0; n < z.waves; n++) {
+        place += t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
+        speed -=
+            ((n + 1) * m.drive_frequency) * (t.wave_re[n][i] * b.sine[n] + t.wave_im[n][i] * b.cosine[n]);
+      }
+      for (int k = 0; k < z.terms; k++) {
+        place += t.shape_re[k][i] * re[k] - t.shape_im[k][i] * im[k];
+        double pace_re = -t.decay[k] * t.shape_re[k][i] - t.turn[k] * t.shape_im[k][i];
+        double pace_im = t.turn[k] * t.shape_re[k][i] - t.decay[k] * t.shape_im[k][i];
+        speed += pace_re * re[k] - pace_im * im[k];
+      }
+      put(q[i], in, place);
+      put(v[i], in, speed);
+    }
+  }
+}
+
+// The coefficients of the flights of the lanes `changed`, from their amplitudes and phases.
+template <class size>
+inline void enter_modes(const structure_machine &m, const size &z, mask changed, structure_group &g) {
+  for (int key = 0; key < modes_of(m); key++) {
+    mask in = in_mode(m, z, key, changed, g.s);
+    if (!any(in))
+      continue;
+    const structure_mode &t = m.mode[key];
+    vec amplitude[most_terms], steepest = {};
+    for (int k = 0; k < z.terms; k++) {
+      double square = t.decay[k] * t.decay[k] + t.turn[k] * t.turn[k];
+      put(g.decay[k], in, t.decay[k]);
+      put(g.turn[k], in, t.turn[k]);
+      put(g.square[k], in, square);
+      amplitude[k] = size_above(g.s.re[k], g.s.im[k]);
+    }
+    for (int j = 0; j < z.joints; j++) {
+      const structure_joint &joint = m.joint[j];
+      const bool slides = joint.slides > 0.5;
+      mask moves = g.s.phase[j] != 0.0;
+      vec d = pick(moves, g.s.phase[j], 1), swing = t.steady[j], sixth = t.steady_sixth[j],
+          level = t.level[j];
+      for (int k = 0; k < z.terms; k++) {
+        double square = t.decay[k] * t.decay[k] + t.turn[k] * t.turn[k];
+        vec share = t.part_size[k][j] * amplitude[k];
+        swing += share;
+        sixth += (square * square * square) * share;
+        put(g.part_re[j][k], in, d * (t.part_re[k][j] * g.s.re[k] - t.part_im[k][j] * g.s.im[k]));
+        put(g.part_im[j][k], in, d * (t.part_re[k][j] * g.s.im[k] + t.part_im[k][j] * g.s.re[k]));
+      }
+      for (int n = 0; n < z.waves; n++) {
+        put(g.swing_re[j][n], in, d * t.swing_re[n][j]);
+        put(g.swing_im[j][n], in, d * t.swing_im[n][j]);
+      }
+      for (int i = 0; i < z.joints; i++)
+        if (m.joint[i].slides > 0.5)
+          level += t.level_by_joint[j][i] * pull_of(g.s, i);
+      put(g.constant[j], in, d * level);
+      put(g.sixth[j], in, sixth);
+      put(g.felt_mass[j], in, t.felt_mass[j]);
+      put(g.low[j], in, slides ? pick(moves, 0, -joint.upper) : vec(joint.lower));
+      put(g.high[j], in, slides ? pick(moves, unlimited, joint.upper) : vec(joint.upper));
+      vec ratio = sixth / (swing + 1e-300);
+      put(steepest, ratio > steepest, ratio);
+    }
+    // The longest that will do.
+    mask fits = in;
+    for (int l = panel_lengths - 1; l >= 0; l--) {
+      fits = fits & (steepest <= m.steepest[l]);
+      if (!any(fits))
+        break;
+      put(g.panel, fits, m.panel[l]);
+      for (int k = 0; k < z.terms; k++) {
+        put(g.step.re[k], fits, t.step_re[l][k]);
+        put(g.step.im[k], fits, t.step_im[l][k]);
+      }
+      for (int n = 0; n < z.waves; n++) {
+        put(g.step.cosine[n], fits, m.step_cosine[l][n]);
+        put(g.step.sine[n], fits, m.step_sine[l][n]);
+      }
+    }
+  }
+}
+
+inline void put_outlook(int joints, mask where, const outlook &from, outlook &o) {
+  for (int j = 0; j < joints; j++) {
+    put(o.f[j], where, from.f[j]);
+    put(o.f1[j], where, from.f1[j]);
+    put(o.f2[j], where, from.f2[j]);
+    put(o.f3[j], where, from.f3[j]);
+  }
+}
+
+// The functions where the flights of the lanes `in` start.
+template <class size>
+inline void look_from_start(const structure_machine &m, const size &z, mask in, structure_group &g) {
+  structure_bases b;
+  outlook o;
+  for (int k = 0; k < z.terms; k++) {
+    b.re[k] = 1;
+    b.im[k] = {};
+  }
+  harmonics_at(m, z, g.s.start, b);
+  functions_at(m, z, g, b, o);
+  put_outlook(z.joints, in, o, g.first);
+}
+
+} // namespace
+
+#endif

@@ -1,0 +1,119 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// What the kernel for jointed structures and its caller share beside `lane_types.hpp`. `structure_types.f90`
+// mirrors these structures member by member.
+#ifndef SEPARATRIX_STRUCTURE_TYPES_HPP
+#define SEPARATRIX_STRUCTURE_TYPES_HPP
+
+enum {
+  lanes_of_structures = 16,
+  most_coordinates = 8,
+  most_terms = 16,
+  most_joints = 4,
+  // Dry friction joints, and the modes that they make: stuck or not.
+  most_sliders = 2,
+  most_structure_modes = 4,
+  most_waves = 8,
+  panel_lengths = 4,
+  most_section = 2 * most_coordinates,
+  metric_numbers = most_section * (most_section + 1) / 2,
+  most_structure_regions = 64
+};
+
+// One mode of a structure: which of its friction joints stick. With E(k) = exp((-decay + i turn) t), complex
+// amplitudes a(k) and W(m) = exp(i m Omega t)
+//   q = still + Re sum shape a E + Re sum wave W,
+// and of every joint one function: its coordinate (an open contact), its sliding speed, the force that holds
+// it,
+//   f = level + Re sum part a E + Re sum swing W.
+// `still` and `level` are sums over the directions of the sliding joints and the coordinates of those held.
+struct structure_mode {
+  double known, terms;
+  double decay[most_terms], turn[most_terms];
+  // Amplitudes from q - still - Re sum wave W and its rate.
+  double from_place_re[most_coordinates][most_terms], from_place_im[most_coordinates][most_terms];
+  double from_speed_re[most_coordinates][most_terms], from_speed_im[most_coordinates][most_terms];
+  double shape_re[most_terms][most_coordinates], shape_im[most_terms][most_coordinates];
+  double wave_re[most_waves][most_coordinates], wave_im[most_waves][most_coordinates];
+  double still[most_coordinates], still_by_joint[most_joints][most_coordinates];
+  double part_re[most_terms][most_joints], part_im[most_terms][most_joints],
+      part_size[most_terms][most_joints];
+  double swing_re[most_waves][most_joints], swing_im[most_waves][most_joints];
+  double level[most_joints], level_by_joint[most_joints][most_joints];
+  // Bounds on what the waves have in the functions and their sixth derivatives.
+  double steady[most_joints], steady_sixth[most_joints];
+  // The exponentials over panels.
+  double step_re[panel_lengths][most_terms], step_im[panel_lengths][most_terms];
+  // Mass that a sliding joint feels with the others as they are [kg].
+  double felt_mass[most_joints];
+};
+
+struct structure_joint {
+  // 1: dry friction, 0: rigid contact.
+  double slides;
+  // Stops [m], or break-away level [N].
+  double upper, lower;
+  double has_upper, has_lower;
+  double kinetic;
+  // Room for rounding, in the unit of the limits.
+  double tie;
+  // Sliding takes no less force than holding.
+  double even;
+  double restitution;
+  double row[most_coordinates];
+  // Change of the speeds, and of the sliding speeds of the joints, per impulse that changes its own speed by
+  // 1 m/s.
+  double kick[most_coordinates], cross[most_joints];
+};
+
+struct structure_machine {
+  double coordinates, joints, waves;
+  double drive_frequency, period, domain;
+  // A step of the root search shorter than this [s] is the last.
+  double close;
+  // Lengths of panels, longest first [s]; how large the sixth derivative of a function may be, in its own
+  // size [1/s^6]; the harmonics over them.
+  double panel[panel_lengths], steepest[panel_lengths];
+  double step_cosine[panel_lengths][most_waves], step_sine[panel_lengths][most_waves];
+  // Sliding speeds below this are left to the scalar code [m/s].
+  double slowest;
+  // Share of the change of a gap's acceleration up to which its chatter is completed, and the longest end of
+  // a chatter [s].
+  double chatter_share, chatter_time;
+  // Impacts after a flight shorter than this [s] are left to the scalar code.
+  double burst_gap;
+  structure_joint joint[most_joints];
+  structure_mode mode[most_structure_modes];
+};
+
+// One member per quantity: T is an array over lanes, or the part of it that is in a register.
+template <class T> struct structure_fields {
+  // The state that the scalar code would go on from; `left`: number of the joint whose guard has just been
+  // zero there, with the sign of its side, 0 = none; `rising`: that of the joint that has just given way.
+  T q[most_coordinates], v[most_coordinates], time, left, rising;
+  // Friction: direction of the slide, 0 = sticks. Of contacts 0.
+  T phase[most_joints];
+  // The flight: start [s after the section], amplitudes, coordinates of the joints held.
+  T start, re[most_terms], im[most_terms], held[most_joints];
+  // What ends it: 1 = found, when, joint (1, ...; 0 = none, the flight goes on), side; amplitudes then;
+  // functions of the joints and their rates then.
+  T found, span, joint, side, end_re[most_terms], end_im[most_terms], end_f[most_joints], end_f1[most_joints];
+  // Counted like those of `lane_fields`.
+  T sticks;
+};
+
+// The neighbourhood of a point of an attractor on the section, in the coordinates q, v.
+struct structure_region {
+  double attractor, reach;
+  double point[most_section], stretch[most_section], metric[metric_numbers];
+};
+
+struct structure_batch {
+  structure_fields<double[lanes_of_structures]> fields;
+  // Unless the regions are all, every lane stops at every section.
+  int regions, complete;
+  structure_region region[most_structure_regions];
+};
+
+#endif

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured forces on bodies of several: a record is one period, by its harmonics."""
+
+import h5py
+import numpy as np
+import pytest
+from program import run, succeed
+
+CASE = """\
+[body.first]
+mass = 1
+[body.second]
+mass = 0.5
+[spring.ground]
+between = ["first"]
+stiffness = 4
+damping = 0.3
+[spring.between]
+between = ["first", "second"]
+stiffness = 2
+damping = 0.1
+[contact.stop]
+between = ["second"]
+law = "newton"
+restitution = 0.7
+upper = 0.6
+[drive.shaker]
+law = "force"
+body = "first"
+{drive}
+[run]
+duration = 30
+window = 10
+average = "window"
+"""
+STEP, SAMPLES = 0.05, 80
+
+
+def _write(folder, force):
+    rows = "".join(f"{float(k * STEP)!r},{float(value)!r}\n" for k, value in enumerate(force))
+    (folder / "force.csv").write_text("# a shaker\nt,force\n" + rows)
+
+
+def test_a_record_is_its_harmonics(separatrix, tmp_path):
+    """The same motion as that of the series which the record samples."""
+    angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    _write(tmp_path, 0.2 + np.cos(angle) - 0.5 * np.sin(2 * angle) + 0.25 * np.cos(7 * angle))
+    series = f"frequency = {2 * np.pi / (STEP * SAMPLES)!r}\nmean = 0.2\n"
+    series += "cosine = [1, 0, 0, 0, 0, 0, 0.25]\nsine = [0, -0.5]"
+    motions = []
+    for drive in ('record = "force.csv"', series):
+        (tmp_path / "case.toml").write_text(CASE.format(drive=drive))
+        succeed(separatrix, "trajectory", "case.toml", "--force", "-o", "motion.h5", folder=tmp_path)
+        with h5py.File(tmp_path / "motion.h5") as file:
+            motions.append((file["event_time"][:], file["second_x"][:]))
+    assert len(motions[0][0]) > 5
+    assert motions[0][0] == pytest.approx(motions[1][0], abs=1e-9)
+    assert motions[0][1] == pytest.approx(motions[1][1], abs=1e-9)
+
+
+def test_what_is_refused(separatrix, tmp_path):
+    """What the harmonics leave is told; a record is not beside a series, and has to be there."""
+    _write(tmp_path, np.where(np.arange(SAMPLES) == 3, 1.0, 0.0))
+
+    def said(drive):
+        (tmp_path / "case.toml").write_text(CASE.format(drive=drive))
+        outcome = run(separatrix, "trajectory", "case.toml", "--force", folder=tmp_path)
+        assert outcome.code in (65, 66)
+        return outcome.err
+
+    assert "'drive.shaker.record': found a record of which 32 harmonics leave 4" in said(
+        'record = "force.csv"'
+    )
+    assert "'drive.shaker.mean': found beside a record" in said('record = "force.csv"\nmean = 1')
+    assert "nowhere.csv" in said('record = "nowhere.csv"')
+    (tmp_path / "case.toml").write_text(CASE.format(drive='record = "force.csv"\nharmonics = 8'))
+    succeed(separatrix, "trajectory", "case.toml", "--force", folder=tmp_path)

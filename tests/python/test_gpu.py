@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Maps by the kernel of a GPU, compiled for the host: those of the processor; and what may go wrong."""
+
+import importlib.machinery
+import importlib.util
+import subprocess
+from pathlib import Path
+
+import h5py
+import pytest
+from program import KINDS, differences, run, succeed
+
+ON_GPU = ["--device", "gpu"]
+STRANGE = {
+    "duration": ["--set", 'run.stop="duration"', "--set", "run.duration=20"],
+    "soft": [
+        *("--set", 'contact={law="kelvin_voigt", stiffness=1e4, damping=20, upper="1.1 m"}'),
+        *("--set", "grid.tile=[7, 31]"),
+    ],
+    "cubic": ["--set", "effect={cubic_spring={stiffness=20}}", "--set", "run.duration=20"],
+}
+FAULTY_CALLS = [1, 2, 5, 9, 14, 15, 16, 18, 19, 21, 30, 60]
+
+
+@pytest.fixture
+def on_host(monkeypatch):
+    """Two GPUs, which are the host."""
+    monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "2")
+
+
+@pytest.mark.parametrize("kind", ["map", "stack", "refined", "points", "sweep"])
+def test_the_device_does_not_matter(separatrix, tmp_path, results, on_host, kind):
+    output = tmp_path / "gpu.h5"
+    said = succeed(separatrix, *KINDS[kind], *ON_GPU, "-o", output, folder=results["map"].parent)
+    assert "computed by GPU 0 (stand-in on the host, for tests)" in said.out
+    assert differences(results[kind], output) == []
+    with h5py.File(output) as file:
+        assert file["provenance"].attrs["device"].startswith("GPU 0")
+    with h5py.File(results[kind]) as file:
+        assert file["provenance"].attrs["device"].startswith("processor, vectors of ")
+
+
+@pytest.mark.parametrize("case", STRANGE)
+def test_nor_does_it_for_other_machines_and_spans(separatrix, tmp_path, results, on_host, case):
+    for device in ("cpu", "gpu"):
+        command = [*KINDS["map"], *STRANGE[case], "--device", device, "-o", tmp_path / f"{device}.h5"]
+        succeed(separatrix, *command, folder=results["map"].parent)
+    assert differences(tmp_path / "cpu.h5", tmp_path / "gpu.h5") == []
+
+
+def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_host):
+    output = tmp_path / "gpu.h5"
+    command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    said = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
+    assert "computed by rank 0: GPU 0, 1: GPU 1, 2: GPU 0" in said.out
+    assert differences(results["map"], output) == []
+
+
+def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, results):
+    output = tmp_path / "mixed.h5"
+    program = [mpi_separatrix, *KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    mixed = ["-n", "1", "-x", "SEPARATRIX_GPU_ON_HOST=1", *program, ":", "-n", "1", *program]
+    ended = subprocess.run(
+        ["mpirun", *mixed], cwd=results["map"].parent, capture_output=True, text=True, check=True, timeout=60
+    )
+    assert "computed by rank 0: GPU 0, 1: processor" in ended.stdout
+    assert differences(results["map"], output) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ([], "--device gpu: found no GPU on "),
+        (["--set", 'integrator.lanes="off"'], "found a machine that only a processor flies"),
+    ],
+)
+def test_a_gpu_that_cannot_help_is_refused(separatrix, results, monkeypatch, more, words):
+    monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "0")
+    ended = run(separatrix, *KINDS["map"], *ON_GPU, *more, "-o", "none.h5", folder=results["map"].parent)
+    assert ended.code == 64
+    assert words in ended.err
+    assert "allowed are auto and cpu" in ended.err
+    assert not (results["map"].parent / "none.h5.part").exists()
+
+
+def test_other_devices_are_refused(separatrix, results):
+    ended = run(separatrix, *KINDS["map"], "--device", "tpu", folder=results["map"].parent)
+    assert ended.code == 64
+    assert "--device: found 'tpu', allowed is auto, cpu, gpu" in ended.err
+    ended = run(separatrix, "trajectory", "case.toml", *ON_GPU, folder=results["map"].parent)
+    assert ended.code == 64
+    assert "--device belongs to the commands basin, sweep, points" in ended.err
+
+
+@pytest.mark.parametrize("call", FAULTY_CALLS)
+def test_a_gpu_that_fails_leaves_a_file_to_go_on_with(
+    separatrix, tmp_path, results, on_host, monkeypatch, call
+):
+    """From that call on every one fails, as CUDA's do."""
+    output = tmp_path / "map.h5"
+    command = [*KINDS["map"], "--set", "grid.tile=[4, 31]", "-o", output]
+    with monkeypatch.context() as fault:
+        fault.setenv("SEPARATRIX_GPU_FAULT", str(call))
+        ended = run(separatrix, *command, *ON_GPU, folder=results["map"].parent)
+    assert ended.code == 75
+    assert "GPU 0: cuda" in ended.err
+    assert "failure made for a test (CUDA error 719)" in ended.err
+    assert "with --resume (without --force) goes on, with --device cpu without a GPU" in ended.err
+    assert not output.exists()
+    said = succeed(separatrix, *command, "--resume", "--device", "cpu", folder=results["map"].parent)
+    assert " of 5 tiles were done before" in said.out
+    assert differences(results["map"], output) == []
+
+
+def test_a_run_goes_on_with_the_tiles_of_a_gpu(separatrix, tmp_path, results, on_host, monkeypatch):
+    """They are larger where the case leaves them open; the processor takes them as they are."""
+    larger = ["--set", "axis[1].count=70", "--set", "axis[2].count=90", "--set", "run.duration=10"]
+    command = [*KINDS["map"], *larger, "-o", tmp_path / "map.h5"]
+    with monkeypatch.context() as fault:
+        fault.setenv("SEPARATRIX_GPU_FAULT", "70")
+        assert run(separatrix, *command, *ON_GPU, folder=results["map"].parent).code == 75
+    succeed(separatrix, *command, "--resume", "--device", "cpu", folder=results["map"].parent)
+    succeed(separatrix, *command[:-1], tmp_path / "cpu.h5", "--device", "cpu", folder=results["map"].parent)
+    assert differences(tmp_path / "map.h5", tmp_path / "cpu.h5") == []
+    with h5py.File(tmp_path / "map.h5") as file, h5py.File(tmp_path / "cpu.h5") as reference:
+        assert file["tiles/tile_shape"][0] > reference["tiles/tile_shape"][0]
+
+
+@pytest.fixture(scope="module")
+def check(source_dir: Path):
+    """The script that reads the code for GPUs, as a module."""
+    path = str(source_dir / "scripts" / "gpu_check")
+    loader = importlib.machinery.SourceFileLoader("gpu_check", path)
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("gpu_check", loader))
+    loader.exec_module(module)
+    return module
+
+
+def test_what_is_fused_or_approximate_is_found(check):
+    exact = "\tmul.rn.f64 %fd1, %fd2, %fd3;\n\t@%p1 add.rn.f64 %fd1, %fd2, %fd3;\n\tneg.f64 %fd1, %fd2;\n"
+    assert check.faults_of_ptx(exact + "\tsetp.lt.f64 %p1, %fd1, %fd2;\n\tmov.f64 %fd1, 0d0;\n") == []
+    assert check.faults_of_ptx(exact + "\tfma.rn.f64 %fd1, %fd2, %fd3, %fd4;\n") == ["1 fma.rn.f64"]
+    assert check.faults_of_ptx("\tadd.f64 %fd1, %fd2, %fd3;\n") == ["1 add.f64"]
+    assert check.faults_of_ptx("\tdiv.approx.f32 %f1, %f2, %f3;\n") == ["1 div.approx.f32"]
+
+
+def test_fused_operations_of_divisions_are_told_from_others(check):
+    code = (
+        "\t\tFunction : _Z1kN6flightE0EE\n        /*0040*/                   MUFU.RCP64H R3, R0 ;\n"
+        "        /*0070*/              @!P0 DFMA R4, R2, -R6, 1 ;\n        /*0080*/     DMUL R4, R4, R4 ;\n"
+    )
+    kernels = check.operations_of_code(code)
+    assert [check.flight_of(name) for name in kernels] == ["plain"]
+    assert check.fused(next(iter(kernels.values()))) == (1, 1)
+
+
+def test_the_benchmark_measures_nothing_without_a_gpu(source_dir, separatrix, build_dir, tmp_path, on_host):
+    """Not even the stand-in's time, which would be no figure of a GPU."""
+    command = [source_dir / "scripts" / "bench", "--gpu", "--build", build_dir, "-o", tmp_path / "page.md"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert "no GPU: nothing was measured, no page was written" in ended.stdout
+    assert not (tmp_path / "page.md").exists()
+
+
+def test_the_page_of_the_benchmark(source_dir, separatrix, tmp_path, on_host, monkeypatch):
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    import gpu
+
+    runs = gpu.Runs(separatrix, tmp_path, 1)
+    rows = gpu.measure(runs, (4, 8, 12), 1, ("coulomb", "cubic"))
+    assert len(rows) == 4
+    assert all(row.endswith("| the same |") for row in rows)
+    page = gpu.page(rows, gpu.largest_map(runs, 12), gpu.device_of(runs), runs)
+    assert "| computed by | GPU 0 (stand-in on the host, for tests); 1 ranks" in page
+    assert "12 x 12 starts" in page
