@@ -6,64 +6,39 @@
 !> touch the boundary, its stable set: a boundary crisis where all of them reach it then (C. Grebogi, E. Ott, J. A. Yorke,
 !> Physica D 7 (1983)). Only the forward map is used, so that grazes, sticking and completed chatters do no harm.
 module homoclinic
-  use body_family, only: body_neighbourhood, family_t
+  use beside_saddle, only: all_reach, arrives, beside_t, cycle_points_t, is_chaotic, least_growth, none_reach, not_known, &
+    set_beside, settle, some_reach, verdict_of
+  use body_family, only: family_t
   use branch_point, only: point_t
-  use errors, only: error_t
   use kinds, only: wp
-  use motion, only: advance_period, start_state
-  use motion_state, only: state_t, tally_t
-  use one_body, only: one_body_t
-  use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance
-  use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: find_contacts
+  public :: find_contacts, put_in_order
 
-  !> Points of a branch that are looked at, and starts on a side there.
-  integer, parameter :: most_looks = 30, most_starts = 12
+  !> Points of a branch that are looked at.
+  integer, parameter :: most_looks = 30
   !> Points further on that are taken where the starts at one were too few.
   integer, parameter :: most_further = 2
   !> Starts at a value where the contact is looked for, and so many times more where none is to arrive.
   integer, parameter :: sure_starts = 32, many = 4
   integer, parameter, public :: starts_that_stay = many*sure_starts
-  !> Of natural sizes: distance of the starts from the saddle, at which a motion has come to an attractor, and of its return.
-  real(wp), parameter :: first_step = 1e-3_wp, capture = 1e-4_wp, settled = 1e-9_wp
-  !> Least multiplier above 1 of a saddle whose starts leave it in a reasonable time.
-  real(wp), parameter :: least_growth = 1e-2_wp
-  integer, parameter :: longest_period = 12
   !> Near the contact arrivals are rare: further halving would tell where they are too rare to be seen.
   integer, parameter :: halvings = 10
   !> Where a chaotic transient is to end, it may take so many times longer than what settles at once.
   integer, parameter :: long_wait = 20
-  !> What the starts of a side do: none reaches the attractor of the other side, some, all, or it is not known.
-  integer, parameter :: not_known = 0, none_reach = 1, some_reach = 2, all_reach = 3
 
   type, public :: contact_t
     !> The contact is behind this point of the branch.
     integer :: after = 0
     !> Values of the parameter where some starts of the side reach the attractor of the other, and where none does.
     real(wp) :: reach = 0, stay = 0
-    !> Whether all of them reach it beyond, and none has a period before; period of the attractor that they reach.
+    !> Whether all of them reach it beyond, and their motion is chaotic before; period of the attractor that they reach.
     logical :: crisis = .false.
     integer :: period = 0
     !> Section point of the saddle there.
     real(wp) :: y(2) = 0
   end type contact_t
-
-  !> The starts beside the saddle at a value of the parameter.
-  type :: beside_t
-    type(one_body_t) :: body
-    type(saddle_t) :: saddle
-    real(wp) :: direction(2) = 0, growth = 1
-    !> Turns of the orbit in which a start leaves the saddle and settles.
-    integer :: turns = 0
-  end type beside_t
-
-  !> Points of an attractor, period by period; none: not settled.
-  type :: cycle_points_t
-    real(wp), allocatable :: points(:, :)
-  end type cycle_points_t
 
   !> A contact that is narrowed down: what was seen at the last value.
   type :: hunt_t
@@ -116,7 +91,36 @@ contains
         contacts = [contacts, contact]
       end do
     end do
+    call put_in_order(line, contacts)
   end subroutine find_contacts
+
+  !> Puts contacts in the order of the points of a line, those behind one point by their distance from it.
+  pure subroutine put_in_order(line, contacts)
+    type(point_t), intent(in) :: line(:)
+    type(contact_t), intent(inout) :: contacts(:)
+    type(contact_t) :: moved
+    integer :: i, k
+    do i = 2, size(contacts)
+      moved = contacts(i)
+      do k = i - 1, 1, -1
+        if (.not. comes_before(moved, contacts(k))) exit
+        contacts(k + 1) = contacts(k)
+      end do
+      contacts(k + 1) = moved
+    end do
+
+  contains
+
+    pure logical function comes_before(one, other)
+      type(contact_t), intent(in) :: one, other
+      comes_before = one%after < other%after
+      if (one%after /= other%after) return
+      associate (value => line(one%after)%orbit%parameter)
+        comes_before = abs(one%reach - value) < abs(other%reach - value)
+      end associate
+    end function comes_before
+
+  end subroutine put_in_order
 
   !> Points of a branch where it is a saddle whose sides stay apart: the ends of each such piece, and others spread evenly.
   pure function places_to_look(line) result(looks)
@@ -143,38 +147,6 @@ contains
     end associate
   end function is_directed
 
-  !> The saddle near `guess` at a value of the parameter, and its unstable direction on the side of `along`.
-  subroutine set_beside(family, value, guess, periods, along, beside, ok)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: value, guess(2), along(2)
-    integer, intent(in) :: periods
-    type(beside_t), intent(out) :: beside
-    logical, intent(out) :: ok
-    type(neighbourhood_t) :: machines
-    type(error_t), allocatable :: error
-    real(wp) :: first(2), second(2)
-    call body_neighbourhood(family, value, machines, error)
-    ok = .not. allocated(error)
-    if (.not. ok) return
-    select type (body => machines%centre)
-    type is (one_body_t)
-      beside%body = body
-    end select
-    call find_saddle(machines, guess, periods, beside%saddle, ok)
-    if (ok) ok = distance_to_saddle(beside%body, beside%saddle, guess) < 0.1_wp
-    if (ok) ok = real(beside%saddle%multipliers(1)) > 1 + least_growth
-    if (.not. ok) return
-    beside%growth = real(beside%saddle%multipliers(1), wp)
-    associate (m => beside%saddle%matrix, sizes => beside%body%size_of)
-      first = [m(1, 2), beside%growth - m(1, 1)]
-      second = [beside%growth - m(2, 2), m(2, 1)]
-      if (norm2(second/sizes) > norm2(first/sizes)) first = second
-      beside%direction = first/norm2(first/sizes)
-      if (sum(beside%direction*along/sizes**2) < 0) beside%direction = -beside%direction
-    end associate
-    beside%turns = 100 + int(-2*log(first_step)/log(beside%growth))
-  end subroutine set_beside
-
   !> What the starts of both sides do.
   subroutine look(beside, verdicts)
     type(beside_t), intent(in) :: beside
@@ -190,80 +162,6 @@ contains
       verdicts(side) = verdict_of(beside, side, settles, beside%turns)
     end do
   end subroutine look
-
-  !> A start of a side.
-  pure function start_beside(beside, side, place) result(y)
-    type(beside_t), intent(in) :: beside
-    integer, intent(in) :: side
-    real(wp), intent(in) :: place
-    real(wp) :: y(2)
-    y = beside%saddle%points(:, 1) + merge(1, -1, side == 1)*first_step*beside%growth**place*beside%direction
-  end function start_beside
-
-  !> The periodic attractor that a start of a side settles on; no points: none.
-  pure subroutine settle(beside, side, settles)
-    type(beside_t), intent(in) :: beside
-    integer, intent(in) :: side
-    type(cycle_points_t), intent(out) :: settles
-    type(state_t) :: state
-    type(tally_t) :: tally
-    real(wp) :: y(2), points(2, 0:2*longest_period)
-    integer :: k, n, reason
-    allocate (settles%points(2, 0))
-    y = start_beside(beside, side, 0.37_wp)
-    state = start_state(beside%body%moving, y(1), y(2), 0.0_wp)
-    do k = 1, beside%turns*beside%saddle%periods + 2*longest_period
-      tally = tally_t()
-      call advance_period(beside%body%moving, state, tally, reason)
-      if (reason /= 0) return
-      n = k - beside%turns*beside%saddle%periods
-      if (n >= 0) points(:, n) = [state%x, state%v]
-    end do
-    do n = 1, longest_period
-      if (section_distance(beside%body, points(:, n), points(:, 0)) > settled) cycle
-      if (section_distance(beside%body, points(:, 2*n), points(:, n)) > settled) cycle
-      if (distance_to_saddle(beside%body, beside%saddle, points(:, 0)) < 10*first_step) return
-      settles%points = points(:, 1:n)
-      return
-    end do
-  end subroutine settle
-
-  !> Whether a start of a side comes to an attractor within `turns` of the orbit.
-  pure logical function arrives(beside, side, settles, place, turns)
-    type(beside_t), intent(in) :: beside
-    integer, intent(in) :: side, turns
-    type(cycle_points_t), intent(in) :: settles
-    real(wp), intent(in) :: place
-    type(state_t) :: state
-    type(tally_t) :: tally
-    real(wp) :: y(2)
-    integer :: j, k, reason
-    arrives = .false.
-    y = start_beside(beside, side, place)
-    state = start_state(beside%body%moving, y(1), y(2), 0.0_wp)
-    do k = 1, turns*beside%saddle%periods
-      tally = tally_t()
-      call advance_period(beside%body%moving, state, tally, reason)
-      if (reason /= 0) return
-      do j = 1, size(settles%points, 2)
-        arrives = section_distance(beside%body, [state%x, state%v], settles%points(:, j)) < capture
-        if (arrives) return
-      end do
-    end do
-  end function arrives
-
-  !> How many of some starts of a side, evenly spread, come to an attractor within `turns` of the orbit.
-  pure integer function verdict_of(beside, side, settles, turns) result(verdict)
-    type(beside_t), intent(in) :: beside
-    integer, intent(in) :: side, turns
-    type(cycle_points_t), intent(in) :: settles
-    logical :: there(most_starts)
-    integer :: i
-    there = [(arrives(beside, side, settles, (i - 0.5_wp)/most_starts, turns), i=1, most_starts)]
-    verdict = some_reach
-    if (.not. any(there)) verdict = none_reach
-    if (all(there)) verdict = all_reach
-  end function verdict_of
 
   !> The contact of a side on a piece of a branch between two of the points looked at, by halving. `verdicts` are those at its ends,
   !> `along` the direction at the first. `ok` is false if it is not to be had.
@@ -338,7 +236,7 @@ contains
     end do
   end subroutine try
 
-  !> Whether the starts of a side settle on no period where they stay, and at the value `beyond` all reach the attractor in the end.
+  !> Whether the starts of a side are chaotic where they stay, and at the value `beyond` all reach the attractor in the end.
   logical function is_crisis(family, line, stay, beyond, hunt)
     type(family_t), intent(in) :: family
     type(point_t), intent(in) :: line(:)
@@ -348,8 +246,7 @@ contains
     type(cycle_points_t) :: settles
     call set_beside(family, stay, guess_at(line, stay), line(1)%orbit%periods, hunt%along, beside, is_crisis)
     if (.not. is_crisis) return
-    call settle(beside, hunt%side, settles)
-    is_crisis = size(settles%points, 2) == 0
+    is_crisis = is_chaotic(beside, hunt%side)
     if (.not. is_crisis) return
     call set_beside(family, beyond, guess_at(line, beyond), line(1)%orbit%periods, hunt%along, beside, is_crisis)
     if (.not. is_crisis) return

@@ -109,7 +109,7 @@ contains
         if (unit /= '1') shown = shown//' '//unit
         shown = shown//': on the side of the first, starts on either side of the saddle reach the attractor of period '// &
           to_text(contact%period)//'; on that of the second none of '//to_text(starts_that_stay)//' on one side does'
-        if (contact%crisis) shown = shown//', and they settle on no period'
+        if (contact%crisis) shown = shown//', and their motion is chaotic'
         call session%journal%line('contact', '    '//shown, '"branch": '//to_text(branch)//', "parameter": '// &
           json_text(search%family%path)//', "reach": '//json_number(contact%reach)//', "stay": '//json_number(contact%stay)// &
           ', "crisis": '//trim(merge('true ', 'false', contact%crisis)))
