@@ -44,8 +44,8 @@ contains
       if (asked == 'gpu' .and. count == 0) call fail(error, exit_usage, '--device gpu: found no GPU on '//host_name()//why// &
                                                      '; allowed are auto and cpu')
     else if (asked == 'gpu') then
-      call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several bodies); '// &
-                'allowed are auto and cpu')
+      call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several '// &
+                'bodies); allowed are auto and cpu')
     end if
     if (count > 0) call use_gpu(modulo(place, count))
   end subroutine choose_device
