@@ -21,6 +21,8 @@ module exponents
   integer, parameter, public :: batches = 32
   !> Frequencies of the 0-1 test.
   integer, parameter :: frequencies = 100
+  !> Periods in which a direction turns to where it grows most.
+  integer, parameter :: aligning = 100
 
   !> What a motion may be.
   integer, parameter, public :: motion_not_known = 0, motion_contracting = 1, motion_neutral = 2, motion_chaotic = 3, &
@@ -76,9 +78,9 @@ contains
       call open_log(log, 0.0_wp)
       log%book%kept = .false.
       spectrum%has_sum = has_exact_sum(body)
-      call fly_to_section(body, state, log, spectrum%known)
+      call fly_on(body, state, log, transient - aligning, spectrum%known)
       if (.not. spectrum%known) return
-      do i = 1 - transient, periods
+      do i = 1 - min(transient, aligning), periods
         call vary_period(machines, body, state, log, events, by_start, spectrum%known)
         if (.not. spectrum%known) return
         ! In units in which both coordinates are alike.
@@ -109,19 +111,25 @@ contains
     spectrum%mean_period = machines%centre%period
   end subroutine lyapunov_exponents
 
-  !> Moves a body that starts at another crank angle on to the first section.
-  subroutine fly_to_section(body, state, log, ok)
+  !> Moves a body that starts at another crank angle on to the first section, and from there over `periods`, if any.
+  subroutine fly_on(body, state, log, periods, ok)
     type(one_body_t), intent(in) :: body
     type(state_t), intent(inout) :: state
     type(log_t), intent(inout) :: log
+    integer, intent(in) :: periods
     logical, intent(out) :: ok
     type(tally_t) :: tally
-    integer :: reason
+    integer :: i, reason
     ok = .true.
-    if (.not. state%time > 0) return
-    call advance_period(body%moving, state, tally, reason, log)
-    ok = reason == 0
-  end subroutine fly_to_section
+    do i = merge(0, 1, state%time > 0), max(0, periods)
+      tally = tally_t()
+      log%events = 0
+      log%origin = 0
+      call advance_period(body%moving, state, tally, reason, log)
+      ok = reason == 0
+      if (.not. ok) return
+    end do
+  end subroutine fly_on
 
   !> Whether an event leaves less of the start than came to it: sticking and an impact without rebound one direction, completed
   !> chatter none.

@@ -76,7 +76,8 @@ contains
         k = zero_one_test(section)
         call report(session, spectrum, machines%centre%has_clock, k)
       else
-        call session%journal%line('not_known', 'not known: the motion was given up, or met an event tangentially')
+        call session%journal%line('not_known', 'not known: the motion was given up, met an event tangentially, '// &
+                                  'or rests where nothing holds it')
       end if
     end if
     call session%end_with(exit_done)

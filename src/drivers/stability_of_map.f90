@@ -214,7 +214,7 @@ contains
       data = data//', "period": '//to_text(found%period)
     end if
     if (.not. found%spectrum%known) then
-      words = words//': the motion was given up, or met an event tangentially'
+      words = words//': the motion was given up, met an event tangentially, or rests where nothing holds it'
     else
       call add_numbers(found, words, data)
     end if

@@ -10,7 +10,7 @@ module body_family
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
   use motion, only: advance_period, motion_t, start_state
-  use motion_state, only: log_t, open_log, options_t, reset_tally, state_t, tally_t
+  use motion_state, only: log_t, mode_stick, open_log, options_t, reset_tally, state_t, tally_t
   use one_body, only: mode_of_body, one_body_of, one_body_t, why_not_varied
   use status, only: exit_bad_case
   use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
@@ -148,8 +148,7 @@ contains
     select type (body => machines%centre)
     type is (one_body_t)
       call fly_periods(body, point, periods, .false., image, events, mode, tally, ok)
-      ! At rest in an equilibrium, with nothing that holds it: its neighbours do not stick.
-      if (ok) ok = tally%sticks == 0 .or. holds(body)
+      if (ok) ok = .not. rests_unheld(body, mode, events)
       if (.not. ok) return
       call vary(machines, mode, point, events, periods*body%period, likeness*body%size_of*max(1, periods), by_start, ok, &
                 by_parameter)
@@ -159,15 +158,17 @@ contains
     end select
   end subroutine map_with_variation
 
-  !> Whether a body can stick: dry friction, or a barrier that it rests on.
-  pure logical function holds(body)
+  !> Whether the body comes to rest in an equilibrium where nothing holds it: its neighbours do not stick.
+  pure logical function rests_unheld(body, mode, events)
     type(one_body_t), intent(in) :: body
-    associate (machine => body%moving%machine)
-      holds = machine%friction%kinetic > 0 .or. machine%friction%break_away > 0 .or. machine%friction%excess > 0 .or. &
-        abs(machine%effects%asymmetric_coulomb) > 0 .or. machine%effects%upwards%count > 0 .or. &
-        min(machine%contact%upper, -machine%contact%lower) < huge(1.0_wp)
+    integer, intent(in) :: mode
+    type(event_t), intent(in) :: events(:)
+    associate (friction => body%moving%machine%friction, effects => body%moving%machine%effects)
+      rests_unheld = .not. (friction%kinetic > 0 .or. friction%break_away > 0 .or. friction%excess > 0 .or. &
+                            abs(effects%asymmetric_coulomb) > 0 .or. effects%upwards%count > 0)
     end associate
-  end function holds
+    rests_unheld = rests_unheld .and. any([mode, events%after] == mode_stick)
+  end function rests_unheld
 
   !> Flies a body from a section point over `periods` drive periods: where it then is, the mode in which it began, and the events
   !> on the way, with `collapsed` a completed chatter as one. `ok` is false if the trajectory had to be given up.
@@ -222,6 +223,8 @@ contains
     ok = reason == 0
     if (.not. ok) return
     call events_of_body(body, start, log, state, .false., events, mode)
+    ok = .not. rests_unheld(body, start%mode, events)
+    if (.not. ok) return
     call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok)
   end subroutine vary_period
 
