@@ -38,7 +38,7 @@ contains
     type(orbit_t), intent(out) :: other
     logical, intent(out) :: known
     type(link_t), allocatable :: chain(:)
-    integer :: at, k
+    integer :: at, k, back
     other = orbit
     call take_apart(machine, orbit, chain)
     known = .true.
@@ -52,9 +52,8 @@ contains
       chain = [chain(:at), contact(machine, margin), chain(at + 1:)]
     case (of_turning)
       chain(k)%event%kind = event_stick
-      associate (back => chain(k)%phase(margin%joint))
-        chain = [chain(:k), slide(margin%joint, back, margin%time), chain(k + 1:)]
-      end associate
+      back = chain(k)%phase(margin%joint)
+      chain = [chain(:k), slide(margin%joint, back, margin%time), chain(k + 1:)]
       chain(k)%phase(margin%joint) = 0
     case (of_stick)
       call take_stick_out(k, chain, known)

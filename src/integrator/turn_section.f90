@@ -22,7 +22,7 @@ module turn_section
     advance_body_to_turn, advance_jointed_to_turn
 
   !> Longest return to the section, in periods of the slowest mode: a belt may carry a body for long.
-  integer, parameter :: longest_return = 256
+  integer, parameter, public :: longest_return = 256
 
 contains
 

@@ -7,6 +7,7 @@ module structure_family
   use body_family, only: family_t, likeness, place_neighbour, share, sides_tried
   use build_motion, only: machine_of
   use errors, only: error_t, fail
+  use guarded_march, only: most_equations
   use guards, only: leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
   use hybrid_machine, only: event_t, most_states
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
@@ -21,6 +22,7 @@ module structure_family
   use status, only: exit_bad_case
   use structure, only: coordinates_of, count_joints, mode_number, phases_in, settle, state_in, structure_of, structure_t
   use transition_list, only: transition_t, transitions_t
+  use turn_section, only: longest_return
   use variations, only: neighbourhood_t, period_slope, vary
   implicit none
   private
@@ -30,9 +32,6 @@ module structure_family
 
   !> A section point as near as this, in natural sizes, to what a joint holds is held.
   real(wp), parameter :: held_within = 1e-10_wp
-  !> Longest return to an event section, in periods of the slowest mode.
-  integer, parameter :: longest_return = 256
-  integer, parameter :: joints_in_number = 13, most_marched = 16
 
 contains
 
@@ -45,10 +44,9 @@ contains
     why = ''
     trial = structure_of(moving, [1.0_wp, 1.0_wp])
     if (trial%n > most_states) why = 'it has too many coordinates'
-    if (trial%n > most_marched .and. (.not. moving%machine%linear .or. moving%options%flight == flight_adaptive)) then
+    if (trial%n > most_equations/2 .and. (.not. moving%machine%linear .or. moving%options%flight == flight_adaptive)) then
       why = 'it has too many coordinates for a law that is not linear'
     end if
-    if (count_joints(moving%machine) > joints_in_number) why = 'it has too many joints'
     do j = 1, count_joints(moving%machine)
       associate (joint => moving%machine%joints(j))
         if (joint%contact%by_impact .and. joint%kind == joint_soft) why = 'the damping of a contact is set by each impact'
