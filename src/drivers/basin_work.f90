@@ -9,7 +9,7 @@ module basin_work
   use grid, only: grid_t, point_slice, slice_period
   use kinds, only: int64, wp
   use point_columns, only: marks_of_attractor, settling_value
-  use point_work, only: point_work_t
+  use point_work, only: point_work_t, watch_t
   use refinement, only: last_origin
   use session, only: session_t
   use status, only: last_reason, reason_settled, reason_time_over
@@ -64,12 +64,14 @@ contains
     allocate (work%captured(work%offset(size(work%offset))), source=0_int64)
   end subroutine prepare_counts
 
-  subroutine compute_basin_points(self, index, values, error)
+  subroutine compute_basin_points(self, index, values, whole, error, watch)
     class(basin_work_t), intent(inout) :: self
     integer, intent(in) :: index(:, :)
     real(wp), intent(out) :: values(:, :)
+    logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
-    call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error)
+    class(watch_t), intent(inout), optional :: watch
+    call basin_points(self%grid, self%span, self%max_period, self%catalogues, index, self%cache, values, error, whole, watch)
   end subroutine compute_basin_points
 
   subroutine basin_points_from(self, index, points, error)

@@ -6,10 +6,11 @@ module point_work
   use errors, only: error_t
   use kinds, only: int64, wp
   use refinement, only: refine_t
+  use work_watch, only: watch_t
   implicit none
   private
 
-  public :: compute_list
+  public :: compute_list, watch_t
 
   type, abstract, public :: point_work_t
     integer :: variables = 0
@@ -33,13 +34,16 @@ module point_work
   end type point_work_t
 
   abstract interface
-    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis.
-    subroutine compute_points(self, index, values, error)
-      import :: error_t, point_work_t, wp
+    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Where this takes long the
+    !> watch is looked at on the way; `whole` is false if it says stop, and the values are void.
+    subroutine compute_points(self, index, values, whole, error, watch)
+      import :: error_t, point_work_t, watch_t, wp
       class(point_work_t), intent(inout) :: self
       integer, intent(in) :: index(:, :)
       real(wp), intent(out) :: values(:, :)
+      logical, intent(out) :: whole
       type(error_t), allocatable, intent(out) :: error
+      class(watch_t), intent(inout), optional :: watch
     end subroutine compute_points
 
     !> Counts a point that is done, computed now or read back after an interruption.
@@ -49,21 +53,6 @@ module point_work
       integer, intent(in) :: index(:)
       real(wp), intent(in) :: values(:)
     end subroutine note_point
-  end interface
-
-  !> Looks up between pieces of work.
-  type, abstract, public :: watch_t
-  contains
-    procedure(look_up), deferred :: look
-  end type watch_t
-
-  abstract interface
-    !> Whether to stop.
-    subroutine look_up(self, stop_now)
-      import :: watch_t
-      class(watch_t), intent(inout) :: self
-      logical, intent(out) :: stop_now
-    end subroutine look_up
   end interface
 
 contains
@@ -100,7 +89,8 @@ contains
     never_again = .true.
   end function never_again
 
-  !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch says stop.
+  !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch says stop before
+  !> the last of them.
   subroutine compute_list(work, index, values, whole, error, watch)
     class(point_work_t), intent(inout) :: work
     integer, intent(in) :: index(:, :)
@@ -117,13 +107,13 @@ contains
       call work%points_from(index(:, first), points, error)
       if (allocated(error)) return
       last = min(last + points, size(index, 2))
-      call work%compute(index(:, first:last), values(first:last, :), error)
-      if (allocated(error)) return
+      call work%compute(index(:, first:last), values(first:last, :), whole, error, watch)
+      if (allocated(error) .or. .not. whole) return
       work%computed = work%computed + last - first + 1
       if (.not. present(watch)) cycle
       call watch%look(stop_now)
-      whole = .not. stop_now
-      if (stop_now) return
+      whole = .not. stop_now .or. last == size(index, 2)
+      if (.not. whole) return
     end do
   end subroutine compute_list
 

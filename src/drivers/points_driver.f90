@@ -26,6 +26,7 @@ module points_driver
   use text, only: to_text
   use text_table, only: table_t
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
+  use work_watch, only: watch_t
   use trajectories, only: block_size, describe_regime, journey_t, run_on_device
   use trajectory, only: outcome_t
   implicit none
@@ -261,12 +262,15 @@ contains
 
   end subroutine describe_points
 
-  subroutine compute_list_points(self, index, values, error)
+  subroutine compute_list_points(self, index, values, whole, error, watch)
     class(list_work_t), intent(inout) :: self
     integer, intent(in) :: index(:, :)
     real(wp), intent(out) :: values(:, :)
+    logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
     integer :: first, last
+    whole = .true.
     first = 1
     do while (first <= size(index, 2))
       associate (ratio => self%list%ratio(index(1, first)))
@@ -282,18 +286,20 @@ contains
           self%ratio = ratio
         end if
       end associate
-      call run_block(self, index(1, first:last), values(first:last, :), error)
-      if (allocated(error)) return
+      call run_block(self, index(1, first:last), values(first:last, :), whole, error, watch)
+      if (allocated(error) .or. .not. whole) return
       first = last + 1
     end do
   end subroutine compute_list_points
 
   !> Points of one machine.
-  subroutine run_block(work, points, values, error)
+  subroutine run_block(work, points, values, whole, error, watch)
     type(list_work_t), intent(in) :: work
     integer, intent(in) :: points(:)
     real(wp), intent(out) :: values(:, :)
+    logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
     type(outcome_t), allocatable :: outcomes(:)
     type(attractor_t) :: no_catalogue(0)
     real(wp), allocatable :: starts(:, :)
@@ -302,8 +308,8 @@ contains
     do i = 1, size(points)
       starts(:, i) = point_start(work%starts, [points(i)])
     end do
-    call run_on_device(work%journey, no_catalogue, starts, outcomes, error)
-    if (allocated(error)) return
+    call run_on_device(work%journey, no_catalogue, starts, outcomes, whole, error, watch)
+    if (allocated(error) .or. .not. whole) return
     do i = 1, size(points)
       associate (outcome => outcomes(i))
         values(i, :) = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &

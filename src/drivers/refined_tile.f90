@@ -21,7 +21,7 @@ module refined_tile
 contains
 
   !> Values (points of the tile, the last axis fastest; marks and origin) of the tile that begins at `lower` (from 0) and
-  !> holds whole blocks. `lengths`: of the map. `whole` is false if the watch says stop.
+  !> holds whole blocks. `lengths`: of the map. `whole` is false if the watch says stop before the last block is done.
   subroutine refine_tile(work, lengths, lower, extent, values, whole, error, watch)
     class(point_work_t), intent(inout) :: work
     integer, intent(in) :: lengths(:), lower(:), extent(:)
@@ -31,6 +31,7 @@ contains
     class(watch_t), intent(inout), optional :: watch
     type(block_t) :: block
     integer :: place(size(lengths)), step(size(lengths)), i
+    logical :: stop_now
     step = 1
     step(work%refined_axes) = work%refine%block
     place = lower
@@ -46,6 +47,11 @@ contains
         place(i) = lower(i)
       end do
       if (i == 0) return
+      if (.not. present(watch)) cycle
+      ! What a block asks for may be little enough to be done at one go.
+      call watch%look(stop_now)
+      whole = .not. stop_now
+      if (stop_now) return
     end do
   end subroutine refine_tile
 

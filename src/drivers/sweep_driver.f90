@@ -31,6 +31,7 @@ module sweep_driver
   use system, only: monotonic_seconds
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
+  use work_watch, only: watch_t
   use trajectory, only: span_t
   use written_check, only: check_written
   implicit none
@@ -230,16 +231,18 @@ contains
     call report_reasons(session%journal, work%reasons)
   end subroutine run_branches
 
-  subroutine compute_branch_points(self, index, values, error)
+  subroutine compute_branch_points(self, index, values, whole, error, watch)
     class(branch_work_t), intent(inout) :: self
     integer, intent(in) :: index(:, :)
     real(wp), intent(out) :: values(:, :)
+    logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
     integer :: place(3, size(index, 2))
     place(1, :) = index(1, :)
     place(2, :) = 1 + (index(2, :) - 1)/self%grid%shape(3)
     place(3, :) = 1 + modulo(index(2, :) - 1, self%grid%shape(3))
-    call basin_points(self%grid, self%span, self%max_period, self%catalogues, place, self%cache, values, error)
+    call basin_points(self%grid, self%span, self%max_period, self%catalogues, place, self%cache, values, error, whole, watch)
   end subroutine compute_branch_points
 
   subroutine branch_points_from(self, index, points, error)

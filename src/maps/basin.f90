@@ -17,6 +17,7 @@ module basin
   use status, only: exit_bad_case
   use text, only: to_text
   use trajectories, only: block_size, describe_all, journey_t, run_on_device
+  use work_watch, only: watch_t
   use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   implicit none
   private
@@ -143,8 +144,8 @@ contains
 
   !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Without a start among the
   !> axes every point is its own slice: then `catalogues` is empty and the point's attractor is discovered on the spot,
-  !> unlabelled.
-  subroutine basin_points(grid, span, max_period, catalogues, index, cache, values, error)
+  !> unlabelled. `whole` is false if the watch says stop on the way.
+  subroutine basin_points(grid, span, max_period, catalogues, index, cache, values, error, whole, watch)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer, intent(in) :: max_period
@@ -153,13 +154,16 @@ contains
     type(slice_cache_t), intent(inout) :: cache
     real(wp), intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(out), optional :: whole
+    class(watch_t), intent(inout), optional :: watch
     integer(int64) :: slices(size(index, 2))
-    logical :: left(size(index, 2))
+    logical :: left(size(index, 2)), done
     integer :: i, first
     do i = 1, size(index, 2)
       slices(i) = point_slice(grid, index(:, i))
     end do
     left = .true.
+    if (present(whole)) whole = .true.
     do first = 1, size(slices)
       if (.not. left(first)) cycle
       call turn_to(grid, span, slices(first), cache, error)
@@ -167,8 +171,10 @@ contains
       associate (members => pack([(i, i=1, size(slices))], left .and. slices == slices(first)))
         left(members) = .false.
         if (size(catalogues) > 0) then
-          call slice_points(grid, cache%journey, catalogues(slices(first) + 1)%attractors, index, members, values, error)
-          if (allocated(error)) return
+          call slice_points(grid, cache%journey, catalogues(slices(first) + 1)%attractors, index, members, values, done, error, &
+                            watch)
+          if (present(whole)) whole = done
+          if (allocated(error) .or. .not. done) return
         else
           call lone_points(grid, max_period, cache%journey, index, members, values)
         end if
@@ -177,13 +183,15 @@ contains
   end subroutine basin_points
 
   !> Points of one slice with a catalogue.
-  subroutine slice_points(grid, journey, catalogue, index, members, values, error)
+  subroutine slice_points(grid, journey, catalogue, index, members, values, whole, error, watch)
     type(grid_t), intent(in) :: grid
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
+    logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
     type(outcome_t), allocatable :: outcomes(:)
     real(wp), allocatable :: starts(:, :)
     integer :: i
@@ -191,8 +199,8 @@ contains
     do i = 1, size(members)
       starts(:, i) = point_start(grid, index(:, members(i)))
     end do
-    call run_on_device(journey, catalogue, starts, outcomes, error)
-    if (allocated(error)) return
+    call run_on_device(journey, catalogue, starts, outcomes, whole, error, watch)
+    if (allocated(error) .or. .not. whole) return
     do i = 1, size(members)
       values(members(i), :) = outcome_values(outcomes(i))
     end do

@@ -14,6 +14,7 @@ module trajectories
   use status, only: reason_left_domain
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_turn, go_to_stop, outcome_t, pass_stop, &
     phase_over, phase_window, run_trajectory, sections_ahead, span_t
+  use work_watch, only: watch_t
   implicit none
   private
 
@@ -34,6 +35,9 @@ module trajectories
   !> Starts that a GPU is given at a time, where a tile has so many: its pool is refilled many times.
   integer, parameter :: gpu_block = 2**22
 
+  !> Batches of a GPU that are attended to between two looks at the watch.
+  integer, parameter :: batches_per_look = 256
+
   !> The trajectory in a lane: number of its start (0 = none), and whether the extremes of its window went unseen.
   type :: passenger_t
     integer :: start = 0
@@ -43,15 +47,19 @@ module trajectories
 
 contains
 
-  !> `run_trajectories` on the GPU of the journey, if it has one. Code 75 if that fails; then there are no outcomes.
-  subroutine run_on_device(journey, catalogue, starts, outcomes, error)
+  !> `run_trajectories` on the GPU of the journey, if it has one; the watch is looked at on the way. Code 75 if that fails; then,
+  !> and where `whole` is false because the watch said stop, there are no outcomes.
+  subroutine run_on_device(journey, catalogue, starts, outcomes, whole, error, watch)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(out) :: outcomes(:)
+    logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
+    whole = .true.
     if (journey%flow%available .and. journey%flow%gpu >= 0) then
-      call run_on_gpu(journey, catalogue, starts, outcomes, error)
+      call run_on_gpu(journey, catalogue, starts, outcomes, whole, error, watch)
     else
       call run_trajectories(journey, catalogue, starts, outcomes)
     end if
@@ -84,18 +92,22 @@ contains
     end do
   end subroutine run_trajectories
 
-  !> A GPU's lanes: while one half of them flies, the other is attended to.
-  subroutine run_on_gpu(journey, catalogue, starts, outcomes, error)
+  !> A GPU's lanes: while one half of them flies, the other is attended to. The watch is looked at whenever a
+  !> half has come back and every few of its batches, until all outcomes are known.
+  subroutine run_on_gpu(journey, catalogue, starts, outcomes, whole, error, watch)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(inout) :: outcomes(:)
+    logical, intent(inout) :: whole
     type(error_t), allocatable, intent(out) :: error
+    class(watch_t), intent(inout), optional :: watch
     type(passenger_t), allocatable :: passengers(:, :, :)
     type(gpu_half_t) :: halves(2)
     type(fleet_t) :: lanes
     integer :: next, half, batches, k
-    logical :: away(2)
+    logical :: away(2), stop_now
+    stop_now = .false.
     call open_gpu(journey%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
     if (allocated(error)) return
     call open_fleet(journey%moving, lanes)
@@ -105,25 +117,32 @@ contains
     next = 1
     do half = 1, 2
       do k = 1, batches
+        if (present(watch) .and. modulo(k, batches_per_look) == 0) call watch%look(stop_now)
+        if (stop_now) exit
         lanes%batch = lane_batch_t()
         call board_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
         halves(half)%batches(k) = lanes%batch
       end do
-      away(half) = any(passengers(:, :, half)%start > 0)
+      away(half) = any(passengers(:, :, half)%start > 0) .and. .not. stop_now
       if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
       if (allocated(error)) return
     end do
+    whole = .not. stop_now
     half = 1
     do while (any(away))
       if (away(half)) then
         call await_half(half, error)
         if (allocated(error)) return
         do k = 1, batches
+          ! A half that is away when the run is to stop is awaited all the same: the GPU writes into its batches.
+          if (present(watch) .and. modulo(k, batches_per_look) == 1 .and. whole) call watch%look(stop_now)
+          whole = whole .and. .not. stop_now
+          if (.not. whole) exit
           lanes%batch = halves(half)%batches(k)
           call attend_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
           halves(half)%batches(k) = lanes%batch
         end do
-        away(half) = any(passengers(:, :, half)%start > 0)
+        away(half) = whole .and. any(passengers(:, :, half)%start > 0)
         if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
         if (allocated(error)) return
       end if

@@ -5,11 +5,12 @@
 import importlib.machinery
 import importlib.util
 import subprocess
+import time
 from pathlib import Path
 
 import h5py
 import pytest
-from program import KINDS, differences, run, succeed
+from program import KINDS, differences, run, succeed, write_case
 
 ON_GPU = ["--device", "gpu"]
 STRANGE = {
@@ -125,6 +126,20 @@ def test_a_run_goes_on_with_the_tiles_of_a_gpu(separatrix, tmp_path, results, on
     assert differences(tmp_path / "map.h5", tmp_path / "cpu.h5") == []
     with h5py.File(tmp_path / "map.h5") as file, h5py.File(tmp_path / "cpu.h5") as reference:
         assert file["tiles/tile_shape"][0] > reference["tiles/tile_shape"][0]
+
+
+def test_a_gpu_stops_within_a_tile(separatrix, tmp_path, on_host):
+    """One tile of some minutes, computed at one go."""
+    write_case(tmp_path)
+    slow = ["--set", 'run.stop="duration"', "--set", "run.duration=2000", "--set", "grid.tile=[300, 300]"]
+    slow += ["--set", "axis[1].count=300", "--set", "axis[2].count=300", "--set", "attractors.sample=1"]
+    began = time.monotonic()
+    ended = run(
+        separatrix, "basin", "case.toml", *slow, *ON_GPU, "--time-limit", "2", "-o", "map.h5", folder=tmp_path
+    )
+    assert ended.code == 75
+    assert "stopped early" in ended.out
+    assert time.monotonic() - began < 10
 
 
 @pytest.fixture(scope="module")
