@@ -96,13 +96,13 @@ contains
     path = path//'.'//command//'.h5'
   end function output_path
 
-  !> Points of a tile where nobody says how many: about a thousand; where some of the ranks have a GPU, up to a million, as a
+  !> Points of a tile where nobody says how many: about a thousand; where every rank has a GPU, up to a million, as a
   !> tile is all that a GPU can do at once, but some tiles for every rank.
   pure integer function points_of_tile(points, ranks, gpus)
     integer(int64), intent(in) :: points
     integer, intent(in) :: ranks, gpus
     points_of_tile = 1024
-    if (gpus > 0) points_of_tile = int(max(1024_int64, min(2_int64**20, points/(4*ranks))))
+    if (gpus == ranks) points_of_tile = int(max(1024_int64, min(2_int64**20, points/(4*ranks))))
   end function points_of_tile
 
   !> Tile shape where the case leaves it open: about so many `points` of one slice, more on a grid that would have

@@ -3,16 +3,19 @@
 
 !> What computes a map: the GPUs of the hosts, one for each rank in turn, or the processor.
 module device_choice
-  use case_setup, only: grid_of, options_of
+  use case_setup, only: automatic_tile, grid_of, options_of, points_of_tile
   use case_type, only: case_t
+  use command_line, only: command_t
   use errors, only: error_t, fail
-  use grid, only: slice_motion
+  use grid, only: grid_t, slice_motion, two_axes
   use kinds, only: int64, wp
-  use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, use_gpu
+  use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, gpu_number, use_gpu
   use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_flow_t
   use motion, only: motion_t
   use motion_state, only: options_t
+  use refined_tile, only: layers_of
+  use refinement, only: automatic_block
   use status, only: exit_usage
   use system, only: host_name
   use team, only: host_length, team_t
@@ -22,33 +25,109 @@ module device_choice
 
   public :: choose_device, device_text
 
+  !> Starts that are to fly at once for `auto` to choose a GPU: it has room for a hundred times as many, and one thread of it is
+  !> slow. The results are the same. For tests the environment may say another number.
+  integer, parameter :: fewest_starts = 1024
+  character(len=*), parameter :: fewest_variable = 'SEPARATRIX_GPU_STARTS'
+
 contains
 
-  !> Chooses what this rank computes with, `asked` being auto, cpu or gpu; before anything is made ready to fly. Code 64 where
+  !> Chooses what this rank computes with, --device being auto, cpu or gpu; before anything is made ready to fly. Code 64 where
   !> a GPU is asked for that is not there, or that cannot help. Collective.
-  subroutine choose_device(team, asked, the_case, error)
+  subroutine choose_device(team, command, the_case, error)
     class(team_t), intent(in) :: team
-    character(len=*), intent(in) :: asked
+    type(command_t), intent(in) :: command
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: why
+    character(len=:), allocatable :: why, asked
     integer :: place, count
+    integer(int64) :: starts
     call use_gpu(-1)
-    if (asked == 'cpu') return
+    asked = trim(command%device)
+    ! Before any return, as ranks may be asked for different things.
     place = place_on_host(team)
+    if (asked == 'cpu') return
+    starts = starts_at_once(command, the_case, team%size())
+    if (asked == 'auto' .and. starts < fewest()) return
     count = 0
-    if (has_lanes(the_case, on_gpu=.true.)) then
+    if (starts == 0) then
+      call fail(error, exit_usage, '--device gpu: found a '//trim(command%name)//' that has no starts to fly together; '// &
+                'allowed are auto and cpu')
+    else if (has_lanes(the_case, on_gpu=.true.)) then
       call count_gpus(count, why)
-      if (len(why) > 0) why = ' ('//why//')'
-      if (.not. gpu_is_built()) why = ' (and no code for one: this build has SEPARATRIX_GPU=OFF)'
-      if (asked == 'gpu' .and. count == 0) call fail(error, exit_usage, '--device gpu: found no GPU on '//host_name()//why// &
+      if (.not. gpu_is_built() .and. len(why) == 0) then
+        why = ' (and no code for one: this build has SEPARATRIX_GPU=OFF)'
+      else if (len(why) > 0) then
+        why = ' ('//why//')'
+      end if
+      if (asked == 'gpu' .and. count <= 0) call fail(error, exit_usage, '--device gpu: found no GPU on '//host_name()//why// &
                                                      '; allowed are auto and cpu')
     else if (asked == 'gpu') then
       call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several '// &
                 'bodies); allowed are auto and cpu')
     end if
-    if (count > 0) call use_gpu(modulo(place, count))
+    if (count > 0) call use_gpu(gpu_number(modulo(place, count)))
   end subroutine choose_device
+
+  !> What `auto` asks for.
+  integer function fewest()
+    character(len=16) :: text
+    integer :: asked, status
+    fewest = fewest_starts
+    call get_environment_variable(fewest_variable, text, status=status)
+    if (status /= 0) return
+    read (text, *, iostat=status) asked
+    if (status == 0) fewest = max(1, asked)
+  end function fewest
+
+  !> About so many starts of one machine fly together, if every rank has a GPU: those of a tile. 0 where all are flown one by
+  !> one; many where the case lacks what the command needs, which is said later.
+  integer(int64) function starts_at_once(command, the_case, ranks) result(starts)
+    type(command_t), intent(in) :: command
+    type(case_t), intent(in) :: the_case
+    integer, intent(in) :: ranks
+    type(grid_t) :: grid
+    integer, allocatable :: tile(:)
+    integer :: axes(2), gpus, side, i
+    starts = huge(starts)
+    gpus = merge(0, ranks, command%shard > 0)
+    select case (trim(command%name))
+    case ('sweep')
+      if (the_case%sweep%present) starts = product(int(the_case%sweep%starts, int64))
+    case ('points')
+      starts = lines_of(command%list, int(fewest(), int64)*4*ranks)
+      starts = min(starts, int(points_of_tile(starts, ranks, gpus), int64))
+    case ('basin')
+      if (size(the_case%axes) == 0) return
+      grid = grid_of(the_case, the_case%axes)
+      tile = automatic_tile(grid, the_case%tile, points_of_tile(product(int(grid%shape, int64)), ranks, gpus))
+      if (all(grid%start_axis == 0)) then
+        starts = 0
+      else if (the_case%refine%active) then
+        ! The coarse lattice of a block.
+        axes = two_axes(grid)
+        side = automatic_block(the_case%refine, grid%shape(axes), layers_of(grid%shape, axes))
+        starts = (int(side, int64)/the_case%refine%step + 1)**2
+      else
+        starts = product(int(pack(tile, [(any(grid%start_axis == i), i=1, size(tile))]), int64))
+      end if
+    end select
+  end function starts_at_once
+
+  !> Lines of a file, counted up to `most`, which is also said where it cannot be read.
+  integer(int64) function lines_of(path, most) result(lines)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: most
+    integer :: unit, status
+    lines = most
+    open (newunit=unit, file=path, status='old', action='read', iostat=status)
+    if (status /= 0) return
+    do lines = 0, most - 1
+      read (unit, '()', iostat=status)
+      if (status /= 0) exit
+    end do
+    close (unit)
+  end function lines_of
 
   !> Number of this rank among those of its host, from 0. Collective.
   integer function place_on_host(team) result(place)

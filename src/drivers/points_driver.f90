@@ -95,7 +95,7 @@ contains
     call describe_list(session, work%list, schema)
     if (command%shard > 0) call describe_shard(command%shard, command%shard_count, schema)
     points = points_per_tile
-    if (session%gpus > 0 .and. command%shard == 0) then
+    if (session%gpus == session%team%size() .and. command%shard == 0) then
       points = points_of_tile(size(work%list%x0, kind=int64), session%team%size(), session%gpus)
     end if
     call open_tiles(session, path, schema, ['point'], [points], file, open_shape=.true.)

@@ -15,6 +15,7 @@ module session
   use errors, only: error_t, fail
   use files, only: give_lock, take_lock
   use journal, only: journal_t, json_text
+  use lane_gpu, only: use_gpu
   use launcher, only: launched_ranks
   use map_schema, only: schema_t
   use output_check, only: check_create, check_result, check_resume, check_table, working_path
@@ -87,10 +88,15 @@ contains
                                                    wants_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
     if (len(command%draw) > 0) call draw_machine(session)
-    if (command%validate .or. command%dry_run .or. &
-        .not. any(command%name == [character(len=10) :: 'basin', 'sweep', 'points'])) return
-    call choose_device(session%team, trim(command%device), session%the_case, error)
+    if (.not. any(command%name == [character(len=10) :: 'basin', 'sweep', 'points'])) return
+    ! What computes nothing, or a sample on one core, looks for a GPU only to refuse what would be refused.
+    if ((command%validate .or. command%dry_run) .and. command%device /= 'gpu') return
+    call choose_device(session%team, command, session%the_case, error)
     call session%stop_if(error)
+    if (command%validate .or. command%dry_run) then
+      call use_gpu(-1)
+      return
+    end if
     call device_text(session%team, session%the_case, session%provenance%device, session%gpus)
   end subroutine open_session
 

@@ -67,6 +67,8 @@ static const lane_gpu *gpu(void) {
 
 int separatrix_gpu_count(char *message, int size) { return gpu()->count(message, size); }
 
+int separatrix_gpu_number(int place) { return gpu()->number(place); }
+
 void separatrix_gpu_name(int device, char *text, int size) { gpu()->name(device, text, size); }
 
 int separatrix_gpu_open(int device, int64_t wanted, lane_batch *halves[2], int64_t *batches, char *message,

@@ -12,7 +12,7 @@ module lane_gpu
   implicit none
   private
 
-  public :: gpu_is_built, count_gpus, gpu_name, use_gpu, gpu_in_use, open_gpu, send_half, await_half
+  public :: gpu_is_built, count_gpus, gpu_number, gpu_name, use_gpu, gpu_in_use, open_gpu, send_half, await_half
 
   integer, parameter :: message_size = 256
 
@@ -34,6 +34,11 @@ module lane_gpu
       integer(c_int), value :: size
       character(kind=c_char), intent(out) :: message(size)
     end function separatrix_gpu_count
+
+    integer(c_int) function separatrix_gpu_number(place) bind(c)
+      import :: c_int
+      integer(c_int), value :: place
+    end function separatrix_gpu_number
 
     subroutine separatrix_gpu_name(device, text, size) bind(c)
       import :: c_char, c_int
@@ -73,7 +78,7 @@ contains
     gpu_is_built = separatrix_gpu_built() /= 0
   end function gpu_is_built
 
-  !> GPUs that this process sees; `why`: what CUDA says where it sees none.
+  !> GPUs that this process sees and has code for; `why`: what CUDA says where it sees none.
   subroutine count_gpus(number, why)
     integer, intent(out) :: number
     character(len=:), allocatable, intent(out) :: why
@@ -81,6 +86,12 @@ contains
     number = separatrix_gpu_count(message, int(message_size, c_int))
     why = text_of(message)
   end subroutine count_gpus
+
+  !> The number that CUDA gives to the GPU at `place` of those counted, from 0; the others take it.
+  integer function gpu_number(place)
+    integer, intent(in) :: place
+    gpu_number = separatrix_gpu_number(int(place, c_int))
+  end function gpu_number
 
   !> What its maker calls a GPU.
   function gpu_name(device) result(name)

@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <iterator>
+#include <vector>
 
 namespace {
 
@@ -77,14 +79,58 @@ struct gpu_attempt {
 
 // Makes a call if all before it went well.
 #define GPU_ATTEMPT(attempt, call, ...)                                                                      \
-  if ((attempt).error == cudaSuccess)                                                                        \
-  (attempt)(#call, call(__VA_ARGS__))
+  do {                                                                                                       \
+    if ((attempt).error == cudaSuccess)                                                                      \
+      (attempt)(#call, call(__VA_ARGS__));                                                                   \
+  } while (0)
+
+// Compute capabilities (10 major + minor) that this build has code for, ascending; CMake says which.
+#ifndef SEPARATRIX_GPU_ARCHITECTURES
+#define SEPARATRIX_GPU_ARCHITECTURES 80, 90
+#endif
+const int architectures[] = {SEPARATRIX_GPU_ARCHITECTURES};
+
+// Whether code was built that a device of this capability runs: that of the same major number and no higher
+// minor one, or, compiled by the driver, that of the last of the list.
+bool gpu_has_code(int capability) {
+  for (const int built : architectures)
+    if (capability >= built && capability / 10 == built / 10)
+      return true;
+  return capability >= *std::rbegin(architectures);
+}
+
+// Numbers of the devices that this build has code for. `error`: of CUDA, where it sees none.
+std::vector<int> gpu_usable(int &seen, cudaError_t &error) {
+  std::vector<int> usable;
+  seen = 0;
+  error = cudaGetDeviceCount(&seen);
+  if (error != cudaSuccess)
+    seen = 0;
+  for (int device = 0; device < seen; device++) {
+    int major = 0, minor = 0;
+    if (cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device) == cudaSuccess &&
+        cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device) == cudaSuccess &&
+        gpu_has_code(10 * major + minor))
+      usable.push_back(device);
+  }
+  return usable;
+}
 
 int gpu_count(char *message, int size) {
-  int count = 0;
-  const cudaError_t error = cudaGetDeviceCount(&count);
+  int seen;
+  cudaError_t error;
+  const int count = int(gpu_usable(seen, error).size());
   snprintf(message, size, "%s", error == cudaSuccess ? "" : cudaGetErrorString(error));
-  return error == cudaSuccess ? count : 0;
+  if (count == 0 && seen > 0)
+    snprintf(message, size, "of %d, none has the compute capability that this build has code for, from %d.%d on",
+             seen, architectures[0] / 10, architectures[0] % 10);
+  return count;
+}
+
+int gpu_number(int place) {
+  int seen;
+  cudaError_t error;
+  return gpu_usable(seen, error).at(place);
 }
 
 void gpu_name(int device, char *text, int size) {
@@ -184,7 +230,7 @@ int gpu_wait(int which, char *message, int size) {
 
 #define SEPARATRIX_LANE_GPU(name)                                                                            \
   extern "C" const lane_gpu *name() {                                                                        \
-    static const lane_gpu functions = {gpu_count, gpu_name, gpu_open, gpu_send, gpu_wait};                   \
+    static const lane_gpu functions = {gpu_count, gpu_number, gpu_name, gpu_open, gpu_send, gpu_wait};                   \
     return &functions;                                                                                       \
   }
 

@@ -3,7 +3,8 @@
 
 // The calls of CUDA's runtime that `lane_gpu.hpp` makes, on the host, for tests: threads run one after the
 // other, when somebody waits for their stream and not before. $SEPARATRIX_GPU_ON_HOST is the number of
-// devices, with $SEPARATRIX_GPU_FAULT=N the Nth call and all after it fail.
+// devices, with $SEPARATRIX_GPU_FAULT=N the Nth call and all after it fail. $SEPARATRIX_GPU_CAPABILITY, as 75,90,
+// is their compute capability in turn, else 9.0; there is code from 8.0 on.
 #ifndef SEPARATRIX_LANE_GPU_HOST_HPP
 #define SEPARATRIX_LANE_GPU_HOST_HPP
 
@@ -23,7 +24,12 @@ namespace {
 
 typedef int cudaError_t;
 enum { cudaSuccess = 0, cudaErrorMemoryAllocation = 2, cudaErrorLaunchFailure = 719 };
-enum gpu_attribute { cudaDevAttrMultiProcessorCount, cudaDevAttrMaxThreadsPerMultiProcessor };
+enum gpu_attribute {
+  cudaDevAttrMultiProcessorCount,
+  cudaDevAttrMaxThreadsPerMultiProcessor,
+  cudaDevAttrComputeCapabilityMajor,
+  cudaDevAttrComputeCapabilityMinor
+};
 enum gpu_copy { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost };
 
 struct cudaDeviceProp {
@@ -64,8 +70,22 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp *properties, int) {
 cudaError_t cudaSetDevice(int) { return made_call(); }
 cudaError_t cudaGetLastError() { return made_call(); }
 
+int capability_of(int device) {
+  const char *asked = getenv("SEPARATRIX_GPU_CAPABILITY");
+  for (; asked != nullptr && device > 0; device--) {
+    asked = strchr(asked, ',');
+    asked = asked == nullptr ? nullptr : asked + 1;
+  }
+  return asked == nullptr ? 90 : atoi(asked);
+}
+
 // Few and odd, so that a small map fills the pool many times.
-cudaError_t cudaDeviceGetAttribute(int *value, gpu_attribute attribute, int) {
+cudaError_t cudaDeviceGetAttribute(int *value, gpu_attribute attribute, int device) {
+  if (attribute >= cudaDevAttrComputeCapabilityMajor) {
+    *value = capability_of(device);
+    *value = attribute == cudaDevAttrComputeCapabilityMajor ? *value / 10 : *value % 10;
+    return cudaSuccess;
+  }
   *value = attribute == cudaDevAttrMultiProcessorCount ? 3 : 43;
   return made_call();
 }

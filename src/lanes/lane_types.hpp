@@ -178,8 +178,10 @@ struct lane_batch {
 // Bodies on a GPU, see `lane_gpu.hpp`: by CUDA, or on the host for tests. 0 = all went well, else `message`
 // says what has failed.
 struct lane_gpu {
-  // Devices that can be used; where there are none, `message` may say why.
+  // Devices that can be used; where there are none, `message` may say why. The number that CUDA gives to the
+  // one at `place` among them, from 0, which the others take.
   int (*count)(char *message, int size);
+  int (*number)(int place);
   void (*name)(int device, char *text, int size);
   // Makes both halves on a device, of at most `wanted` batches each; `batches`: as many as there are.
   int (*open)(int device, int64_t wanted, lane_batch *halves[2], int64_t *batches, char *message, int size);

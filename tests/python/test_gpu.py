@@ -26,8 +26,9 @@ FAULTY_CALLS = [1, 2, 5, 9, 14, 15, 16, 18, 19, 21, 30, 60]
 
 @pytest.fixture
 def on_host(monkeypatch):
-    """Two GPUs, which are the host."""
+    """Two GPUs, which are the host, and that are taken for little work as well."""
     monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "2")
+    monkeypatch.setenv("SEPARATRIX_GPU_STARTS", "1")
 
 
 @pytest.mark.parametrize("kind", ["map", "stack", "refined", "points", "sweep"])
@@ -61,12 +62,26 @@ def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_ho
 def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, results):
     output = tmp_path / "mixed.h5"
     program = [mpi_separatrix, *KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    mixed = ["-n", "1", "-x", "SEPARATRIX_GPU_ON_HOST=1", *program, ":", "-n", "1", *program]
+    mixed = ["-n", "1", "-x", "SEPARATRIX_GPU_ON_HOST=1", "-x", "SEPARATRIX_GPU_STARTS=1", *program, ":", "-n", "1", *program]
     ended = subprocess.run(
         ["mpirun", *mixed], cwd=results["map"].parent, capture_output=True, text=True, check=True, timeout=60
     )
     assert "computed by rank 0: GPU 0, 1: processor" in ended.stdout
     assert differences(results["map"], output) == []
+
+
+@pytest.mark.parametrize(("capabilities", "number"), [("75,86", 1), ("120,75", 0), ("70,75", None)])
+def test_a_gpu_without_code_for_it_is_passed_over(
+    separatrix, tmp_path, results, on_host, monkeypatch, capabilities, number
+):
+    monkeypatch.setenv("SEPARATRIX_GPU_CAPABILITY", capabilities)
+    ended = run(separatrix, *KINDS["map"], *ON_GPU, "-o", tmp_path / "map.h5", folder=results["map"].parent)
+    if number is None:
+        assert ended.code == 64
+        assert "of 2, none has the compute capability that this build has code for, from 8.0 on" in ended.err
+    else:
+        assert ended.code == 0
+        assert f"computed by GPU {number} (" in ended.out
 
 
 @pytest.mark.parametrize(
@@ -76,13 +91,45 @@ def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, resu
         (["--set", 'integrator.lanes="off"'], "found a machine that only a processor flies"),
     ],
 )
-def test_a_gpu_that_cannot_help_is_refused(separatrix, results, monkeypatch, more, words):
-    monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "0")
+@pytest.mark.parametrize("count", ["0", "-1"])
+def test_a_gpu_that_cannot_help_is_refused(separatrix, results, monkeypatch, more, words, count):
+    monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", count)
     ended = run(separatrix, *KINDS["map"], *ON_GPU, *more, "-o", "none.h5", folder=results["map"].parent)
     assert ended.code == 64
     assert words in ended.err
     assert "allowed are auto and cpu" in ended.err
     assert not (results["map"].parent / "none.h5.part").exists()
+
+
+@pytest.mark.parametrize("kind", ["plane", "map"])
+@pytest.mark.parametrize("how", ["--validate", "--dry-run", "--force"])
+def test_a_gpu_is_refused_where_nothing_flies_on_it(separatrix, tmp_path, results, monkeypatch, kind, how):
+    """A plane of parameters, even where there is a GPU; and always before anything is done."""
+    monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "1" if kind == "plane" else "0")
+    ended = run(separatrix, *KINDS[kind], *ON_GPU, how, "-o", tmp_path / "no.h5", folder=results["map"].parent)
+    assert ended.code == 64
+    words = {"plane": "found a basin that has no starts to fly together", "map": "found no GPU on "}
+    assert f"--device gpu: {words[kind]}" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "device"),
+    [
+        ("plane", [], "processor"),
+        ("sweep", [], "processor"),
+        ("points", [], "processor"),
+        ("refined", [], "processor"),
+        ("map", [], "processor"),
+        ("map", ["--set", "axis[1].count=64", "--set", "axis[2].count=64", "--set", "run.duration=10"], "GPU 0"),
+    ],
+)
+def test_auto_takes_a_gpu_for_many_starts_only(
+    separatrix, tmp_path, results, on_host, monkeypatch, kind, more, device
+):
+    monkeypatch.delenv("SEPARATRIX_GPU_STARTS")
+    succeed(separatrix, *KINDS[kind], *more, "-o", tmp_path / "auto.h5", folder=results["map"].parent)
+    with h5py.File(tmp_path / "auto.h5") as file:
+        assert file["provenance"].attrs["device"].startswith(device)
 
 
 def test_other_devices_are_refused(separatrix, results):
