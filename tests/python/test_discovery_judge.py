@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from separatrix.discovery.decision.gates import foremost
-from separatrix.discovery.decision.judge import Judged, held_out_bounds, stable
+from separatrix.discovery.decision.judge import Judged, _together_clear, held_out_bounds, stable
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.refit import Fitted
@@ -105,3 +105,19 @@ def test_a_kink_ends_a_fit_within_two_standard_errors(decrement, exhausted, conv
     one = replace(fit(np.full(COUNT, 47.0), decrement), exhausted=exhausted)
     assert one.reduced_chi2 == pytest.approx(1, abs=0.05)
     assert one.converged == converged
+
+
+def test_a_table_is_something_though_each_of_its_values_could_be_zero():
+    """Three values that are known but for a constant; and one that is nothing."""
+    shape = np.array([0.5, -0.2, -0.4])
+    covariance = 1e-4 * np.eye(3) + np.ones((3, 3))
+    free = [SimpleNamespace(positive=False)] * 3
+
+    def clear(values: np.ndarray) -> bool:
+        fit = SimpleNamespace(values=values)
+        fitted = SimpleNamespace(fit=fit, covariance=covariance, problem=SimpleNamespace(free=free))
+        return _together_clear(fitted, [0, 1, 2])
+
+    assert np.all(np.abs(shape) < 1.96 * np.sqrt(np.diag(covariance)))
+    assert clear(shape)
+    assert not clear(np.array([0.01, -0.01, 0.0]) + 0.8)

@@ -155,6 +155,23 @@ def _size(fitted: Fitted, i: int) -> float:
     return 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
 
 
+def _together_clear(fitted: Fitted, places: list[int]) -> bool:
+    """Whether the 95 % region of several parameters is without zero, though the interval of each may have it.
+
+    The values of a table all move with a constant that another parameter of the machine can take over.
+    """
+    variance = np.diag(fitted.covariance)
+    places = [i for i in places if not fitted.problem.free[i].positive and variance[i] > 0]
+    if len(places) < 2:
+        return False
+    size = np.sqrt(variance[places])
+    information = np.linalg.pinv(
+        fitted.covariance[np.ix_(places, places)] / np.outer(size, size), hermitian=True
+    )
+    values = fitted.fit.values[places] / size
+    return bool(values @ information @ values > chi2.ppf(0.95, len(places)))
+
+
 def margin(best: Judged, other: Judged, options: Options) -> float:
     """Evidence by which a candidate must beat another one: more where the two are names of one motion."""
     scale = options.separation * max(1.0, best.fitted.fit.reduced_chi2)
@@ -178,7 +195,7 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
         return False, "the machine with it cannot follow some segments that the base can"
     if not clear:
         return False, "its parameters are at their bounds: the wrong sign"
-    if not any(clear):
+    if not any(clear) and not _together_clear(one.fitted, inside):
         return False, "its 95 % intervals contain zero"
     usual = float(np.sqrt(np.mean(fit.evaluation.v[fit.good] ** 2))) if fit.good.any() else 0.0
     lowest, highest = options.drive_scales
