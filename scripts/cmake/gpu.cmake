@@ -19,9 +19,6 @@ find_library(SEPARATRIX_CUDART cudart_static HINTS "${folder}/lib64" "${folder}/
 # correctly rounded, small numbers stay. For later processors the driver compiles what is kept of the last of the list;
 # its operations carry their rounding, so that it cannot fuse them either.
 set(SEPARATRIX_NVCC_FLAGS -std=c++17 -O3 -fmad=false -prec-div=true -prec-sqrt=true -ftz=false -Xcompiler=-fPIC)
-string(REGEX REPLACE "[a-z]" "" built "${SEPARATRIX_GPU_ARCHITECTURES}") # the kernel is to know, to pass over other GPUs
-list(JOIN built "," built)
-list(APPEND SEPARATRIX_NVCC_FLAGS "-DSEPARATRIX_GPU_ARCHITECTURES=${built}")
 foreach(capability IN LISTS SEPARATRIX_GPU_ARCHITECTURES)
   list(APPEND architectures "-gencode=arch=compute_${capability},code=sm_${capability}")
 endforeach()

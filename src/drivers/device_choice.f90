@@ -156,6 +156,13 @@ contains
     has_lanes = flow%available .and. .not. (on_gpu .and. allocated(flow%structure))
   end function has_lanes
 
+  pure function device_of(number) result(words)
+    integer, intent(in) :: number
+    character(len=:), allocatable :: words
+    words = 'processor'
+    if (number >= 0) words = 'GPU '//to_text(number)
+  end function device_of
+
   !> What was chosen, in words, and by how many ranks a GPU; on rank 0 of all ranks. Collective.
   subroutine device_text(team, the_case, words, gpus)
     class(team_t), intent(in) :: team
@@ -163,9 +170,9 @@ contains
     character(len=:), allocatable, intent(out) :: words
     integer, intent(out) :: gpus
     real(wp), allocatable :: chosen(:)
-    character(len=24), allocatable :: of_rank(:)
+    character(len=40), allocatable :: of_ranks(:)
     type(options_t) :: options
-    integer :: rank
+    integer :: first, last, group
     call team%allgather([real(gpu_in_use, wp)], chosen)
     gpus = count(chosen > -0.5_wp)
     if (gpus == 0) then
@@ -175,12 +182,22 @@ contains
     else if (team%size() == 1) then
       words = 'GPU '//to_text(gpu_in_use)//' ('//gpu_name(gpu_in_use)//')'
     else
-      allocate (of_rank(size(chosen)))
-      do rank = 1, size(chosen)
-        of_rank(rank) = to_text(rank - 1)//': processor'
-        if (chosen(rank) > -0.5_wp) of_rank(rank) = to_text(rank - 1)//': GPU '//to_text(nint(chosen(rank)))
+      allocate (of_ranks(size(chosen)))
+      group = 0
+      last = 0
+      do while (last < size(chosen))
+        first = last + 1
+        last = first
+        do while (last < size(chosen))
+          if (nint(chosen(last + 1)) /= nint(chosen(first))) exit
+          last = last + 1
+        end do
+        group = group + 1
+        of_ranks(group) = to_text(first - 1)
+        if (last > first) of_ranks(group) = trim(of_ranks(group))//'-'//to_text(last - 1)
+        of_ranks(group) = trim(of_ranks(group))//': '//device_of(nint(chosen(first)))
       end do
-      words = 'rank '//join(of_rank, ', ')
+      words = 'rank '//join(of_ranks(:group), ', ')
     end if
   end subroutine device_text
 

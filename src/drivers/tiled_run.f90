@@ -178,7 +178,7 @@ contains
       index(:, point) = index_in_block(lower, extent, point)
     end do
     if (work%again .and. .not. work%refine%active) then
-      call compute_again(session, file, work, tile, index, values, watch, whole)
+      call compute_again(file, work, tile, index, values, watch, whole, error)
     else if (work%refine%active) then
       allocate (values(points, work%marks + 1))
       call refine_tile(work, int(file%tiling%lengths), int(lower), int(extent), values, whole, error, watch)
@@ -201,24 +201,23 @@ contains
   end subroutine run_tile
 
   !> The values of a tile that was done, with those points computed again that do not stand.
-  subroutine compute_again(session, file, work, tile, index, values, watch, whole)
-    type(session_t), intent(inout) :: session
+  subroutine compute_again(file, work, tile, index, values, watch, whole, error)
     type(map_file_t), intent(inout) :: file
     class(point_work_t), intent(inout) :: work
     integer, intent(in) :: tile, index(:, :)
     real(wp), allocatable, intent(out) :: values(:, :)
     type(tile_watch_t), intent(inout) :: watch
     logical, intent(out) :: whole
-    type(error_t), allocatable :: error
+    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: new(:, :)
     integer, allocatable :: left(:)
     integer :: i
     call file%read_tile(tile, values, error)
-    call session%abort_if(error)
+    if (allocated(error)) return
     left = pack([(i, i=1, size(values, 1))], [(.not. work%stands(values(i, :)), i=1, size(values, 1))])
     allocate (new(size(left), work%variables))
     call compute_list(work, index(:, left), new, whole, error, watch)
-    call session%abort_if(error)
+    if (allocated(error)) return
     if (whole) values(left, :) = new
   end subroutine compute_again
 

@@ -84,17 +84,19 @@ struct gpu_attempt {
       (attempt)(#call, call(__VA_ARGS__));                                                                   \
   } while (0)
 
-// Compute capabilities (10 major + minor) that this build has code for, ascending; CMake says which.
-#ifndef SEPARATRIX_GPU_ARCHITECTURES
-#define SEPARATRIX_GPU_ARCHITECTURES 80, 90
+// Compute capabilities (100 major + 10 minor) that this build has code for, ascending, as nvcc says; for the
+// stand-in those that CMake asks it for by default.
+#ifdef __CUDA_ARCH_LIST__
+const int architectures[] = {__CUDA_ARCH_LIST__};
+#else
+const int architectures[] = {800, 900};
 #endif
-const int architectures[] = {SEPARATRIX_GPU_ARCHITECTURES};
 
 // Whether code was built that a device of this capability runs: that of the same major number and no higher
 // minor one, or, compiled by the driver, that of the last of the list.
 bool gpu_has_code(int capability) {
   for (const int built : architectures)
-    if (capability >= built && capability / 10 == built / 10)
+    if (capability >= built && capability / 100 == built / 100)
       return true;
   return capability >= *std::rbegin(architectures);
 }
@@ -110,7 +112,7 @@ std::vector<int> gpu_usable(int &seen, cudaError_t &error) {
     int major = 0, minor = 0;
     if (cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device) == cudaSuccess &&
         cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device) == cudaSuccess &&
-        gpu_has_code(10 * major + minor))
+        gpu_has_code(100 * major + 10 * minor))
       usable.push_back(device);
   }
   return usable;
@@ -122,8 +124,9 @@ int gpu_count(char *message, int size) {
   const int count = int(gpu_usable(seen, error).size());
   snprintf(message, size, "%s", error == cudaSuccess ? "" : cudaGetErrorString(error));
   if (count == 0 && seen > 0)
-    snprintf(message, size, "of %d, none has the compute capability that this build has code for, from %d.%d on",
-             seen, architectures[0] / 10, architectures[0] % 10);
+    snprintf(message, size,
+             "of %d, none has the compute capability that this build has code for, from %d.%d on", seen,
+             architectures[0] / 100, architectures[0] / 10 % 10);
   return count;
 }
 
@@ -230,7 +233,7 @@ int gpu_wait(int which, char *message, int size) {
 
 #define SEPARATRIX_LANE_GPU(name)                                                                            \
   extern "C" const lane_gpu *name() {                                                                        \
-    static const lane_gpu functions = {gpu_count, gpu_number, gpu_name, gpu_open, gpu_send, gpu_wait};                   \
+    static const lane_gpu functions = {gpu_count, gpu_number, gpu_name, gpu_open, gpu_send, gpu_wait};       \
     return &functions;                                                                                       \
   }
 

@@ -3,8 +3,8 @@
 
 // The calls of CUDA's runtime that `lane_gpu.hpp` makes, on the host, for tests: threads run one after the
 // other, when somebody waits for their stream and not before. $SEPARATRIX_GPU_ON_HOST is the number of
-// devices, with $SEPARATRIX_GPU_FAULT=N the Nth call and all after it fail. $SEPARATRIX_GPU_CAPABILITY, as 75,90,
-// is their compute capability in turn, else 9.0; there is code from 8.0 on.
+// devices, with $SEPARATRIX_GPU_FAULT=N the Nth call and all after it fail. $SEPARATRIX_GPU_CAPABILITY, as
+// 75,90, is their compute capability in turn, else 9.0; there is code from 8.0 on.
 #ifndef SEPARATRIX_LANE_GPU_HOST_HPP
 #define SEPARATRIX_LANE_GPU_HOST_HPP
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from program import KINDS, differences, run, succeed, write_case
+from program import FOLD, KINDS, differences, run, succeed, write_case
 
 ON_GPU = ["--device", "gpu"]
 STRANGE = {
@@ -59,10 +59,20 @@ def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_ho
     assert differences(results["map"], output) == []
 
 
+def test_ranks_with_one_device_are_named_together(mpi_separatrix, tmp_path, results, on_host, monkeypatch):
+    monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "1")
+    output = tmp_path / "gpu.h5"
+    command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    said = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
+    assert "computed by rank 0-2: GPU 0" in said.out
+    assert differences(results["map"], output) == []
+
+
 def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, results):
     output = tmp_path / "mixed.h5"
     program = [mpi_separatrix, *KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    mixed = ["-n", "1", "-x", "SEPARATRIX_GPU_ON_HOST=1", "-x", "SEPARATRIX_GPU_STARTS=1", *program, ":", "-n", "1", *program]
+    gpu = ["-x", "SEPARATRIX_GPU_ON_HOST=1", "-x", "SEPARATRIX_GPU_STARTS=1"]
+    mixed = ["-n", "1", *gpu, *program, ":", "-n", "1", *program]
     ended = subprocess.run(
         ["mpirun", *mixed], cwd=results["map"].parent, capture_output=True, text=True, check=True, timeout=60
     )
@@ -106,7 +116,7 @@ def test_a_gpu_that_cannot_help_is_refused(separatrix, results, monkeypatch, mor
 def test_a_gpu_is_refused_where_nothing_flies_on_it(separatrix, tmp_path, results, monkeypatch, kind, how):
     """A plane of parameters, even where there is a GPU; and always before anything is done."""
     monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "1" if kind == "plane" else "0")
-    ended = run(separatrix, *KINDS[kind], *ON_GPU, how, "-o", tmp_path / "no.h5", folder=results["map"].parent)
+    ended = run(separatrix, *KINDS[kind], *ON_GPU, how, "-o", tmp_path / "a.h5", folder=results["map"].parent)
     assert ended.code == 64
     words = {"plane": "found a basin that has no starts to fly together", "map": "found no GPU on "}
     assert f"--device gpu: {words[kind]}" in ended.err
@@ -120,7 +130,7 @@ def test_a_gpu_is_refused_where_nothing_flies_on_it(separatrix, tmp_path, result
         ("points", [], "processor"),
         ("refined", [], "processor"),
         ("map", [], "processor"),
-        ("map", ["--set", "axis[1].count=64", "--set", "axis[2].count=64", "--set", "run.duration=10"], "GPU 0"),
+        ("map", ["--set", "axis[1].count=64", "--set", "axis[2].count=64"], "GPU 0"),
     ],
 )
 def test_auto_takes_a_gpu_for_many_starts_only(
@@ -159,6 +169,33 @@ def test_a_gpu_that_fails_leaves_a_file_to_go_on_with(
     said = succeed(separatrix, *command, "--resume", "--device", "cpu", folder=results["map"].parent)
     assert " of 5 tiles were done before" in said.out
     assert differences(results["map"], output) == []
+
+
+def test_a_gpu_that_fails_in_a_second_look_leaves_a_file_to_go_on_with(
+    separatrix, tmp_path, on_host, monkeypatch
+):
+    """The last of all calls is made there."""
+    write_case(tmp_path, FOLD)
+    output = tmp_path / "map.h5"
+    command = ["basin", "case.toml", "--set", "grid.tile=[20, 20]", "-o", output]
+    last, beyond = 0, 8192
+    while beyond - last > 1:
+        call = (last + beyond) // 2
+        with monkeypatch.context() as fault:
+            fault.setenv("SEPARATRIX_GPU_FAULT", str(call))
+            ended = run(separatrix, *command, *ON_GPU, "--force", folder=tmp_path)
+        last, beyond = (call, beyond) if ended.code else (last, call)
+    with monkeypatch.context() as fault:
+        fault.setenv("SEPARATRIX_GPU_FAULT", str(last))
+        failed = run(separatrix, *command, *ON_GPU, "--force", folder=tmp_path)
+    output.unlink(missing_ok=True)
+    assert failed.code == 75
+    with h5py.File(tmp_path / "map.h5.part") as file:
+        assert file["second_look/start"][0, -1] != 0
+    assert "with --resume (without --force) goes on, with --device cpu without a GPU" in failed.err
+    succeed(separatrix, *command, "--resume", "--device", "cpu", folder=tmp_path)
+    succeed(separatrix, *command[:-1], tmp_path / "cpu.h5", "--device", "cpu", folder=tmp_path)
+    assert differences(output, tmp_path / "cpu.h5") == []
 
 
 def test_a_run_goes_on_with_the_tiles_of_a_gpu(separatrix, tmp_path, results, on_host, monkeypatch):
