@@ -352,8 +352,8 @@ sys.exit(code)
 
 
 def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_path):
-    """25 times the rows may take 1.5 MB more. Ranks also pack the final file, a slab of up to 2**20 values at
-    a time: as many rows as a chunk has, so that longer rows take more until it is full."""
+    """25 times the rows, a million points, may take 2.5 MB more. Ranks also pack the final file, a slab of
+    up to 2**20 values at a time: as many rows as a chunk has, so that longer rows take more until it is full."""
     write_case(tmp_path)
     peaks = {}
     for shape in ((200, 200), (5000, 200), (200, 5000)):
@@ -364,5 +364,5 @@ def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_pat
         peaks[shape] = [int((tmp_path / f"peak_{rank}").read_text()) for rank in (0, 1)]
         (tmp_path / "map.h5").unlink()
     small = peaks[200, 200]
-    assert np.subtract(peaks[5000, 200], small).max() < 1500
+    assert np.subtract(peaks[5000, 200], small).max() < 2500
     assert np.subtract(peaks[200, 5000], small).max() < 16000
