@@ -353,7 +353,7 @@ sys.exit(code)
 
 def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_path):
     """25 times the rows, a million points, may take 2.5 MB more. Ranks also pack the final file, a slab of
-    up to 2**20 values at a time: as many rows as a chunk has, so that longer rows take more until it is full."""
+    up to 2**20 values at a time: as many rows as a chunk has, so longer rows take more until it is full."""
     write_case(tmp_path)
     peaks = {}
     for shape in ((200, 200), (5000, 200), (200, 5000)):
