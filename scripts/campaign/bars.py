@@ -56,6 +56,12 @@ def bars(found: list[Score]) -> list[list[str]]:
             [o.region for o in strong if o.region is not None],
         ),
     ]
+    quick = [one.seconds for one in found if one.whole < 50_000]
+    mean = statistics.fmean(quick) if quick else math.nan
+    rows.append(
+        ["processor time of a short case, mean", "<= 10 s", f"{mean:.1f} s of {len(quick)}",
+         "yes" if mean <= 10 else "**no**" if quick else "undecided"]
+    )  # fmt: skip
     precise = [one for one in found if one.right and one.in_catalogue and one.d_prime >= PRECISE]
     errors = [error for one in precise for error in one.errors]
     median = statistics.median(errors) if errors else math.nan

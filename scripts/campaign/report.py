@@ -17,6 +17,7 @@ from rates import Rate, rate
 from scoring import HAVE_A_TERM, PRECISE, SEPARABLE, STRONG, Score, score
 
 TEMPLATE = Path(__file__).resolve().parent / "discovery.md.in"
+LONG = 50_000
 METHODS = ("STLSQ", "ensemble SINDy")
 
 
@@ -180,6 +181,12 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "separable": f"{SEPARABLE:g}",
         "precise": f"{PRECISE:g}",
         "seconds": f"{middle([one.seconds for one in found]):.0f}",
+        "mean_short": mean_seconds([one for one in found if one.whole < LONG]),
+        "mean_long": mean_seconds([one for one in found if one.whole >= LONG]),
+        "long": sum(one.whole >= LONG for one in found),
+        "shaped": sum(one.shaped for one in found),
+        "faulty": sum(one.rig for one in found),
+        "rows": table(["hidden", "cases, d' >= 5", "decided"], rows_of_strong(found)),
         "bars": table(["figure", "bar", "found", "met"], bars(found)),
         "separable_bars": table(
             ["effects with d' of at least 5", "decided", "right of the decided", "wrong name"],
@@ -225,6 +232,20 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
     return TEMPLATE.read_text().format(**fields)
 
 
+def mean_seconds(group: list[Score]) -> str:
+    """Mean processor time of cases."""
+    return f"{statistics.fmean(one.seconds for one in group):.1f} s" if group else "-"
+
+
+def rows_of_strong(found: list[Score]) -> list[list[str]]:
+    """How many strong effects of each kind were decided."""
+    rows = []
+    for name in truths([one for one in found if one.strong]):
+        group = [one for one in found if one.strong and one.truth == name]
+        rows.append([name, str(len(group)), str(decided(group))])
+    return rows
+
+
 def decided(group: list[Score]) -> Rate:
     """How many got one answer."""
     return rate([one.decided for one in group])
@@ -235,16 +256,24 @@ def right(group: list[Score]) -> Rate:
     return rate([one.right for one in group if one.decided])
 
 
+def density(one: Score) -> str:
+    """Samples per period; each number of many would be a class of its own."""
+    return f"{one.samples if one.samples <= 400 else 'more'} samples per period"
+
+
 def conditions(found: list[Score]) -> list[list[str]]:
     """Rates by what the records are like."""
     rows = []
     for of in (
         lambda one: one.colour + " noise",
-        lambda one: f"{one.samples} samples per period",
+        density,
         lambda one: "position and velocity" if one.velocity else "position only",
         lambda one: "crank angle measured" if one.crank_angle else "crank angle from a mark",
         lambda one: f"regime `{one.regime}`",
         lambda one: "one effect" if one.kind == "single" else "two effects",
+        lambda one: "law of another shape" if one.shaped else "law of the catalogue",
+        lambda one: "small faults of the rig" if one.rig else "no fault of the rig",
+        lambda one: "50 000 samples or more" if one.whole >= LONG else "fewer than 50 000 samples",
     ):
         rows += classes(
             found,

@@ -17,6 +17,7 @@ HAVE_A_TERM = EQUIVALENT | {
     "drive_ripple",
 }
 """Effects that the baselines can name: they have the force as a term, or a constant for the set."""
+FUNCTIONS = ("_curve", "_harmonics")
 STRONG = 5.0
 """d' from which on the bars count."""
 SEPARABLE = 3.0
@@ -38,6 +39,16 @@ DEPENDS_ON = {
 
 SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
 PLANE, PHASE, IMPACT = "position and velocity", "drive phase", "time since the last impact"
+FAMILIES = {
+    "friction over speed": {"viscous", "coulomb", "quadratic_drag", "stribeck", "friction_curve"},
+    "friction over place": {"position_dependent_friction", "friction_place_curve"},
+    "spring over stretch": {"cubic_spring", "spring_curve"},
+    "restitution over impact speed": {"restitution_slope", "restitution_curve"},
+    "contact over penetration": {"compliant_contact", "kelvin_voigt_contact", "contact_curve"},
+    "drive over phase": {"drive_ripple", "drive_harmonics"},
+}
+"""Closed forms and the function of a family. A function names the family of any of its laws; where the law
+that was hidden has another shape than that of the catalogue, so does any closed form of the family."""
 REGIONS = {
     "viscous": {SPEED, PLANE},
     "coulomb": {SPEED, REVERSAL, PLANE},
@@ -92,6 +103,12 @@ class Score:
     """What a force without a name is said to depend on is right; None where nothing is said."""
     character_closes: float
     """Share of the held-out gap that it would close; NaN where nothing is said."""
+    shaped: bool
+    """The law that was hidden has another shape than that of the catalogue."""
+    rig: bool
+    """The records have the small faults of a rig."""
+    whole: int
+    """Samples of all records together."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -130,6 +147,17 @@ def reported(verdict: dict) -> set[frozenset[str]]:
     return {frozenset(word.split("+")) for word in words if word}
 
 
+def as_hidden(names: frozenset[str], truth: dict) -> frozenset[str]:
+    """A set of effects with what names the family of a hidden one in the place of its name."""
+    found = set(names)
+    for hidden in truth["names"]:
+        members = next((one for one in FAMILIES.values() if hidden in one), {hidden})
+        said = {name for name in members if hidden in truth.get("shapes", {}) or name.endswith(FUNCTIONS)}
+        if hidden not in found and len(found & said) == 1:
+            found = (found - said) | {hidden}
+    return frozenset(found)
+
+
 def only_equivalent(sets: set[frozenset[str]]) -> bool:
     """Whether sets of effects differ by effects only that nothing can tell apart here."""
     common = frozenset.intersection(*sets)
@@ -140,7 +168,7 @@ def only_equivalent(sets: set[frozenset[str]]) -> bool:
 def score(truth: dict, result: dict) -> Score:
     """Judge one case."""
     verdict, names = result["verdict"], frozenset(truth["names"])
-    sets = reported(verdict)
+    sets = {as_hidden(one, truth) for one in reported(verdict)}
     answer = verdict["outcome"] if verdict["outcome"] in ANSWERS else "failed"
     one_answer = answer == "named" or (answer == "ambiguous" and bool(sets) and only_equivalent(sets))
     contains = names in sets
@@ -181,6 +209,9 @@ def score(truth: dict, result: dict) -> Score:
         character_closes=verdict["character"][0]["closed"]["held_out"]
         if verdict.get("character")
         else math.nan,
+        shaped=bool(truth.get("shapes")),
+        rig=bool(truth.get("rig")),
+        whole=truth.get("samples", 0),
         seconds=result["seconds"],
         baselines=result.get("baselines", {}),
         baselines_right={

@@ -6,7 +6,17 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from effects import ASYMMETRIC_VISCOUS, CATALOGUE, OUTSIDE, PAIRS, SENSORS, Effect, changes, parameters
+from effects import (
+    ASYMMETRIC_VISCOUS,
+    CATALOGUE,
+    OUTSIDE,
+    PAIRS,
+    SENSORS,
+    SHAPES,
+    Effect,
+    changes,
+    parameters,
+)
 from experiment import REGIMES, Experiment
 from simulator import Machine, SimulationError, X
 from size import COARSE, IMITATORS, Information, Noise
@@ -14,6 +24,18 @@ from size import COARSE, IMITATORS, Information, Noise
 BLOCK = 40
 """Cases in which every kind has its share."""
 SHARES = {"none": 8, "outside": 6, "pair": 4}
+LONG = 9
+"""Cases of a block with as many samples as a rig records."""
+MOST_SAMPLES = (52_000, 100_000)
+"""Of the three records of a long case together."""
+LONGEST = 36
+"""Drive periods of a long record at most."""
+PLANNED = 100
+"""Samples per drive period on which the size of an effect of a long case is chosen."""
+RIG = (1e-4, 1e-3)
+"""Small faults of a rig over the signal: a sensor that is not quite linear, further harmonics; of the crank
+angle in rad."""
+ANOTHER_SHAPE = 2 / 3
 TARGETS = (3.0, 5.0, 10.0, 30.0)
 LEVELS = (0.001, 0.005, 0.01, 0.03, 0.05)
 PERIODS = 12
@@ -52,6 +74,11 @@ class Hidden:
         return machine.copy(**changes(machine, self.name, self.effect, self.sign * self.size, self.shape))
 
     @property
+    def another_shape(self) -> dict[str, float]:
+        """What makes its law another one than that of the catalogue."""
+        return {key: value for key, value in self.shape.items() if key in SHAPES}
+
+    @property
     def parameters(self) -> dict[str, float]:
         """In the words of the case file."""
         return parameters(self.name, self.effect, self.sign * self.size, self.shape)
@@ -77,6 +104,10 @@ class Case:
     phase_error: list[float]
     target: float
     seed: list[int]
+    rig: dict[str, float] = field(default_factory=dict)
+    """Small faults of the rig: crank_noise [rad]; curved, cubic (sensor) and harmonics over the signal."""
+    density: int = 1
+    """Samples of a record for each on which its size was chosen."""
     d_prime: dict[str, float] = field(default_factory=dict)
     beyond: dict[str, float] = field(default_factory=dict)
     """d' if one other effect of the catalogue is fitted too, and the worst of them."""
@@ -110,13 +141,20 @@ def plan(seed: int, number: int) -> tuple[str, str, float]:
     return kind, names[index], targets[(turn + index) % len(targets)]
 
 
+def is_long(seed: int, number: int) -> bool:
+    """Whether a case has records as long as those of a rig."""
+    block, place = divmod(number, BLOCK)
+    return int(np.random.default_rng([seed, 4, block]).permutation(BLOCK)[place]) < LONG
+
+
 def draw(seed: int, number: int) -> Case:
     """The case of this number; a regime in which its effect cannot have the size asked for is drawn again."""
     kind, name, target = plan(seed, number)
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, 3, number, attempt])
+        more = np.random.default_rng([seed, 5, number, attempt])
         try:
-            case = _draw(random, number, kind, name, target)
+            case = _draw(random, more, number, kind, name, target, is_long(seed, number))
         except (SimulationError, Unreachable):
             continue
         case.seed = [seed, number, attempt]
@@ -149,8 +187,10 @@ def _ratios(random: np.random.Generator, regime: str) -> list[float]:
             return [round(float(ratio), 3) for ratio in ratios]
 
 
-def _experiments(random: np.random.Generator, regime: str) -> list[Experiment]:
+def _experiments(random: np.random.Generator, regime: str, periods: int | None) -> list[Experiment]:
     samples = int(random.choice([50, 100, 400], p=[0.6, 0.35, 0.05]))
+    if periods:
+        samples = PLANNED
     upper = REGIMES[regime].upper
     return [
         Experiment(
@@ -160,22 +200,44 @@ def _experiments(random: np.random.Generator, regime: str) -> list[Experiment]:
             v0=float(random.uniform(-2, 2)),
             settling=int(random.choice([0, 12])),
             samples_per_period=samples,
-            periods=PERIODS,
+            periods=periods or PERIODS,
         )
         for ratio in _ratios(random, regime)
     ]
 
 
-def _hide(random: np.random.Generator, name: str, base: Machine) -> Hidden:
+def _hide(
+    random: np.random.Generator, name: str, base: Machine, shapes: np.random.Generator | None
+) -> Hidden:
     label, effect = name, CATALOGUE.get(name) or OUTSIDE.get(name)
     if name == "asymmetric_viscous":
         label, effect = "asymmetric_friction", ASYMMETRIC_VISCOUS
     driven = base.copy(frequency=math.sqrt(base.stiffness))
     sign = float(random.choice([-1, 1])) if effect.signed else 1.0
-    return Hidden(label, effect, effect.shape(driven, random), sign)
+    shape = effect.shape(driven, random)
+    if shapes is not None and effect.another and shapes.random() < ANOTHER_SHAPE:
+        shape |= effect.another(shapes)
+    return Hidden(label, effect, shape, sign)
 
 
-def _draw(random: np.random.Generator, number: int, kind: str, name: str, target: float) -> Case:
+def _rig(random: np.random.Generator) -> dict[str, float]:
+    """The small faults of a rig, which half of the cases have."""
+    if random.random() < 0.5:
+        return {}
+    sizes = np.exp(random.uniform(*np.log(RIG), 4)) * [1, *random.choice([-1, 1], 2), 1]
+    return dict(zip(("crank_noise", "curved", "cubic", "harmonics"), map(float, sizes), strict=True))
+
+
+def _draw(
+    random: np.random.Generator,
+    more: np.random.Generator,
+    number: int,
+    kind: str,
+    name: str,
+    target: float,
+    long: bool,
+) -> Case:
+    """A case; what is only drawn of some comes from `more`."""
     regime = _regime(random, name)
     its = REGIMES[regime]
     nominal = its.machine()
@@ -183,14 +245,16 @@ def _draw(random: np.random.Generator, number: int, kind: str, name: str, target
         key: getattr(nominal, key) * (1 + SCATTER[key] * random.standard_normal()) for key in its.unknowns
     }
     base = nominal.copy(**scatter)
-    experiments = _experiments(random, regime)
+    rig, periods = _rig(more), int(more.integers(PERIODS, LONGEST + 1)) if long else None
+    experiments = _experiments(random, regime, periods)
+    shapes = more if kind == "single" else None
     case = Case(
         number=number,
         kind=kind,
         regime=regime,
         base=base,
         machine=base,
-        hidden=[_hide(random, part, base) for part in name.split("+") if part],
+        hidden=[_hide(random, part, base, shapes) for part in name.split("+") if part],
         training=experiments[:2],
         held_out=experiments[2],
         level=float(random.choice(LEVELS, p=[0.15, 0.2, 0.3, 0.2, 0.15])),
@@ -201,6 +265,7 @@ def _draw(random: np.random.Generator, number: int, kind: str, name: str, target
         phase_error=[float(error) for error in random.normal(0, 0.02, 3)],
         target=target if name else 0.0,
         seed=[],
+        rig=rig,
     )
     if name == "second_barrier":
         lowest = [
@@ -214,7 +279,22 @@ def _draw(random: np.random.Generator, number: int, kind: str, name: str, target
         raise Unreachable
     if name:
         _judge(case, information)
+    if long:
+        _sample_densely(case, more)
     return case
+
+
+def _sample_densely(case: Case, random: np.random.Generator) -> None:
+    """Records of as many samples as a rig takes: the effect is worth as many standard errors more."""
+    experiments = [*case.training, case.held_out]
+    planned = sum(one.count for one in experiments)
+    case.density = round(float(random.uniform(*MOST_SAMPLES)) / planned)
+    for one in experiments:
+        one.samples_per_period *= case.density
+    case.d_prime = {name: worth * math.sqrt(case.density) for name, worth in case.d_prime.items()}
+    case.beyond = {
+        name: (worth * math.sqrt(case.density), other) for name, (worth, other) in case.beyond.items()
+    }
 
 
 def _choose_sizes(case: Case) -> None:

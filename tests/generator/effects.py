@@ -6,8 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from simulator import Machine
+from simulator import POWER, SATURATING, STEP, Machine
 
+SHAPES = (
+    "quadratic_exponent stribeck_exponent cubic_exponent contact_exponent"
+    " restitution_shape restitution_constant friction_wave"
+).split()
+"""Parameters of the machine that give a law another shape than that of the catalogue."""
 SENSORS = ("sensor_bias", "sensor_gain", "sensor_delay")
 
 
@@ -30,6 +35,8 @@ class Effect:
     """Names of the further parameters in the case file."""
     instead_of: tuple[str, ...] = ()
     """Parameters of the base machine that the effect makes void."""
+    another: Callable[[np.random.Generator], dict[str, float]] | None = None
+    """Draws another shape of the law than that of the catalogue."""
 
 
 def _stribeck(machine: Machine, random: np.random.Generator) -> dict[str, float]:
@@ -70,10 +77,23 @@ def _maxwell(machine: Machine, random: np.random.Generator) -> dict[str, float]:
     return {"maxwell_time": random.uniform(0.05, 0.3)}
 
 
+def _exponent(field_: str, low: float, high: float) -> Callable[[np.random.Generator], dict[str, float]]:
+    return lambda random: {field_: random.uniform(low, high)}
+
+
+def _restitution(random: np.random.Generator) -> dict[str, float]:
+    """A power law (a fifth: a viscoelastic body), one that saturates, or a step between two levels."""
+    shape = int(random.choice([POWER, SATURATING, STEP]))
+    drawn = {POWER: random.choice([0.2, random.uniform(0.25, 2)]), SATURATING: random.uniform(0.4, 1.5)}
+    return {"restitution_shape": shape, "restitution_constant": drawn.get(shape, random.uniform(0.7, 1.6))}
+
+
 CATALOGUE = {
     "viscous": Effect("damping", "viscous", (1e-4, 4)),
     "coulomb": Effect("force", "coulomb", (1e-3, 4)),
-    "quadratic_drag": Effect("coefficient", "quadratic", (1e-4, 1)),
+    "quadratic_drag": Effect(
+        "coefficient", "quadratic", (1e-4, 1), another=_exponent("quadratic_exponent", 1.5, 3)
+    ),
     "stribeck": Effect(
         "excess",
         "stribeck",
@@ -82,14 +102,19 @@ CATALOGUE = {
         _stribeck,
         ("stribeck_velocity",),
         {"stribeck_velocity": "velocity"},
+        another=_exponent("stribeck_exponent", 0.6, 3),
     ),
     "static_excess": Effect("force", "static_excess", (1e-3, 5)),
     "dahl": Effect("stiffness", "dahl", (1e4, 10)),
     "asymmetric_friction": Effect("coulomb", "asymmetric_coulomb", (1e-4, 1.5), True),
-    "position_dependent_friction": Effect("slope", "friction_slope", (1e-3, 0.85), True),
-    "cubic_spring": Effect("stiffness", "cubic", (1e-2, 200), True),
+    "position_dependent_friction": Effect(
+        "slope", "friction_slope", (1e-3, 0.85), True, another=_exponent("friction_wave", 4, 12)
+    ),
+    "cubic_spring": Effect(
+        "stiffness", "cubic", (1e-2, 200), True, another=_exponent("cubic_exponent", 1.5, 5)
+    ),
     "offset_force": Effect("force", "offset", (1e-3, 8), True),
-    "restitution_slope": Effect("slope", "restitution_slope", (1e-4, 0.2)),
+    "restitution_slope": Effect("slope", "restitution_slope", (1e-4, 0.2), another=_restitution),
     "compliant_contact": Effect(
         "stiffness",
         "contact_stiffness",
@@ -99,6 +124,7 @@ CATALOGUE = {
         ("contact_damping",),
         {"contact_damping": "damping"},
         ("restitution",),
+        _exponent("contact_exponent", 1, 2),
     ),
     "second_barrier": Effect("position", "lower", (1e-5, 0.15)),
     "drive_ripple": Effect(

@@ -77,7 +77,8 @@ class Experiment:
     samples_per_period: int
     periods: int
     sensor: dict[str, float] = field(default_factory=dict)
-    """sensor_bias [m], sensor_gain [1], sensor_delay [s] of the position."""
+    """sensor_bias [m], sensor_gain [1], sensor_delay [s] of the position; sensor_curved and sensor_cubic:
+    what square and cube of the signal over its standard deviation add to it."""
 
     @property
     def frequency(self) -> float:
@@ -120,6 +121,11 @@ class Experiment:
         delay = self.sensor.get("sensor_delay", 0.0)
         if delay > 0:
             seen[:, X] = self._delayed(driven, states, delay, self.substeps(steps_per_period))
+        curved, cubic = self.sensor.get("sensor_curved", 0.0), self.sensor.get("sensor_cubic", 0.0)
+        if curved or cubic:
+            middle, swing = seen[:, X].mean(), seen[:, X].std()
+            u = (seen[:, X] - middle) / swing
+            seen[:, X] += swing * (curved * u**2 + cubic * u**3)
         seen[:, X] *= 1 + self.sensor.get("sensor_gain", 0.0)
         seen[:, X] += self.sensor.get("sensor_bias", 0.0)
         return seen

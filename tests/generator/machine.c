@@ -56,6 +56,24 @@ static double delayed_position(const struct machine *m, double t, double now) {
          m->history_step * s * r * (a[1] * r - b[1] * s);
 }
 
+/* size^exponent, that of the catalogue where no other is given. */
+static double power_of(double size, double exponent, double usual) {
+  return pow(size, exponent > 0 ? exponent : usual);
+}
+
+static double spring_beyond_linear(const struct machine *m, double stretch) {
+  if (m->cubic_exponent > 0) {
+    return m->cubic * copysign(pow(fabs(stretch), m->cubic_exponent), stretch);
+  }
+  return m->cubic * stretch * stretch * stretch;
+}
+
+/* The force of the soft barrier beside its damping. */
+static double contact_force(const struct machine *m, double depth) {
+  return m->contact_stiffness *
+         (m->contact_exponent > 0 ? pow(depth, m->contact_exponent) : depth * sqrt(depth));
+}
+
 /* Every force but friction and the soft barrier. */
 static double driving_force(const struct machine *m, double t, const double y[STATES]) {
   double stretch = m->free_length + foot(m, t) - y[X];
@@ -63,7 +81,7 @@ static double driving_force(const struct machine *m, double t, const double y[ST
   if (m->stiffness_wave != 0) {
     stiffness *= 1 + m->stiffness_wave * cos(m->stiffness_wave_frequency * t);
   }
-  double force = stiffness * stretch + m->cubic * stretch * stretch * stretch + m->offset - y[U];
+  double force = stiffness * stretch + spring_beyond_linear(m, stretch) + m->offset - y[U];
   if (m->second_mass > 0) {
     force += m->second_stiffness * (y[X2] - y[X]) + m->second_damping * (y[V2] - y[V]);
   }
@@ -78,10 +96,15 @@ static double holding_force(const struct machine *m, const struct motion *b, dou
                             const double y[STATES]) {
   double force = driving_force(m, t, y);
   if (b->in_contact && y[X] > m->upper) {
-    double depth = y[X] - m->upper;
-    force -= m->contact_stiffness * depth * sqrt(depth);
+    force -= contact_force(m, y[X] - m->upper);
   }
   return force;
+}
+
+/* Share of dry friction at a place. */
+static double roughness(const struct machine *m, double x) {
+  double place = m->friction_wave > 0 ? sin(m->friction_wave * x) / m->friction_wave : x;
+  return fmax(0, 1 + m->friction_slope * place);
 }
 
 /* Friction force that opposes sliding in a direction. */
@@ -91,13 +114,13 @@ static double level(const struct machine *m, double t, double x, double v, int d
     dry *= 1 + m->friction_drift * t;
   }
   if (m->stribeck != 0) {
-    dry += m->stribeck * exp(-(v / m->stribeck_velocity) * (v / m->stribeck_velocity));
+    dry += m->stribeck * exp(-power_of(fabs(v) / m->stribeck_velocity, m->stribeck_exponent, 2));
   }
-  return dry * fmax(0, 1 + m->friction_slope * x);
+  return dry * roughness(m, x);
 }
 
 static double break_away(const struct machine *m, double t, double x, int direction) {
-  return level(m, t, x, 0, direction) + m->static_excess * fmax(0, 1 + m->friction_slope * x);
+  return level(m, t, x, 0, direction) + m->static_excess * roughness(m, x);
 }
 
 static void rates(const struct machine *m, const struct motion *b, double t, const double y[STATES],
@@ -107,11 +130,13 @@ static void rates(const struct machine *m, const struct motion *b, double t, con
   memset(f, 0, STATES * sizeof *f);
   if (s != 0) {
     double size = s * v;
-    force -= m->viscous * v + m->asymmetric_viscous * size + m->quadratic * v * size;
+    force -= m->viscous * v + m->asymmetric_viscous * size;
+    if (m->quadratic != 0) {
+      force -= s * m->quadratic * power_of(size, m->quadratic_exponent, 2);
+    }
     force -= m->dahl > 0 ? y[Z] : s * level(m, t, y[X], v, s);
     if (b->in_contact && y[X] > m->upper) {
-      double depth = y[X] - m->upper;
-      force -= fmax(0, m->contact_stiffness * depth * sqrt(depth) * (1 + m->contact_damping * v));
+      force -= fmax(0, contact_force(m, y[X] - m->upper) * (1 + m->contact_damping * v));
     }
     f[X] = v;
     f[V] = force / m->mass;
@@ -192,10 +217,25 @@ static void choose_direction(const struct machine *m, struct motion *b) {
   }
 }
 
+/* Growth of what an impact loses with its speed. */
+static double loss(const struct machine *m, double speed) {
+  double constant = m->restitution_constant;
+  switch ((int)m->restitution_shape) {
+  case POWER:
+    return pow(speed, constant);
+  case SATURATING:
+    return constant * (1 - exp(-speed / constant));
+  case STEP:
+    return 0.5 * (1 + tanh((speed - constant) / (0.15 * constant)));
+  default:
+    return speed;
+  }
+}
+
 static void bounce(const struct machine *m, struct motion *b) {
   int side = b->direction;
   double speed = fabs(b->y[V]);
-  double k = m->restitution - m->restitution_slope * speed;
+  double k = m->restitution - m->restitution_slope * loss(m, speed);
   if (m->restitution_wave != 0) {
     k += m->restitution_wave * sin(m->restitution_wave_frequency * b->t);
   }

@@ -9,7 +9,10 @@
 /* x, v, force of the presliding spring, x and v of a second mass, force of a Maxwell element. */
 enum { X, V, Z, X2, V2, U, STATES };
 
-enum { HARMONICS = 3 };
+enum { HARMONICS = 6 };
+
+/* Shapes of a restitution that falls with the speed of impact. */
+enum { LINEAR, POWER, SATURATING, STEP };
 
 /* SI units; an effect that is not there is 0. */
 struct machine {
@@ -22,6 +25,12 @@ struct machine {
   double asymmetric_coulomb, asymmetric_viscous, friction_slope, cubic, offset;
   double restitution_slope, contact_stiffness, contact_damping, lower;
   double ripple_sine, ripple_cosine, ripple_harmonic;
+
+  /* Shapes of these laws; 0 is that of the catalogue. Speeds are over 1 m/s, stretches and depths over 1 m.
+   */
+  double quadratic_exponent, stribeck_exponent, cubic_exponent, contact_exponent;
+  double restitution_shape, restitution_constant;
+  double friction_wave; /* of friction over place [1/m] */
 
   /* What the catalogue does not have. Drifts and waves are functions of the time since the record began. */
   double stiffness_wave, stiffness_wave_frequency;

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from design import MEMORY, Case, sizes_of_noise
 from experiment import ANGLE, COSINE, FINE, GRAVITY, REGIMES, SINE, STIFFNESS, Experiment, Regime
-from simulator import X
+from simulator import Machine, X
+from size import COARSE
 
 TRAINING = ("first.csv", "second.csv")
 HELD_OUT = "held_out.csv"
@@ -57,9 +58,22 @@ angle = {ANGLE!r}
 """
 
 
+def with_faults(case: Case, experiment: Experiment) -> tuple[Machine, dict[str, float]]:
+    """Machine and sensor of an experiment with the small faults of the rig."""
+    driven = experiment.driven(case.machine)
+    if not case.rig:
+        return driven, {}
+    first = case.training[0]
+    swing = float(np.std(first.states(first.driven(case.machine), COARSE)[0][:, X]))
+    size = case.rig["harmonics"] * swing / math.sqrt(3)
+    driven = driven.copy(cosine=(*COSINE, size, 0.0, size), sine=(*SINE, 0.0, size, 0.0))
+    return driven, {"sensor_curved": case.rig["curved"], "sensor_cubic": case.rig["cubic"]}
+
+
 def measured(case: Case, experiment: Experiment, random: np.random.Generator) -> tuple[dict, float, float]:
     """Columns of a record as the sensors show them, the noise of the position, and its resolution [m]."""
-    driven = experiment.driven(case.machine)
+    driven, faults = with_faults(case, experiment)
+    experiment.sensor = {**experiment.sensor, **faults}
     states, _ = experiment.states(driven, FINE)
     seen = experiment.observe(driven, states, FINE)
     sigma, sigma_v = sizes_of_noise(seen, case.level)
@@ -80,6 +94,8 @@ def measured(case: Case, experiment: Experiment, random: np.random.Generator) ->
         columns["v"] = seen[:, 1] + sigma_v * noise[:, 1]
     if case.crank_angle:
         columns["phi"] = experiment.phase + experiment.frequency * time
+        if case.rig:
+            columns["phi"] += case.rig["crank_noise"] * random.standard_normal(len(x))
     return columns, sigma, resolution
 
 
@@ -95,6 +111,8 @@ def write_record(path: Path, case: Case, which: int, random: np.random.Generator
         head["sensor_noise_sigma_m"] = repr(sigma)
     if resolution > 0:
         head["sensor_resolution_m"] = repr(resolution)
+    if case.crank_angle and case.rig and case.tells_noise:
+        head["phi_noise_sigma_rad"] = repr(case.rig["crank_noise"])
     if not case.crank_angle:
         head["phase"] = f"{experiment.phase + case.phase_error[which]:.4f}"
     lines = [f"# {key}: {value}" for key, value in head.items()]
@@ -109,7 +127,13 @@ def truth_of(case: Case) -> dict:
         "number": case.number,
         "kind": case.kind,
         "names": [hidden.name for hidden in case.hidden],
-        "parameters": {path: value for hidden in case.hidden for path, value in hidden.parameters.items()},
+        # a law of another shape has no parameters of the catalogue
+        "parameters": {
+            path: value
+            for hidden in case.hidden
+            if not hidden.another_shape
+            for path, value in hidden.parameters.items()
+        },
         "target": case.target,
         "d_prime": case.d_prime,
         "beyond": {
@@ -123,6 +147,9 @@ def truth_of(case: Case) -> dict:
         "crank_angle": case.crank_angle,
         "ratios": [experiment.ratio for experiment in [*case.training, case.held_out]],
         "base": {name: getattr(case.base, name) for name in REGIMES[case.regime].unknowns},
+        "samples": sum(experiment.count for experiment in [*case.training, case.held_out]),
+        "shapes": {hidden.name: hidden.another_shape for hidden in case.hidden if hidden.another_shape},
+        "rig": case.rig,
         "seed": case.seed,
     }
 

@@ -14,9 +14,11 @@ import numpy as np
 
 FOLDER = Path(__file__).resolve().parent
 FLAGS = ("-O2", "-std=c11", "-ffp-contract=off", "-fPIC", "-shared")
-HARMONICS = 3
+HARMONICS = 6
 STATES = 6
 X, V, DAHL, SECOND_X, SECOND_V, MAXWELL = range(STATES)
+POWER, SATURATING, STEP = 1, 2, 3
+"""Shapes of a restitution that falls with the speed of impact; 0 is the line of the catalogue."""
 NOWHERE = 1e30
 """Where a barrier is that is not there."""
 
@@ -26,6 +28,8 @@ SCALARS = (
     " asymmetric_coulomb asymmetric_viscous friction_slope cubic offset"
     " restitution_slope contact_stiffness contact_damping lower"
     " ripple_sine ripple_cosine ripple_harmonic"
+    " quadratic_exponent stribeck_exponent cubic_exponent contact_exponent"
+    " restitution_shape restitution_constant friction_wave"
     " stiffness_wave stiffness_wave_frequency friction_drift second_mass second_stiffness second_damping"
     " delayed_stiffness delay restitution_wave restitution_wave_frequency maxwell_stiffness maxwell_time"
 ).split()

@@ -191,6 +191,26 @@ JUDGED = [
         (False, False, False, False),
         "one of the pair",
     ),
+    (truth(["stribeck"]), verdict("named", ["friction_curve"]), (True, True, True, False), "right name"),
+    (truth(["stribeck"]), verdict("named", ["quadratic_drag"]), (True, False, False, True), "quadratic_drag"),
+    (
+        truth(["stribeck"], shapes={"stribeck": {"stribeck_exponent": 0.7}}),
+        verdict("named", ["quadratic_drag"]),
+        (True, True, True, False),
+        "right name",
+    ),
+    (
+        truth(["cubic_spring"], shapes={"cubic_spring": {"cubic_exponent": 2.0}}),
+        verdict("named", ["friction_curve"]),
+        (True, False, False, True),
+        "friction_curve",
+    ),
+    (
+        truth(["stribeck"], shapes={"stribeck": {"stribeck_exponent": 0.7}}),
+        verdict("ambiguous", ["stribeck"], ["friction_curve"]),
+        (False, False, True, False),
+        "set with the truth",
+    ),
     (
         truth(["viscous"]),
         verdict("named", ["viscous", "dahl"]),

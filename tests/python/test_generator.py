@@ -83,6 +83,45 @@ def test_half_the_step_changes_little(generator, substeps):
     assert np.abs(one - other)[:, simulator.X].max() < 1e-6
 
 
+@pytest.mark.parametrize(
+    ("shape", "constant", "loss"),
+    [
+        (0, 0.0, lambda v: v),
+        (1, 0.2, lambda v: v**0.2),
+        (2, 0.7, lambda v: 0.7 * (1 - np.exp(-v / 0.7))),
+        (3, 1.2, lambda v: (1 + np.tanh((v - 1.2) / 0.18)) / 2),
+    ],
+    ids=["line", "power", "saturating", "step"],
+)
+def test_restitution_falls_with_the_speed_as_its_shape_says(generator, shape, constant, loss):
+    *_, simulator = generator
+    more = {"restitution_slope": 0.15, "restitution_shape": shape, "restitution_constant": constant}
+    machine = machine_of(generator, coulomb=0.0, stiffness=0.0, upper=0.8, restitution=0.8, **more)
+    for speed in (0.3, 1.1, 2.5):
+        states, impacts = fly(generator, machine, 0.79, speed, periods=1)
+        assert impacts == 1
+        assert -states[-1, simulator.V] == pytest.approx(speed * (0.8 - 0.15 * loss(speed)), rel=1e-12)
+
+
+def test_laws_of_another_shape_are_what_they_say(generator):
+    """Work of the forces along a motion: of a spring from its potential, of friction over place."""
+    *_, simulator = generator
+    more = {"cubic": 30.0, "cubic_exponent": 2.0, "quadratic": 0.0}
+    machine = machine_of(generator, coulomb=0.0, scale=0.0, upper=simulator.NOWHERE, **more)
+    states, _ = fly(generator, machine, 0.9, 0.0, periods=2, samples=4000)
+    stretch = np.abs(machine.free_length + machine.mean - states[:, simulator.X])
+    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * stretch**2 / 2 + 30 * stretch**3 / 3
+    assert energy == pytest.approx(energy[0], rel=1e-9)
+    machine = machine_of(generator, scale=0.0, upper=simulator.NOWHERE, friction_slope=0.5, friction_wave=9.0)
+    states, _ = fly(generator, machine, 1.1, 0.0, periods=1, samples=8000)
+    x = states[:, simulator.X]
+    stretch = machine.free_length + machine.mean - x
+    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * stretch**2 / 2
+    middle = (x[1:] + x[:-1]) / 2
+    work = np.sum(machine.coulomb * (1 + 0.5 * np.sin(9 * middle) / 9) * np.abs(np.diff(x)))
+    assert energy[0] - energy[-1] == pytest.approx(work, rel=1e-5)
+
+
 def effects_of_program() -> list[tuple[str, dict, dict]]:
     """Name, table of the case file, parameters of the generator."""
     return [
@@ -91,6 +130,11 @@ def effects_of_program() -> list[tuple[str, dict, dict]]:
         ("coulomb", {"force": 0.5}, {"coulomb": 0.5 + 0.2 * 9.81}),
         ("quadratic_drag", {"coefficient": 0.1}, {"quadratic": 0.1}),
         ("stribeck", {"excess": 0.8, "velocity": 0.2}, {"stribeck": 0.8, "stribeck_velocity": 0.2}),
+        (
+            "stribeck",
+            {"excess": 0.8, "velocity": 0.2, "exponent": 0.8},
+            {"stribeck": 0.8, "stribeck_velocity": 0.2, "stribeck_exponent": 0.8},
+        ),
         ("static_excess", {"force": 1.0}, {"static_excess": 1.0}),
         ("dahl", {"stiffness": 400.0}, {"dahl": 400.0}),
         ("asymmetric_friction", {"coulomb": 0.3}, {"asymmetric_coulomb": 0.3}),
@@ -102,6 +146,11 @@ def effects_of_program() -> list[tuple[str, dict, dict]]:
             "compliant_contact",
             {"stiffness": 1e6, "damping": 0.3},
             {"contact_stiffness": 1e6, "contact_damping": 0.3},
+        ),
+        (
+            "compliant_contact",
+            {"stiffness": 2e5, "damping": 0.3, "exponent": 1.2},
+            {"contact_stiffness": 2e5, "contact_damping": 0.3, "contact_exponent": 1.2},
         ),
         ("second_barrier", {"position": 0.27}, {"lower": 0.27}),
         ("drive_ripple", {"sine": 0.03, "cosine": -0.02}, {"ripple_sine": 0.03, "ripple_cosine": -0.02}),
@@ -140,12 +189,19 @@ def test_two_methods_give_one_record(generator, separatrix, tmp_path, name, tabl
     assert np.abs(seen - theirs)[late:].max() < 1e-6
 
 
-@pytest.mark.parametrize("number", [0, 1])
+def nothing_hidden(design) -> int:
+    """The number of a case that is drawn quickly."""
+    return next(
+        n for n in range(design.BLOCK) if design.plan(SEED, n)[0] == "none" and not design.is_long(SEED, n)
+    )
+
+
+@pytest.mark.parametrize("number", [None, 1])
 def test_a_case_is_what_its_number_says(generator, tmp_path, number):
     design, _, records, _ = generator
     seals = []
     for folder in ("one", "two"):
-        case = design.draw(SEED, number)
+        case = design.draw(SEED, nothing_hidden(design) if number is None else number)
         seals.append(records.write_case(tmp_path / folder, tmp_path / f"{folder}.json", case))
     assert seals[0] == seals[1] == records.seal(tmp_path / "one.json")
     for name in (records.BASE, *records.TRAINING, records.HELD_OUT):
@@ -155,7 +211,7 @@ def test_a_case_is_what_its_number_says(generator, tmp_path, number):
 def test_the_seal_notices_another_truth(generator, tmp_path):
     design, _, records, _ = generator
     path = tmp_path / "truth.json"
-    found = records.write_case(tmp_path / "case", path, design.draw(SEED, 0))
+    found = records.write_case(tmp_path / "case", path, design.draw(SEED, nothing_hidden(design)))
     path.write_text(json.dumps(json.loads(path.read_text()) | {"names": ["viscous"]}))
     assert records.seal(path) != found
 
@@ -192,6 +248,42 @@ def test_a_size_is_worth_what_was_asked(generator):
             assert target * 0.9 <= case.d_prime[name] <= 1.3 * target, (number, name)
             return
     raise AssertionError("no such case in three blocks")
+
+
+def test_long_cases_have_the_samples_of_a_rig(generator, tmp_path):
+    design, _, records, _ = generator
+    numbers = range(4 * design.BLOCK)
+    long = [number for number in numbers if design.is_long(SEED, number)]
+    assert len(long) == 4 * design.LONG
+    number = next(number for number in long if design.plan(SEED, number)[0] == "none")
+    case = design.draw(SEED, number)
+    records.write_case(tmp_path / "case", tmp_path / "truth.json", case)
+    truth = json.loads((tmp_path / "truth.json").read_text())
+    rows = sum(
+        line[0].isdigit()
+        for name in (*records.TRAINING, records.HELD_OUT)
+        for line in (tmp_path / "case" / name).read_text().splitlines()
+    )
+    assert truth["samples"] == rows
+    assert 50_000 <= rows <= 105_000
+
+
+def test_faults_of_a_rig_are_small_and_in_half_of_the_cases(generator):
+    design, experiment, records, simulator = generator
+    drawn = [design._rig(np.random.default_rng(number)) for number in range(200)]
+    assert 70 < sum(bool(one) for one in drawn) < 130
+    sizes = np.abs([list(one.values()) for one in drawn if one])
+    assert sizes.min() >= 1e-4
+    assert sizes.max() <= 1e-3
+    case = design.draw(SEED, nothing_hidden(design))
+    one = case.training[0]
+    clean = one.observe(one.driven(case.machine), one.states(one.driven(case.machine))[0])[:, 0]
+    case.rig = {"crank_noise": 1e-3, "curved": 1e-3, "cubic": -1e-3, "harmonics": 1e-3}
+    driven, faults = records.with_faults(case, one)
+    one.sensor = {**one.sensor, **faults}
+    seen = one.observe(driven, one.states(driven)[0])[:, 0]
+    change = np.median(np.abs(seen - clean)) / clean.std()
+    assert 1e-4 < change < 0.05
 
 
 def test_every_kind_has_its_share(generator):

@@ -83,11 +83,18 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         return _conclude(bench, decision, best, rivals)
     if shaped is None and found is not first:
         shaped = _shaped(bench, found)
-    if shaped is not None:
+    if shaped is not None and not (_of_two_directions(shaped[0]) and bench.options.most_effects > 1):
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
         return _give_up(decision)
-    *more, closed = with_more(bench, decision.rounds, best)
+    rounds = list(decision.rounds)
+    *more, closed = with_more(bench, rounds, best)
+    if shaped is not None:
+        # a table for each direction says what a law over the speed and one of the direction say with less
+        closed = closed and more[0].evidence > shaped[0].evidence
+        if not closed:
+            return _conclude(bench, decision, *shaped)
+    decision.rounds = rounds
     if closed:
         return _conclude(bench, decision, *more)
     if not settled and more[0].fitted.fit.like_noise(2) and _noise_renewed(bench, more[0]):
@@ -119,6 +126,12 @@ def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
         return None
     judge_ceiling(bench, one)
     return member if one.gates["adequate"] and one.gates["admissible"] and one.gates["converged"] else None
+
+
+def _of_two_directions(one: Judged) -> bool:
+    """Whether a fit has a table of friction for each direction of its own."""
+    free = one.fitted.problem.free
+    return one.name == "friction_curve" and not any(free[i].also for i in one.fitted.added)
 
 
 def _begun(bench: Bench, first: Round) -> Decision:

@@ -9,6 +9,7 @@ import numpy as np
 from separatrix.discovery.decision.judge import Judged, judged
 from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
@@ -121,7 +122,8 @@ def run_round(
         )
         # what is far behind a machine that leaves only noise and foretells need not foretell
         told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
-        found.judged.append(found.judge(fitted, told))
+        found.judged.append(_simplest(bench, found, found.judge(fitted, told)))
+        fitted = found.judged[-1].fitted
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
     found.rank()
@@ -153,6 +155,18 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
     absent = {name: absent[name] for name in STARTS if name in absent}
     return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
+
+
+def _simplest(bench: Bench, found: Round, whole: Judged) -> Judged:
+    """The effect, or one of its laws alone where that has more evidence."""
+    best = whole
+    if whole.prediction is None and bench.held_out is not None:
+        return best
+    for part, fitted in halves(bench.training, found.base, found.candidates[whole.name], whole.fitted):
+        one = found.judge(fitted, bench.foretell(fitted, found.foretold))
+        if one.evidence > best.evidence:
+            best, found.candidates[whole.name] = one, part
+    return best
 
 
 def _out_of_race(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:

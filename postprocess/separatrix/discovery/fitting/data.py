@@ -190,11 +190,13 @@ def polished(
     most: int,
     fixed: np.ndarray | None = None,
     guesses: tuple[np.ndarray, ...] = (),
+    suspects: np.ndarray | None = None,
 ) -> Fit:
-    """The fit after its suspicious segments were tried again by the machine of the others."""
+    """The fit after its suspicious segments, or those given, were tried by the machine of the others."""
     tried = [data.smoothed_starts(stage), *guesses]
     errors = data.smoothed_errors(stage)
-    suspects = suspicious(fit)
+    if suspects is None:
+        suspects = suspicious(fit)
     if not suspects.size:
         return fit
     versions = [fit]
@@ -213,7 +215,8 @@ def polished(
 def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:
     """The machine fitted to the other segments, evaluated on all."""
     kept = np.setdiff1d(np.arange(problem.segments.count), suspects)
-    found = minimise(problem.of_segments(kept), fit.values, fit.starts[kept], most=most, fixed=fixed)
+    part = problem.of_segments(kept)
+    found = minimise(part, fit.values, fit.starts[kept], most=most, fixed=fixed, rough=True)
     starts = fit.starts.copy()
     starts[kept] = found.starts
     return minimise(problem, found.values, starts, most=0)

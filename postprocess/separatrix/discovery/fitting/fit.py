@@ -290,6 +290,17 @@ class _Descent:
         return bool(self.gain < 0.02 * self.before and self.before > limit * max(1, self.count))
 
 
+def blocking(problem: Problem, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Segments that lose more by a Gauss-Newton step than it promises in all: they bar its way."""
+    descent = _Descent(problem, values, starts, np.ones(values.size, bool), False, None)
+    descent.look(0.0, rough=False)
+    start_step, step, promised = gauss_newton_step(descent.blocks, descent.open, _MILD)
+    tried = np.clip(descent.values + step, descent.lower, descent.upper)
+    trial = problem.evaluate(tried, starts + start_step, derivatives=False)
+    lost = _costs(trial, 1.0, robust=False) - _costs(descent.current, 1.0, robust=False)
+    return np.flatnonzero((lost > promised) | trial.failed)
+
+
 def again(problem: Problem, fit: Fit) -> Fit:
     """The same values and starts, evaluated with the noise as it is known now."""
     current = problem.evaluate(fit.values, fit.starts)

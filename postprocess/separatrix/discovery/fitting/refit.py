@@ -8,7 +8,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.data import Data, fit_stages, polished
-from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.fit import Fit, blocking, minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.screen import Screened
@@ -30,6 +30,10 @@ WORSE = 1.0
 _SAME = 1e-3
 # share of chi^2 by which two fits that are far behind may differ and another start not be worth it
 _ALIKE = 0.05
+# reduced chi^2 of the base up to which a start from it is trusted
+_NEAR_BASE = 10.0
+# share of what the base misses that a rival has closed for another effect to need but one start
+_MOST_CLOSED = 0.5
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
 
@@ -113,10 +117,28 @@ def refit(
             break
         if settled and gain_over(best, rival)[0] < -_BEATEN:
             break
+        if _enough(best, base, candidate, rival):
+            break
         if known is not None or (quick and tries == 2):
             # the other starts of a fit that is known were tried then
             break
     return _above_base(data, best, base, candidate)
+
+
+def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | None) -> bool:
+    """Whether a fit that began at the base, and is no worse, needs no start from afar.
+
+    An effect with sizes alone has one minimum near the base. Another has more; but those that are no better
+    where most of the gap is closed, or on top of an effect, are not worth what they cost.
+    """
+    if not found.fit.converged or base.fit.reduced_chi2 > _NEAR_BASE or gain_over(found, base)[0] < -WORSE:
+        return False
+    if candidate.linear.all() or base.added:
+        return True
+    if rival is None or not rival.fit.converged:
+        return False
+    closed = rival.fit.excess < (1 - _MOST_CLOSED) * base.fit.excess
+    return closed and gain_over(found, rival)[0] < -2 * _BEATEN
 
 
 def hopeless(base: Fitted) -> float:
@@ -131,9 +153,7 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
     """
     if not candidate.linear.any() or gain_over(best, base)[0] > -WORSE:
         return best
-    values = _base_values(base, candidate)
-    added = np.array(candidate.added)
-    values[added[candidate.linear]] = 0.0
+    values = _absent(_base_values(base, candidate), candidate)
     problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
     fit = minimise(problem, values, base.fit.starts)
     found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
@@ -141,6 +161,13 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
     if gain_over(best, base)[0] > -WORSE:
         return best
     return replace(best, fit=replace(best.fit, caught=True))
+
+
+def _absent(values: np.ndarray, candidate: Candidate) -> np.ndarray:
+    """The values with the effect of size zero."""
+    values = values.copy()
+    values[np.array(candidate.added)[candidate.linear]] = 0.0
+    return values
 
 
 def beaten(one: Fitted, rival: Fitted) -> bool:
@@ -152,8 +179,15 @@ def beaten(one: Fitted, rival: Fitted) -> bool:
 def carried_on(data: Data, candidate: Candidate, known: Fitted, patient: bool = False) -> Fitted:
     """An earlier fit, carried on with the noise of now."""
     problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-    fit = minimise(problem, known.fit.values, known.fit.starts, patient=patient)
+    values = values_of(known, [replace(one, value=0.0) if one.path in _amplitudes(candidate) else one
+                               for one in candidate.free])  # fmt: skip
+    fit = minimise(problem, values, known.fit.starts, patient=patient)
     return Fitted(candidate.names, candidate.model, problem, fit, candidate.added, known.tries)
+
+
+def _amplitudes(candidate: Candidate) -> set[str]:
+    """Paths of the added parameters without which there is no effect."""
+    return {candidate.free[i].path for i, size in zip(candidate.added, candidate.linear, strict=True) if size}
 
 
 def _delivers(found: Fitted, base: Fitted, candidate: Candidate, screened: Screened | None) -> bool:
@@ -207,7 +241,17 @@ def _try(
     """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
-        return problem, minimise(problem, values, base.fit.starts, most=most, beat=beat)
+        fit = minimise(problem, values, base.fit.starts, most=most, beat=beat)
+        absent = _absent(values, candidate)
+        if fit.total > base.fit.total + 2 * WORSE and not np.array_equal(absent, values):
+            # the linearised size threw it out of the minimum of the base, which it contains
+            other = minimise(problem, absent, base.fit.starts, most=most, beat=beat)
+            if not other.converged:
+                barred = blocking(problem, absent, base.fit.starts)
+                other = polished(data, problem, other, data.last, most, suspects=barred)
+            if other.good.sum() >= fit.good.sum() and other.total < fit.total:
+                fit = other
+        return problem, fit
     stages = [1, data.last]
     if kind == "far":
         stages = list(range(data.last + 1))
