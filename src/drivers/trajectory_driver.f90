@@ -9,6 +9,7 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use constants, only: unreachable
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
   use file_layout, only: add_events
@@ -133,8 +134,7 @@ contains
     type(attractor_t), intent(in) :: cycle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: unreachable, barriers(2)
-    unreachable = sqrt(huge(1.0_wp))
+    real(wp) :: barriers(2)
     barriers = barrier_positions(moving%machine%contact)
     call schema%add_attribute('', 'drive_period', moving%machine%period)
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
