@@ -302,6 +302,7 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     monkeypatch.setattr(rounds, "judged", judge_one)
     monkeypatch.setattr(rounds, "gain_over", lambda one, other: (one.gain - other.gain, None))
     monkeypatch.setattr(rounds, "_out_of_race", lambda *_: False)
+    monkeypatch.setattr(rounds, "_simplest", lambda bench, found, one: one)
     for step in ("_carry_on", "_cross", "_fair"):
         monkeypatch.setattr(rounds, step, lambda *_: None)
     fits = SimpleNamespace(values=[], reduced_chi2=1.0, like_noise=lambda _: False)

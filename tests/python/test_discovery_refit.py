@@ -42,3 +42,21 @@ def test_a_candidate_is_fitted_from_the_base_before_it_is_worse(
     found = refit._above_base(data, poor, base, candidate)
     assert found.fit.values.tolist() == wanted
     assert found.fit.converged == converged
+
+
+@pytest.mark.parametrize(("linear", "added", "chi2", "far", "enough"), [
+    (True, (), 90.0, 100.0, True),
+    # worse than the machine that it contains: thrown out of its minimum
+    (True, (), 101.0, 100.0, False),
+    (False, (), 90.0, 100.0, False),
+    (False, (), 101.0, 100.0, True),
+    # on top of an effect one start is heard, whatever it led to
+    (False, (1,), 101.0, 100.0, True),
+    # a base that is far off says nothing of where the minimum is
+    (True, (), 90.0, 2000.0, False),
+])  # fmt: skip
+def test_a_start_from_afar_is_spared_where_the_base_leads(linear, added, chi2, far, enough):
+    base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], far), added)
+    found = Fitted(("viscous",), None, SimpleNamespace(free=FREE), fit([9.0, 0.5], chi2), (1,))
+    candidate = SimpleNamespace(linear=np.array([linear]))
+    assert refit._enough(found, base, candidate, None) == enough

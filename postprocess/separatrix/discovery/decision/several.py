@@ -55,7 +55,7 @@ def _grown(bench: Bench, rounds: list[Round], found: Judged) -> list[Judged]:
         return sets
     tried = {frozenset(one.fitted.names) for one in sets}
     for _, *pair in pair_gains(first)[:_PAIRS]:
-        if frozenset(pair) not in tried:
+        if frozenset(pair) not in tried and lost.isdisjoint(pair):
             made = fit_set(bench, first, pair)
             if made is not None:
                 sets.append(over_base(bench, first.base, first.foretold, made))

@@ -119,22 +119,28 @@ def refit(
             break
         if _enough(best, base, candidate, rival):
             break
-        if known is not None or (quick and tries == 2):
+        if known is not None or ((quick or base.added) and tries == 2):
             # the other starts of a fit that is known were tried then
             break
     return _above_base(data, best, base, candidate)
 
 
 def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | None) -> bool:
-    """Whether a fit that began at the base, and is no worse, needs no start from afar.
+    """Whether a fit that began at the base needs no start from afar.
 
-    An effect with sizes alone has one minimum near the base. Another has more; but those that are no better
-    where most of the gap is closed, or on top of an effect, are not worth what they cost.
+    An effect with sizes alone has one minimum near the base. Another has more; but where the first is worse
+    than no effect, or no better where most of the gap is closed, or on top of an effect, they are not worth
+    what they cost.
     """
-    if not found.fit.converged or base.fit.reduced_chi2 > _NEAR_BASE or gain_over(found, base)[0] < -WORSE:
+    if base.fit.reduced_chi2 > _NEAR_BASE:
         return False
-    if candidate.linear.all() or base.added:
+    converged, worse = found.fit.converged, gain_over(found, base)[0] < -WORSE
+    if candidate.linear.all():
+        return converged and not worse
+    if (worse and converged) or (base.added and (worse or converged)):
         return True
+    if worse or not converged:
+        return False
     if rival is None or not rival.fit.converged:
         return False
     closed = rival.fit.excess < (1 - _MOST_CLOSED) * base.fit.excess
