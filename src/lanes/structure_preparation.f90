@@ -43,6 +43,7 @@ contains
     real(wp) :: fastest
     flow%available = fits_lanes(moving)
     if (.not. flow%available) return
+    flow%resumes = .true.
     allocate (flow%structure)
     associate (machine => moving%machine, m => flow%structure)
       m%coordinates = machine%n
