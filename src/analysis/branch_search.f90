@@ -20,6 +20,7 @@ module branch_search
   use part_of_branch, only: lies_on
   use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, is_admissible, move_along, &
     orbit_of_motion, orbit_t, same_sequence, scales_of_orbit
+  use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -50,6 +51,8 @@ module branch_search
     !> Rows that give place and speed of what is watched from a section point; whether the section is a time of the drive.
     real(wp), allocatable :: watch(:, :)
     logical :: has_clock = .true.
+    !> Who is told how far the search is, if any.
+    class(search_watch_t), pointer :: watcher => null()
   end type search_t
 
 contains
@@ -83,7 +86,7 @@ contains
     allocate (search%found(i)%orbits(0))
     call machine_neighbourhood(search%family, search%values(i), machines, error)
     if (allocated(error)) return
-    call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i))
+    call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i), search%watcher)
     do k = 1, size(search%found(i)%orbits)
       search%depends = search%depends .or. depends_on_parameter(machines, search%found(i)%orbits(k))
     end do
@@ -159,7 +162,7 @@ contains
     type(orbit_t) :: other
     integer :: i, side
     logical :: ok
-    call trace_branch(search%family, search%plan, seed, found)
+    call trace_branch(search%family, search%plan, seed, found, search%watcher)
     search%branches = [search%branches, found]
     call note_passages(search, found)
     do i = 1, size(found%points)

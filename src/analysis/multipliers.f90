@@ -13,15 +13,18 @@ module multipliers
 
 contains
 
-  !> Eigenvalues, largest modulus first; with imaginary parts that are none left out.
-  pure function multipliers_of(matrix) result(values)
+  !> Eigenvalues, largest modulus first; with imaginary parts that are none left out. With the `determinant` of a matrix of two
+  !> coordinates that is known better than from its entries, the product is that.
+  pure function multipliers_of(matrix, determinant) result(values)
     real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in), optional :: determinant
     complex(wp) :: values(size(matrix, 1)), vectors(size(matrix, 1), size(matrix, 1)), moved
     logical :: ok
     integer :: i, k
     if (size(matrix, 1) <= 2 .or. .not. all(abs(matrix) < sqrt(huge(1.0_wp)))) then
       values = matrix(1, 1)
       if (size(matrix, 1) <= 2) values = eigenvalues(matrix)
+      if (size(matrix, 1) == 2 .and. present(determinant)) call set_product(determinant, values)
       return
     end if
     call general_eigen(matrix, values, vectors, ok)
@@ -37,6 +40,20 @@ contains
       values(k + 1) = moved
     end do
   end function multipliers_of
+
+  !> Gives two multipliers the product that is known: the smaller of real ones is the less known, of a pair the modulus.
+  pure subroutine set_product(determinant, values)
+    real(wp), intent(in) :: determinant
+    complex(wp), intent(inout) :: values(2)
+    real(wp) :: rest
+    if (.not. (abs(values(1)) > 0 .and. abs(determinant) < huge(determinant))) return
+    if (abs(aimag(values(1))) > 0) then
+      rest = determinant - real(values(1))**2
+      if (rest > 0) values = cmplx(real(values(1)), [sqrt(rest), -sqrt(rest)], wp)
+    else
+      values(2) = cmplx(determinant/real(values(1)), 0.0_wp, wp)
+    end if
+  end subroutine set_product
 
   !> det(M + shift).
   pure real(wp) function shifted_determinant(m, shift) result(determinant)

@@ -289,6 +289,7 @@ contains
     type(orbit_t), intent(inout) :: orbit
     real(wp) :: miss(size(orbit%y) + size(orbit%events)), slopes(size(miss), size(miss))
     real(wp), dimension(size(orbit%y)) :: unbounded, y
+    real(wp) :: determinant
     logical :: ok
     unbounded = huge(1.0_wp)
     call shoot(machines%centre, orbit, miss, slopes)
@@ -297,7 +298,10 @@ contains
       y = orbit%y
       call vary_section(machines, structure, orbit%mode, orbit%y, orbit%events, orbit%periods, y, orbit%matrix, ok)
     class default
-      call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, unbounded, orbit%matrix, ok)
+      call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, unbounded, orbit%matrix, ok, &
+                determinant=determinant)
+      if (ok) orbit%multipliers = multipliers_of(orbit%matrix, determinant)
+      if (ok) return
     end select
     if (.not. ok) orbit%matrix = sqrt(huge(1.0_wp))
     orbit%multipliers = multipliers_of(orbit%matrix)

@@ -47,19 +47,21 @@ contains
 
   !> Derivatives of the state at `t_end` [s] of the motion that starts at the section in `mode` with `y` and has `events`:
   !> by the start in `by_start`, by the parameter in `by_parameter`. `ok` is false if the flights do not lead from event to event
-  !> within `tolerance` (in each coordinate), or where an event is met tangentially.
-  pure subroutine vary(machines, mode, y, events, t_end, tolerance, by_start, ok, by_parameter)
+  !> within `tolerance` (in each coordinate), or where an event is met tangentially. `determinant`, of two coordinates, is that of
+  !> `by_start` as the product of those of flights and events: after strong stretching the entries do not know it.
+  pure subroutine vary(machines, mode, y, events, t_end, tolerance, by_start, ok, by_parameter, determinant)
     type(neighbourhood_t), intent(in) :: machines
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:), t_end, tolerance(:)
     type(event_t), intent(in) :: events(:)
     real(wp), intent(out) :: by_start(:, :)
     logical, intent(out) :: ok
-    real(wp), intent(out), optional :: by_parameter(:)
-    real(wp), dimension(size(y), size(y) + 1) :: change
+    real(wp), intent(out), optional :: by_parameter(:), determinant
+    real(wp), dimension(size(y), size(y) + 1) :: change, once
     real(wp), dimension(size(y)) :: state, reached
+    real(wp) :: flight(size(y), size(y))
     real(wp) :: time
-    integer :: i, n, now
+    integer :: i, k, n, now
     logical :: forgets
     n = size(y)
     ok = .true.
@@ -69,9 +71,18 @@ contains
     change = 0
     ! What a start at rest may change is what the rest lets it.
     call machines%centre%fly(now, time, state, time, reached, change(:, :n))
+    if (present(determinant)) determinant = determinant_of(change)
     do i = 1, size(events) + 1
       if (i <= size(events)) then
-        call cross_flight(machines, now, state, time, events(i)%time, change, reached, present(by_parameter))
+        call cross_flight(machines, now, state, time, events(i)%time, change, reached, present(by_parameter), flight)
+        if (present(determinant)) then
+          once = 0
+          do k = 1, n
+            once(k, k) = 1
+          end do
+          call salt(machines, events(i), once, .false., forgets, ok)
+          determinant = determinant*determinant_of(flight)*determinant_of(once)
+        end if
         call salt(machines, events(i), change, present(by_parameter), forgets, ok)
         ! What is forgotten need not be followed.
         ok = ok .and. (forgets .or. all(abs(reached - events(i)%arrival(:n)) <= tolerance))
@@ -80,7 +91,8 @@ contains
         time = events(i)%time
         now = events(i)%after
       else
-        call cross_flight(machines, now, state, time, t_end, change, reached, present(by_parameter))
+        call cross_flight(machines, now, state, time, t_end, change, reached, present(by_parameter), flight)
+        if (present(determinant)) determinant = determinant*determinant_of(flight)
       end if
     end do
     by_start = change(:, :n)
@@ -88,15 +100,21 @@ contains
     ok = all(abs(change) <= huge(1.0_wp))
   end subroutine vary
 
-  !> Takes the variations along a flight.
-  pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter)
+  !> Of the first two coordinates.
+  pure real(wp) function determinant_of(a)
+    real(wp), intent(in) :: a(:, :)
+    determinant_of = a(1, 1)*a(2, 2) - a(1, 2)*a(2, 1)
+  end function determinant_of
+
+  !> Takes the variations along a flight, whose derivative by its start is `flight`.
+  pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter, flight)
     type(neighbourhood_t), intent(in) :: machines
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:), t0, t1
     real(wp), intent(inout) :: change(:, :)
-    real(wp), intent(out) :: reached(:)
+    real(wp), intent(out) :: reached(:), flight(:, :)
     logical, intent(in) :: with_parameter
-    real(wp) :: flight(size(y), size(y)), near(size(y), 4)
+    real(wp) :: near(size(y), 4)
     integer :: i, n
     n = size(y)
     call machines%centre%fly(mode, t0, y, t1, reached, flight)
