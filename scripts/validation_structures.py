@@ -19,6 +19,7 @@ from markdown import table
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from validation_structures_bouncing import bouncing, rattle
+from validation_structures_impacts import COMPUTED as IMPACTS
 from validation_structures_orbits import orbits
 from validation_structures_others import COMPUTED as BENCHMARKS
 from validation_structures_program import SOURCE, Number, Program, text
@@ -360,18 +361,6 @@ def belt_by_steps(file: h5py.File, rests: np.ndarray) -> list[Number]:
 #: What has no number beside it yet, and why.
 NOT_YET = (
     [
-        "capture time of a vibro-impact nonlinear energy sink",
-        "asymptotic: where a capture ends is a matter of taste",
-    ],
-    [
-        "impacting cantilever by two and more modes",
-        "the closed form is no motion there (docs/structure-files.md)",
-    ],
-    [
-        "chatter of one of three bodies",
-        "against every single impact in tests/modes/test_jointed_motion.pf",
-    ],
-    [
         "end of the chatter of a ball between floor and ceiling (Siconos)",
         "events tell where it was completed, not its end",
     ],
@@ -396,6 +385,7 @@ COMPUTED = (
     turning_pendulum,
     simulated,
     *BENCHMARKS,
+    *IMPACTS,
 )
 
 

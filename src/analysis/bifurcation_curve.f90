@@ -8,6 +8,7 @@ module bifurcation_curve
   use branch_point, only: label_gr, label_gr_fold, label_pd, label_sn, label_stick, no_label, point_t
   use curve_equations, only: at_zero, beside_like, choose_monitor, correct, curve_plan_t, curve_point_t, looked_at, move, place_t, &
     set_tangent, unknowns
+  use inverse_interpolation, only: weights_at_zero
   use kinds, only: wp
   use orbit_margins, only: margin_t, of_gap, of_impact
   use part_of_branch, only: event_speeds
@@ -253,10 +254,7 @@ contains
       value(k) = beside_like(family, plan, node, which, passed)
       all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter, node%now%free]
     end do
-    do k = 1, nodes
-      weight(k) = product(value/(value - value(k)), mask=[(i /= k, i=1, nodes)])
-    end do
-    ok = sum(abs(value)) + sum(abs(weight)) < huge(1.0_wp)
+    call weights_at_zero(value, weight, ok)
     if (.not. ok) return
     there = node
     there%now%orbit%y = matmul(all(:2, :), weight)

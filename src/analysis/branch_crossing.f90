@@ -6,6 +6,7 @@ module branch_crossing
   use body_family, only: family_t
   use branch_point, only: step_to, trace_t
   use errors, only: error_t
+  use inverse_interpolation, only: weights_at_zero
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
   use multipliers, only: shifted_determinant
@@ -76,7 +77,7 @@ contains
     type(trace_t) :: node
     type(error_t), allocatable :: error
     real(wp) :: value(nodes), all(size(trace%now%tangent), nodes), tangents(size(trace%now%tangent), nodes), weight(nodes), zero
-    integer :: i, k, n, steps
+    integer :: k, n, steps
     n = size(trace%now%tangent)
     call near_zero(family, trace, test_value(test, trace), test_value(test, next), test, length, zero)
     do k = 1, nodes
@@ -86,10 +87,7 @@ contains
       all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter]
       tangents(:, k) = node%now%tangent
     end do
-    do k = 1, nodes
-      weight(k) = product(value/(value - value(k)), mask=[(i /= k, i=1, nodes)])
-    end do
-    ok = sum(abs(value)) + sum(abs(weight)) < huge(1.0_wp)
+    call weights_at_zero(value, weight, ok)
     if (.not. ok) return
     there = node
     associate (orbit => there%now%orbit, place => matmul(all, weight))

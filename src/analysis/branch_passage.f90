@@ -15,6 +15,7 @@ module branch_passage
     of_turning, same_meaning
   use other_sequence, only: change_sequence
   use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_t
+  use secant_bracket, only: bracket_t, narrow, next_trial
   use soft_graze, only: enter_touches, is_touch, touches_apart, touching, vanishing_touch
   use structure, only: structure_t
   use structure_sequence, only: change_structure_sequence
@@ -105,36 +106,22 @@ contains
     real(wp), intent(inout) :: length
     type(trace_t), intent(out) :: there
     logical, intent(out) :: ok
-    real(wp) :: low, high, f_low, f_high, s, f
-    integer :: i, steps, side
-    low = 0
-    high = length
-    f_low = value_of(target, trace)
-    f_high = value_of(target, next)
+    type(bracket_t) :: bracket
+    real(wp) :: s, f
+    integer :: i, steps
+    bracket = bracket_t(0.0_wp, length, value_of(target, trace), value_of(target, next))
     ! A margin that is not passed within rounding.
-    if (target%test == no_test) f_low = max(f_low, 0.0_wp)
+    if (target%test == no_test) bracket%at_low = max(bracket%at_low, 0.0_wp)
     there = next
     ok = .true.
-    side = 0
+    s = length
     do i = 1, most_secants
-      s = (low + high)/2
-      if (abs(f_low) < huge(f_low)) s = (f_low*high - f_high*low)/(f_low - f_high)
-      if (.not. (s > low .and. s < high)) s = (low + high)/2
+      s = next_trial(bracket)
       call step_to(family, trace, s, there, ok, steps)
       if (.not. ok) return
       f = value_of(target, there)
-      if (abs(f) > 0 .and. (f < 0 .eqv. f_high < 0)) then
-        high = s
-        f_high = f
-        if (side < 0 .and. abs(f_low) < huge(f_low)) f_low = f_low/2
-        side = -1
-      else
-        low = s
-        f_low = f
-        if (side > 0) f_high = f_high/2
-        side = 1
-      end if
-      if (abs(f) <= 4*epsilon(f) .or. high - low <= 4*spacing(high)) exit
+      call narrow(bracket, s, f)
+      if (abs(f) <= 4*epsilon(f) .or. bracket%high - bracket%low <= 4*spacing(bracket%high)) exit
     end do
     length = s
   end subroutine locate

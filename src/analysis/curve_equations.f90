@@ -157,19 +157,20 @@ contains
   function tests(body, orbit) result(test)
     type(one_body_t), intent(in) :: body
     type(orbit_t), intent(inout) :: orbit
-    real(wp) :: test(2), m(states, states), speeds
+    real(wp) :: test(2), m(states, states), speeds, determinant
     type(neighbourhood_t) :: machines
     type(margins_t) :: margins
     logical :: ok
     test = huge(1.0_wp)
     allocate (machines%centre, source=body)
-    call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*body%period, [huge(1.0_wp), huge(1.0_wp)], m, ok)
+    call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*body%period, [huge(1.0_wp), huge(1.0_wp)], m, ok, &
+              determinant=determinant)
     if (.not. ok) return
     orbit%matrix = m
-    orbit%multipliers = eigenvalues(m)
+    orbit%multipliers = eigenvalues(m, determinant)
     margins = margins_of(body, orbit)
     speeds = product(margins%list%value, mask=margins%list%kind == of_impact)
-    test = speeds*(1 + [-1, 1]*(m(1, 1) + m(2, 2)) + (m(1, 1)*m(2, 2) - m(1, 2)*m(2, 1)))
+    test = speeds*(1 + [-1, 1]*(m(1, 1) + m(2, 2)) + determinant)
   end function tests
 
   !> Natural sizes of the unknowns: state, instants, both parameters.

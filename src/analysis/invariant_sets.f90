@@ -9,6 +9,7 @@
 module invariant_sets
   use body_family, only: map_with_variation
   use circle, only: point_near
+  use constants, only: unreachable
   use kinds, only: wp
   use matrices, only: solve
   use motion_state, only: tally_t
@@ -318,7 +319,7 @@ contains
         k = i + scans*(j - 1)
         growth%starts(:, k) = low + (high - low)*[i - 0.5_wp, j - 0.5_wp]/scans
         call map_with_variation(machines, growth%starts(:, k), 1, growth%images(:, k), slopes, tally, ok)
-        if (.not. ok) growth%images(:, k) = sqrt(huge(1.0_wp))
+        if (.not. ok) growth%images(:, k) = unreachable
       end do
     end do
   end subroutine scan_window

@@ -12,7 +12,7 @@ module orbit_search
   use motion_state, only: tally_t
   use multipliers, only: shifted_determinant
   use orbit_sections, only: section_points
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_orbit
   use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none
@@ -22,7 +22,7 @@ module orbit_search
 
   integer, parameter :: most_newton = 20, settling = 150
   !> Relative distance at which a section point counts as a return to an earlier one, and at which two orbits are one.
-  real(wp), parameter :: near_return = 0.1_wp, same_orbit = 1e-7_wp
+  real(wp), parameter :: near_return = 0.1_wp
   !> A motion has settled when it moves no further than this over a number of periods that every short one divides.
   real(wp), parameter :: at_rest = 1e-9_wp
   integer, parameter :: any_period = 12

@@ -11,14 +11,12 @@ module orbit_symmetry
   use kinds, only: wp
   use machine_family, only: machine_of_family
   use part_of_branch, only: lies_on
-  use periodic_orbit, only: closing_time, orbit_t
+  use periodic_orbit, only: closing_time, orbit_t, same_orbit
   implicit none
   private
 
   public :: mark_symmetry, centre_of, is_mirror_image
 
-  !> Halves agree to this in natural sizes.
-  real(wp), parameter :: same = 1e-7_wp
   !> Instants at which they are compared, as shares of half the period.
   real(wp), parameter :: instants(4) = [0.0837_wp, 0.3141_wp, 0.5772_wp, 0.9069_wp]
 
@@ -58,7 +56,7 @@ contains
       twice = one + other
       if (i == 1) first = twice
       if (i == 1) first(machine%places + 1:) = 0
-      is_symmetric = maxval(abs(twice - first)/machine%size_of) < same
+      is_symmetric = maxval(abs(twice - first)/machine%size_of) < same_orbit
       if (.not. is_symmetric) return
     end do
   end function is_symmetric

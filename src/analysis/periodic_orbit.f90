@@ -7,6 +7,7 @@
 !> another, so that an orbit can be followed up to and beyond the end of its event sequence.
 module periodic_orbit
   use body_family, only: family_t
+  use constants, only: unreachable
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
@@ -30,6 +31,8 @@ module periodic_orbit
   real(wp), parameter :: converged_step = 1e-11_wp
   !> Newton's steps with the same derivatives by the parameter.
   integer, parameter :: newton_between = 4
+  !> Orbits whose points on the section are within this in natural sizes are one.
+  real(wp), parameter, public :: same_orbit = 1e-7_wp
   !> A motion with the events of an orbit at other instants than this share of 1/frequency is not that orbit.
   real(wp), parameter :: likeness = 1e-5_wp
 
@@ -289,7 +292,7 @@ contains
     type(orbit_t), intent(inout) :: orbit
     real(wp) :: miss(size(orbit%y) + size(orbit%events)), slopes(size(miss), size(miss))
     real(wp), dimension(size(orbit%y)) :: unbounded, y
-    real(wp) :: determinant
+    real(wp), allocatable :: determinant
     logical :: ok
     unbounded = huge(1.0_wp)
     call shoot(machines%centre, orbit, miss, slopes)
@@ -298,13 +301,15 @@ contains
       y = orbit%y
       call vary_section(machines, structure, orbit%mode, orbit%y, orbit%events, orbit%periods, y, orbit%matrix, ok)
     class default
+      allocate (determinant)
       call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, unbounded, orbit%matrix, ok, &
                 determinant=determinant)
-      if (ok) orbit%multipliers = multipliers_of(orbit%matrix, determinant)
-      if (ok) return
     end select
-    if (.not. ok) orbit%matrix = sqrt(huge(1.0_wp))
-    orbit%multipliers = multipliers_of(orbit%matrix)
+    if (.not. ok) then
+      orbit%matrix = unreachable
+      if (allocated(determinant)) deallocate (determinant)
+    end if
+    orbit%multipliers = multipliers_of(orbit%matrix, determinant)
   end subroutine set_multipliers
 
   !> Direction in which the orbits go on, a unit vector in natural sizes, on the side of `along`.

@@ -11,6 +11,7 @@ module saddle_search
   use matrices, only: solve
   use motion_state, only: tally_t
   use multipliers, only: multipliers_of
+  use periodic_orbit, only: same_orbit
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -18,8 +19,8 @@ module saddle_search
   public :: find_saddle, saddle_at, add_saddle, section_distance, distance_to_saddle
 
   integer, parameter :: most_newton = 30
-  !> Of natural sizes: Newton's method is not to go further at once, has converged, and two orbits are one.
-  real(wp), parameter :: longest_step = 0.3_wp, converged = 1e-12_wp, same_orbit = 1e-7_wp
+  !> Of natural sizes: Newton's method is not to go further at once, has converged.
+  real(wp), parameter :: longest_step = 0.3_wp, converged = 1e-12_wp
   !> A multiplier nearer to the unit circle than this does not tell a saddle.
   real(wp), parameter :: neutral = 1e-6_wp
   !> Rate of change in natural sizes below which nothing moves.

@@ -43,19 +43,23 @@ contains
 
   !> Adds to `catalogue` what `starts` (rows x [m], v [m/s], crank angle [rad]) lead to and it does not yet hold.
   !> Cycles up to `max_period` drive periods are looked for after one, two, four ... durations, those that come back to the bit
-  !> whatever their period.
-  pure subroutine discover_attractors(moving, span, starts, max_period, catalogue)
+  !> whatever their period. `within_span`: a motion that has come to nothing by the end of the extension is left out; it is not
+  !> watched over the thousands of periods that tell chaos from a long transient.
+  pure subroutine discover_attractors(moving, span, starts, max_period, catalogue, within_span)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: max_period
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
+    logical, intent(in), optional :: within_span
     type(strobe_t) :: strobe
     type(attractor_t) :: found
     type(stretch_t) :: stretch
     real(wp) :: patience
     integer :: i
-    logical :: ok
+    logical :: ok, longer
+    longer = .true.
+    if (present(within_span)) longer = .not. within_span
     if (.not. allocated(catalogue)) allocate (catalogue(0))
     if (.not. has_section(moving)) return
     do i = 1, size(starts, 2)
@@ -71,7 +75,7 @@ contains
         end if
         if (find_box(catalogue, section_point(moving, strobe), stretch%regime) > 0) exit
         if (2*patience > span%extension*span%duration) then
-          call look_longer(moving, max_period, stretch, strobe, catalogue)
+          call look_longer(moving, max_period, longer, stretch, strobe, catalogue)
           exit
         end if
         patience = 2*patience
@@ -80,10 +84,11 @@ contains
   end subroutine discover_attractors
 
   !> The end of patience: the motion without impact of a linear oscillator is known without it; any other is watched for a fixed
-  !> number of periods more, and if it has come to no cycle then, it is not periodic, or not known.
-  pure subroutine look_longer(moving, max_period, stretch, strobe, catalogue)
+  !> number of periods more if it may take `longer`, and if it has come to no cycle then, it is not periodic, or not known.
+  pure subroutine look_longer(moving, max_period, longer, stretch, strobe, catalogue)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: max_period
+    logical, intent(in) :: longer
     type(stretch_t), intent(in) :: stretch
     type(strobe_t), intent(inout) :: strobe
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
@@ -97,6 +102,7 @@ contains
         return
       end if
     end if
+    if (.not. longer) return
     lasts = .false.
     do
       call watch_long(moving, catalogue, stretch%amplitude, strobe, found, returns, known, ok)

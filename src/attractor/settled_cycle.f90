@@ -17,7 +17,8 @@ module settled_cycle
 contains
 
   !> The cycle that the motion of `outcome` has come to by its end, period 0 if none; then the steady values are those of
-  !> the cycle. Not where they are asked for over the window as it is. `patience`: span of the case, with its extension;
+  !> the cycle. Not where they are asked for over the window as it is. A cycle that the motion comes to later, or that is longer
+  !> than the motion, is none of its own, so that chaos is not searched for long. `patience`: span of the case, with its extension;
   !> `start`: x [m], v [m/s], crank angle [rad].
   pure subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
     type(motion_t), intent(in) :: moving
@@ -28,8 +29,10 @@ contains
     type(attractor_t), intent(out) :: cycle
     type(attractor_t), allocatable :: own(:)
     type(outcome_t) :: again
+    integer :: most_periods
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
-    call discover_attractors(moving, patience, reshape(start, [3, 1]), max_period, own)
+    most_periods = min(max_period, max(1, int(min(span%duration/moving%machine%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
+    call discover_attractors(moving, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
     if (size(own) == 0) return
     call sort_attractors(own)
     call run_trajectory(moving, own, span, start(1), start(2), start(3), again)

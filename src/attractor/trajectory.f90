@@ -16,8 +16,8 @@ module trajectory
   implicit none
   private
 
-  public :: run_trajectory, run_from_section, begin_course, go_past_turn, go_to_stop, pass_stop, sections_ahead, ends_captured, &
-    conclude, fit_window
+  public :: run_trajectory, run_from_section, begin_course, begin_record, end_record, go_on, is_recorded, go_past_turn, &
+    go_to_stop, pass_stop, sections_ahead, ends_captured, conclude, fit_window
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
@@ -108,25 +108,54 @@ contains
     type(course_t), intent(inout) :: course
     type(outcome_t), intent(inout) :: outcome
     type(log_t), intent(inout), optional :: log
-    logical :: slipped
-    if (present(log)) then
-      log%book%at_start = energy_now(moving, course)
-      log%origin = -course%state%time
-      if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
-    end if
-    do while (course%phase == phase_transient .or. course%phase == phase_window)
-      call go_to_stop(moving, course, slipped, log)
-      call pass_stop(moving, catalogue, span, slipped, course, outcome)
+    if (present(log)) call begin_record(moving, course, log)
+    do while (is_recorded(course))
+      call go_on(moving, catalogue, span, course, outcome, log)
     end do
-    if (present(log)) then
-      call record_end(moving, course, log%sample_interval > 0 .and. course%elapsed >= span%duration, log)
-    end if
+    if (present(log)) call end_record(moving, span, course, log)
     do while (course%phase == phase_extension)
-      call go_to_stop(moving, course, slipped)
-      call pass_stop(moving, catalogue, span, slipped, course, outcome)
+      call go_on(moving, catalogue, span, course, outcome)
     end do
     call conclude(moving, catalogue, course, outcome)
   end subroutine run_course
+
+  !> The part of a course that is written down: all but the extension.
+  pure logical function is_recorded(course)
+    type(course_t), intent(in) :: course
+    is_recorded = course%phase == phase_transient .or. course%phase == phase_window
+  end function is_recorded
+
+  !> To the next stop, with what is due there.
+  pure subroutine go_on(moving, catalogue, span, course, outcome, log)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(span_t), intent(in) :: span
+    type(course_t), intent(inout) :: course
+    type(outcome_t), intent(inout) :: outcome
+    type(log_t), intent(inout), optional :: log
+    logical :: slipped
+    call go_to_stop(moving, course, slipped, log)
+    call pass_stop(moving, catalogue, span, slipped, course, outcome)
+  end subroutine go_on
+
+  !> What a log holds of the state at the start of a course, and when its first sample is due.
+  pure subroutine begin_record(moving, course, log)
+    type(motion_t), intent(in) :: moving
+    type(course_t), intent(in) :: course
+    type(log_t), intent(inout) :: log
+    log%book%at_start = energy_now(moving, course)
+    log%origin = -course%state%time
+    if (log%sample_interval > 0) log%next_sample = ceiling(course%state%time/log%sample_interval)
+  end subroutine begin_record
+
+  !> What a log holds of the state at the end of the duration.
+  pure subroutine end_record(moving, span, course, log)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(course_t), intent(in) :: course
+    type(log_t), intent(inout) :: log
+    call record_end(moving, course, log%sample_interval > 0 .and. course%elapsed >= span%duration, log)
+  end subroutine end_record
 
   !> A body set off from a `start` as `start_strobe` has it.
   pure subroutine begin_course(moving, span, start, course)

@@ -8,6 +8,7 @@ module c_trajectory
   use c_text, only: answer
   use case_setup, only: span_of
   use case_type, only: case_t
+  use constants, only: unreachable
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
   use kinds, only: wp
@@ -188,8 +189,7 @@ contains
     type(log_t), intent(in) :: log
     type(outcome_t), intent(in) :: outcome
     real(wp), intent(inout) :: summary(:)
-    real(wp) :: barriers(2), unreachable
-    unreachable = sqrt(huge(1.0_wp))
+    real(wp) :: barriers(2)
     barriers = barrier_positions(moving%machine%contact)
     where (abs(barriers) > unreachable) barriers = sign(ieee_value(1.0_wp, ieee_positive_inf), barriers)
     associate (f => outcome%window, book => log%book)

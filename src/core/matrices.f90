@@ -7,7 +7,7 @@ module matrices
   implicit none
   private
 
-  public :: solve, cholesky, spectral_radius, eigenvalues
+  public :: solve, cholesky, determinant_of, spectral_radius, eigenvalues
 
   !> Squarings by which |A^(2^k)|^(1/2^k) comes near the spectral radius.
   integer, parameter :: squarings = 20
@@ -56,6 +56,34 @@ contains
     end do
   end function cholesky
 
+  !> The determinant, by elimination with row exchanges.
+  pure real(wp) function determinant_of(m) result(determinant)
+    real(wp), intent(in) :: m(:, :)
+    real(wp) :: a(size(m, 1), size(m, 1)), row(size(m, 1))
+    integer :: i, k, n
+    n = size(m, 1)
+    if (n == 2) then
+      determinant = m(1, 1)*m(2, 2) - m(1, 2)*m(2, 1)
+      return
+    end if
+    a = m
+    determinant = 1
+    do k = 1, n
+      i = k - 1 + maxloc(abs(a(k:, k)), 1)
+      determinant = determinant*a(i, k)
+      if (.not. abs(determinant) > 0) return
+      if (i /= k) then
+        row = a(i, :)
+        a(i, :) = a(k, :)
+        a(k, :) = row
+        determinant = -determinant
+      end if
+      do i = k + 1, n
+        a(i, k:) = a(i, k:) - a(i, k)/a(k, k)*a(k, k:)
+      end do
+    end do
+  end function determinant_of
+
   !> Largest modulus of the eigenvalues: in closed form up to two rows, else by Gelfand's formula, which misses by a
   !> relative 2e-5 at most.
   pure real(wp) function spectral_radius(a) result(radius)
@@ -67,7 +95,7 @@ contains
       radius = abs(a(1, 1))
     case (2)
       half_trace = (a(1, 1) + a(2, 2))/2
-      determinant = a(1, 1)*a(2, 2) - a(1, 2)*a(2, 1)
+      determinant = determinant_of(a)
       discriminant = half_trace**2 - determinant
       if (discriminant >= 0) then
         radius = abs(half_trace) + sqrt(discriminant)
@@ -92,9 +120,10 @@ contains
 
   !> The eigenvalues, largest modulus first, of a conjugate pair the one with positive imaginary part first: in closed form up
   !> to two rows, else the roots of the characteristic polynomial (Faddeev and LeVerrier) by the simultaneous iteration of
-  !> Weierstrass, which serves few rows.
-  pure function eigenvalues(a) result(values)
+  !> Weierstrass, which serves few rows. `known_determinant`: better than the entries of two rows give it.
+  pure function eigenvalues(a, known_determinant) result(values)
     real(wp), intent(in) :: a(:, :)
+    real(wp), intent(in), optional :: known_determinant
     complex(wp) :: values(size(a, 1)), moved
     real(wp) :: half_trace, determinant, root
     integer :: i, k
@@ -103,7 +132,8 @@ contains
       values = cmplx(a(1, 1), 0.0_wp, wp)
     case (2)
       half_trace = (a(1, 1) + a(2, 2))/2
-      determinant = a(1, 1)*a(2, 2) - a(1, 2)*a(2, 1)
+      determinant = determinant_of(a)
+      if (present(known_determinant)) determinant = known_determinant
       root = ((a(1, 1) - a(2, 2))/2)**2 + a(1, 2)*a(2, 1)
       if (root < 0) then
         values = cmplx(half_trace, sqrt(-root)*[1.0_wp, -1.0_wp], wp)

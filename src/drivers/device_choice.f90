@@ -7,10 +7,10 @@ module device_choice
   use case_type, only: case_t
   use command_line, only: command_t
   use errors, only: error_t, fail
+  use fleet, only: prepare_flow
   use grid, only: grid_t, slice_motion, two_axes
   use kinds, only: int64, wp
   use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, gpu_number, use_gpu
-  use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_flow_t
   use motion, only: motion_t
   use motion_state, only: options_t
@@ -152,7 +152,7 @@ contains
     has_lanes = .false.
     call slice_motion(grid_of(the_case, the_case%axes(:0)), 0_int64, moving, error)
     if (allocated(error)) return
-    call prepare_lanes(moving, flow)
+    call prepare_flow(moving, flow)
     has_lanes = flow%available .and. .not. (on_gpu .and. allocated(flow%structure))
   end function has_lanes
 

@@ -6,6 +6,7 @@ module point_list
   use axis, only: name_length
   use case_parameters, only: parameter_bounds
   use case_values, only: bounds_t
+  use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: int64, wp
@@ -203,8 +204,8 @@ contains
     real(wp) :: barriers(2)
     barriers = barrier_positions(contact)
     words = ''
-    if (barriers(2) > -sqrt(huge(1.0_wp))) words = 'at least the lower barrier '//to_text(barriers(2))//' m'
-    if (barriers(1) > sqrt(huge(1.0_wp))) return
+    if (barriers(2) > -unreachable) words = 'at least the lower barrier '//to_text(barriers(2))//' m'
+    if (barriers(1) > unreachable) return
     if (len(words) > 0) words = words//', '
     words = words//'at most the upper barrier '//to_text(barriers(1))//' m'
   end function between_barriers

@@ -12,9 +12,9 @@ module points_driver
   use endings, only: report_reasons
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime, axis_dimension
+  use fleet, only: prepare_flow
   use grid, only: grid_t, machine_with, make_grid, point_start, sample_axis, slice_motion
   use kinds, only: int64, int8, wp
-  use lane_preparation, only: prepare_lanes
   use map_file, only: map_file_t
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t, type_float64, type_int32
@@ -131,7 +131,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call slice_motion(grid, 0_int64, journey%moving, error)
     if (allocated(error)) return
-    call prepare_lanes(journey%moving, journey%flow)
+    call prepare_flow(journey%moving, journey%flow)
     journey%span = span_of(the_case)
     journey%span%stop_when_captured = .false.
     journey%span%extension = 1
@@ -282,7 +282,7 @@ contains
         if (abs(ratio - self%ratio) > 0) then
           call machine_with(self%grid, 'drive.ratio', ratio, self%journey%moving, error)
           if (allocated(error)) return
-          call prepare_lanes(self%journey%moving, self%journey%flow)
+          call prepare_flow(self%journey%moving, self%journey%flow)
           self%ratio = ratio
         end if
       end associate

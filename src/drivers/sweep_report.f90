@@ -5,6 +5,7 @@
 module sweep_report
   use attractors, only: regime_impact, regime_names
   use case_type, only: contact_position => contact_law
+  use constants, only: unreachable
   use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
   use file_layout, only: add_axes, add_reason, add_regime
   use journal, only: json_number
@@ -63,8 +64,8 @@ contains
     ! A barrier that is swept has no one position.
     if (session%the_case%sweep%swept%name == 'contact.upper') barriers(1) = huge(1.0_wp)
     if (session%the_case%sweep%swept%name == 'contact.lower') barriers(2) = -huge(1.0_wp)
-    if (barriers(1) < sqrt(huge(1.0_wp))) call schema%add_attribute('', 'barrier_upper', barriers(1))
-    if (barriers(2) > -sqrt(huge(1.0_wp))) call schema%add_attribute('', 'barrier_lower', barriers(2))
+    if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
+    if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
 
   contains
 

@@ -9,11 +9,11 @@ module trajectory_driver
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use constants, only: unreachable
   use contact_law, only: barrier_positions
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
-  use journal, only: duration_text
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
@@ -27,10 +27,14 @@ module trajectory_driver
   use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
   use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
+  use stop_check, only: check_stop
+  use strobe, only: coordinates_of
+  use system, only: monotonic_seconds
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
-  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
+  use trajectory, only: begin_course, begin_record, conclude, course_t, end_record, fit_window, go_on, is_recorded, &
+    outcome_t, span_t
   use turn_section, only: has_no_clock
   implicit none
   private
@@ -39,6 +43,8 @@ module trajectory_driver
 
   !> Most samples of a trajectory: some hundred bytes each.
   real(wp), parameter :: most_samples = 2e7_wp
+  !> A search that may take so many seconds is told of.
+  real(wp), parameter :: worth_a_word = 5
 
 contains
 
@@ -53,7 +59,7 @@ contains
     type(outcome_t) :: outcome
     type(schema_t) :: schema
     type(error_t), allocatable :: error
-    type(attractor_t) :: no_catalogue(0), cycle
+    type(attractor_t) :: cycle
     character(len=:), allocatable :: path
     call open_session(command, session)
     call require_start(session%the_case, error)
@@ -77,7 +83,8 @@ contains
     end if
     call session%begin(path, tiled=.false.)
     call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
-    call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome, log)
+    call fly(session, moving, span, grid%start, outcome, log, error)
+    call session%stop_if(error)
     call describe_cycle(moving, span_of(session%the_case), span, session%the_case%attractors%max_period, grid%start, outcome, &
                         cycle)
     call describe_file(session, 'trajectory', schema)
@@ -103,6 +110,39 @@ contains
     call report_files(session, command, path)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
+
+  !> The motion, with a word on how far it is where it takes its time. Code 75 on a stop signal.
+  subroutine fly(session, moving, span, start, outcome, log, error)
+    type(session_t), intent(inout) :: session
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    real(wp), intent(in) :: start(3)
+    type(outcome_t), intent(out) :: outcome
+    type(log_t), intent(inout) :: log
+    type(error_t), allocatable, intent(out) :: error
+    type(attractor_t) :: no_catalogue(0)
+    type(course_t) :: course
+    real(wp) :: began, periods, searched
+    began = monotonic_seconds()
+    call begin_course(moving, span, start, course)
+    call session%journal%begin('periods', ceiling(span%duration/moving%machine%period, int64), 0_int64)
+    call begin_record(moving, course, log)
+    do while (is_recorded(course))
+      call go_on(moving, no_catalogue, span, course, outcome, log)
+      call session%journal%progress(int(course%elapsed/moving%machine%period, int64))
+      call check_stop(session%journal, 0.0_wp, 'flying', error)
+      if (allocated(error)) return
+    end do
+    call end_record(moving, span, course, log)
+    call conclude(moving, no_catalogue, course, outcome)
+    if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
+    ! Newton's method at each period, twenty steps with differences along every coordinate at most.
+    periods = span%duration/moving%machine%period
+    searched = session%the_case%run%extension*periods &
+               + 10*(2*coordinates_of(moving) + 1)*min(periods, real(session%the_case%attractors%max_period, wp))**2
+    if ((monotonic_seconds() - began)/periods*searched < worth_a_word) return
+    call session%journal%line('search', 'looking for the cycle that it came to; run.average = "window" leaves that out')
+  end subroutine fly
 
   !> Code 65 if the samples of so many drive periods are more than fit into memory.
   subroutine check_samples(the_case, periods, error)
@@ -133,8 +173,7 @@ contains
     type(attractor_t), intent(in) :: cycle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
-    real(wp) :: unreachable, barriers(2)
-    unreachable = sqrt(huge(1.0_wp))
+    real(wp) :: barriers(2)
     barriers = barrier_positions(moving%machine%contact)
     call schema%add_attribute('', 'drive_period', moving%machine%period)
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)

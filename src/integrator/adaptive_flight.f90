@@ -6,6 +6,7 @@
 !> again to the event itself, so that the state carries the error of the method and not of the extension. The same
 !> as `guarded_march` to the bit, but for two unknowns only and faster: basins with a Stribeck layer need it.
 module adaptive_flight
+  use constants, only: unreachable
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
@@ -24,8 +25,6 @@ module adaptive_flight
   public :: fly_adaptive
 
   integer, parameter :: most_polish = 6, most_equations = 2
-  !> Positions and speeds beyond this stand for none.
-  real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
 
   !> What a slip needs to know of the machine and where it must end.
   type :: slip_t

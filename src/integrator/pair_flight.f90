@@ -4,6 +4,7 @@
 !> One flight of two bodies in one mode, in closed form, up to the first guard that falls: relative velocity zero, a
 !> stop, the break-away of the interface, or the release from the stop.
 module pair_flight
+  use constants, only: unreachable
   use kinds, only: wp
   use linear_flow, only: drop_rounding, expand, first_zero, is_above, most_unknowns, order, product_integral, series_of, &
     series_value, state_at, stretch_t, stride
@@ -212,7 +213,6 @@ contains
     type(pair_motion_t), intent(in) :: moving
     integer, intent(in) :: touch
     type(watch_t), intent(inout) :: watches(guards)
-    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
     associate (machine => moving%machine, upper => watches(guard_upper), lower => watches(guard_lower))
       upper%active = machine%upper < unreachable
       lower%active = machine%lower > -unreachable

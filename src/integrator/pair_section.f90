@@ -5,7 +5,7 @@
 !> controller. What nothing depends on is left out: the driving body where its motion is given, the position of one that nothing
 !> ties and of the driven one where no stop bounds it, the velocity of both where nothing ties either to the ground.
 module pair_section
-  use constants, only: two_pi
+  use constants, only: two_pi, unreachable
   use contact_law, only: contact_t
   use kinds, only: wp
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion
@@ -18,8 +18,6 @@ module pair_section
   public :: coordinates_of_pair, free_pair, tells_what_follows, start_of_pair, resumed_pair, pair_at, pair_point, scales_of_pair
 
   integer, parameter :: of_place = 1, of_v2 = 2, of_x1 = 3, of_v1 = 4, of_integral = 5, of_two = 5
-  !> Stops beyond are none.
-  real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
 
 contains
 

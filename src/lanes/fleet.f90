@@ -5,18 +5,21 @@
 module fleet
   use jointed_log, only: watched_state
   use kinds, only: wp
+  use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_batch_t, lane_flow_t, regions_t
   use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
+  use machine_facts, only: is_one_body
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
   use strobe, only: coordinates_of, strobe_t
   use structure_lanes, only: add_structure_region, fly_structure_lanes, occupy_structure_lane, structure_flies, &
     structure_lane_state, take_structure_counts
+  use structure_preparation, only: prepare_structure_lanes
   use structure_types, only: structure_batch_t
   implicit none
   private
 
-  public :: open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, fly_fleet
+  public :: prepare_flow, open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, fly_fleet
 
   !> Every lane is controlled by `batch`; the motion of several bodies is in `structures`.
   type, public :: fleet_t
@@ -27,6 +30,16 @@ module fleet
   end type fleet_t
 
 contains
+
+  !> How lanes fly a machine, if its options ask for lanes.
+  pure subroutine prepare_flow(moving, flow)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(out) :: flow
+    flow%width = moving%options%lane_width
+    if (flow%width <= 0) return
+    if (allocated(moving%jointed)) call prepare_structure_lanes(moving%jointed, flow)
+    if (is_one_body(moving)) call prepare_lanes(moving, flow)
+  end subroutine prepare_flow
 
   !> Empty lanes for a machine.
   pure subroutine open_fleet(moving, fleet)

@@ -10,12 +10,10 @@ module lane_preparation
   use kinds, only: wp
   use lane_types, only: contact_series_t, lane_flow_t, layer_nodes, machine_t, mode_t, most_harmonics, restitution_curve_t
   use layer_transit, only: gauss
-  use machine_facts, only: is_one_body
   use motion, only: motion_t
   use motion_state, only: flight_adaptive
   use oscillator, only: oscillator_t
   use rest, only: chatter_speed
-  use structure_preparation, only: prepare_structure_lanes
   implicit none
   private
 
@@ -39,15 +37,11 @@ module lane_preparation
 
 contains
 
-  !> Lanes for a jointed structure or one body, if its options ask for lanes. One body: in closed form where its equation is linear
+  !> Lanes of `flow%width` for one body: in closed form where its equation is linear
   !> in every mode of slip, or has a thin Stribeck layer, without a harmonic at resonance; else in series where all forces have one.
   pure subroutine prepare_lanes(moving, flow)
     type(motion_t), intent(in) :: moving
-    type(lane_flow_t), intent(out) :: flow
-    flow%width = moving%options%lane_width
-    if (flow%width <= 0) return
-    if (allocated(moving%jointed)) call prepare_structure_lanes(moving%jointed, flow)
-    if (.not. is_one_body(moving)) return
+    type(lane_flow_t), intent(inout) :: flow
     flow%gpu = moving%options%gpu
     if (moving%exact .and. .not. moving%machine%contact%soft) then
       call prepare_plain(moving, flow)

@@ -6,10 +6,10 @@ module basin
   use attractors, only: attractor_t
   use discover, only: discover_attractors
   use errors, only: error_t, fail
+  use fleet, only: prepare_flow
   use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
   use kinds, only: int64, wp
   use match, only: carry_labels, number_new, remember
-  use lane_preparation, only: prepare_lanes
   use motion, only: motion_t
   use pair, only: is_pair
   use point_columns, only: outcome_values
@@ -65,7 +65,7 @@ contains
     journey%span = span
     call fit_window(journey%moving%machine%period, journey%span)
     journey%describe = describe
-    call prepare_lanes(journey%moving, journey%flow)
+    call prepare_flow(journey%moving, journey%flow)
   end subroutine open_journey
 
   !> Points worth asking `basin_points` for at a time, from that at `index` on: its slice speaks for those that follow.

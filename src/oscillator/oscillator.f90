@@ -4,7 +4,7 @@
 !> A machine composed of laws: m x'' = restoring(l0 + x_A(phi) - x) + friction(x') + effects, barriers at
 !> fixed positions, crank angle phi = Omega t + phi_0.
 module oscillator
-  use constants, only: two_pi
+  use constants, only: two_pi, unreachable
   use contact_law, only: add_to_contact, barrier_positions, compliant_contact, contact_of, contact_t, force_on_body
   use drive_law, only: add_harmonics, add_ripple, drive_of, drive_t, foot_motion, measured_force
   use effect_check, only: refuse_effects
@@ -154,7 +154,6 @@ contains
   pure real(wp) function turn_of(machine) result(turn)
     type(oscillator_t), intent(in) :: machine
     real(wp) :: barriers(2)
-    real(wp), parameter :: unreachable = sqrt(huge(1.0_wp))
     barriers = barrier_positions(machine%contact)
     turn = 0
     if (abs(machine%effects%cubic) > 0 .or. abs(machine%effects%friction_slope) > 0 .or. &

@@ -8,6 +8,7 @@
 module variations
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
+  use matrices, only: determinant_of
   implicit none
   private
 
@@ -47,8 +48,8 @@ contains
 
   !> Derivatives of the state at `t_end` [s] of the motion that starts at the section in `mode` with `y` and has `events`:
   !> by the start in `by_start`, by the parameter in `by_parameter`. `ok` is false if the flights do not lead from event to event
-  !> within `tolerance` (in each coordinate), or where an event is met tangentially. `determinant`, of two coordinates, is that of
-  !> `by_start` as the product of those of flights and events: after strong stretching the entries do not know it.
+  !> within `tolerance` (in each coordinate), or where an event is met tangentially. `determinant`: of `by_start`, as the product
+  !> over the flights and events, which keeps its digits where `by_start` has large entries.
   pure subroutine vary(machines, mode, y, events, t_end, tolerance, by_start, ok, by_parameter, determinant)
     type(neighbourhood_t), intent(in) :: machines
     integer, intent(in) :: mode
@@ -57,11 +58,10 @@ contains
     real(wp), intent(out) :: by_start(:, :)
     logical, intent(out) :: ok
     real(wp), intent(out), optional :: by_parameter(:), determinant
-    real(wp), dimension(size(y), size(y) + 1) :: change, once
+    real(wp), dimension(size(y), size(y) + 1) :: change
     real(wp), dimension(size(y)) :: state, reached
-    real(wp) :: flight(size(y), size(y))
     real(wp) :: time
-    integer :: i, k, n, now
+    integer :: i, n, now
     logical :: forgets
     n = size(y)
     ok = .true.
@@ -71,19 +71,11 @@ contains
     change = 0
     ! What a start at rest may change is what the rest lets it.
     call machines%centre%fly(now, time, state, time, reached, change(:, :n))
-    if (present(determinant)) determinant = determinant_of(change)
+    if (present(determinant)) determinant = determinant_of(change(:, :n))
     do i = 1, size(events) + 1
       if (i <= size(events)) then
-        call cross_flight(machines, now, state, time, events(i)%time, change, reached, present(by_parameter), flight)
-        if (present(determinant)) then
-          once = 0
-          do k = 1, n
-            once(k, k) = 1
-          end do
-          call salt(machines, events(i), once, .false., forgets, ok)
-          determinant = determinant*determinant_of(flight)*determinant_of(once)
-        end if
-        call salt(machines, events(i), change, present(by_parameter), forgets, ok)
+        call cross_flight(machines, now, state, time, events(i)%time, change, reached, present(by_parameter), determinant)
+        call salt(machines, events(i), change, present(by_parameter), forgets, ok, determinant)
         ! What is forgotten need not be followed.
         ok = ok .and. (forgets .or. all(abs(reached - events(i)%arrival(:n)) <= tolerance))
         if (.not. ok) return
@@ -91,8 +83,7 @@ contains
         time = events(i)%time
         now = events(i)%after
       else
-        call cross_flight(machines, now, state, time, t_end, change, reached, present(by_parameter), flight)
-        if (present(determinant)) determinant = determinant*determinant_of(flight)
+        call cross_flight(machines, now, state, time, t_end, change, reached, present(by_parameter), determinant)
       end if
     end do
     by_start = change(:, :n)
@@ -100,25 +91,21 @@ contains
     ok = all(abs(change) <= huge(1.0_wp))
   end subroutine vary
 
-  !> Of the first two coordinates.
-  pure real(wp) function determinant_of(a)
-    real(wp), intent(in) :: a(:, :)
-    determinant_of = a(1, 1)*a(2, 2) - a(1, 2)*a(2, 1)
-  end function determinant_of
-
-  !> Takes the variations along a flight, whose derivative by its start is `flight`.
-  pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter, flight)
+  !> Takes the variations along a flight.
+  pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter, determinant)
     type(neighbourhood_t), intent(in) :: machines
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:), t0, t1
     real(wp), intent(inout) :: change(:, :)
-    real(wp), intent(out) :: reached(:), flight(:, :)
+    real(wp), intent(out) :: reached(:)
     logical, intent(in) :: with_parameter
-    real(wp) :: near(size(y), 4)
+    real(wp), intent(inout), optional :: determinant
+    real(wp) :: flight(size(y), size(y)), near(size(y), 4)
     integer :: i, n
     n = size(y)
     call machines%centre%fly(mode, t0, y, t1, reached, flight)
     change = matmul(flight, change)
+    if (present(determinant)) determinant = determinant*determinant_of(flight)
     if (.not. with_parameter) return
     do i = 1, 4
       call machines%near(i)%fly(mode, t0, y, t1, near(:, i))
@@ -127,16 +114,17 @@ contains
   end subroutine cross_flight
 
   !> Takes the variations across an event. `forgets`: the state after it is the same whatever came before, and lasts.
-  pure subroutine salt(machines, event, change, with_parameter, forgets, ok)
+  pure subroutine salt(machines, event, change, with_parameter, forgets, ok, determinant)
     type(neighbourhood_t), intent(in) :: machines
     type(event_t), intent(in) :: event
     real(wp), intent(inout) :: change(:, :)
     logical, intent(in) :: with_parameter
     logical, intent(out) :: forgets, ok
+    real(wp), intent(inout), optional :: determinant
     real(wp), dimension(size(change, 1)) :: before, after, jumped, g_y, r_t, unused_y
-    real(wp) :: r_y(size(change, 1), size(change, 1)), later(size(change, 2)), value(1), values(1, 4), g_t, unused_t, rate
-    real(wp) :: jumps(size(change, 1), 4), by_parameter(size(change, 1)), guard_by_parameter(1), unused(size(change, 1), &
-      size(change, 1))
+    real(wp), dimension(size(change, 1), size(change, 1)) :: r_y, saltation
+    real(wp) :: later(size(change, 2)), value(1), values(1, 4), g_t, unused_t, rate
+    real(wp) :: jumps(size(change, 1), 4), by_parameter(size(change, 1)), guard_by_parameter(1)
     integer :: i, k, n
     n = size(change, 1)
     by_parameter = 0
@@ -149,7 +137,7 @@ contains
       if (with_parameter) then
         do i = 1, 4
           call machines%near(i)%guard(event, t, y, values(1, i), unused_y, unused_t)
-          call machines%near(i)%jump(event, t, y, jumps(:, i), unused, unused_y)
+          call machines%near(i)%jump(event, t, y, jumps(:, i), saltation, unused_y)
         end do
         guard_by_parameter = by_difference(machines, value, values)
         by_parameter = by_difference(machines, jumped, jumps)
@@ -159,12 +147,19 @@ contains
     if (forgets) then
       change = 0
       change(:, n + 1) = by_parameter
+      if (present(determinant)) determinant = 0
       ok = .true.
       return
     end if
     rate = sum(g_y*before) + g_t
     ok = abs(rate) > 0
     if (.not. ok) return
+    if (present(determinant)) then
+      do k = 1, n
+        saltation(:, k) = r_y(:, k) - (matmul(r_y, before) + r_t - after)*(g_y(k)/rate)
+      end do
+      determinant = determinant*determinant_of(saltation)
+    end if
     later = -matmul(g_y, change)/rate
     later(n + 1) = later(n + 1) - guard_by_parameter(1)/rate
     do k = 1, n + 1

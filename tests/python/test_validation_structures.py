@@ -35,6 +35,14 @@ def test_benchmarks_agree(rows, separatrix, build_dir, tmp_path, name, count):
     assert [number for number in found if number.verdict != "agrees"] == []
 
 
+@pytest.mark.parametrize(("name", "count"), [("cantilever", 18), ("capture", 5), ("chatter", 8)])
+def test_impact_by_impact(rows, separatrix, build_dir, tmp_path, name, count):
+    benchmarks = {compute.__name__: compute for compute in rows.IMPACTS}
+    found = benchmarks[name](rows.Program(build_dir, tmp_path))
+    assert len(found) == count
+    assert [number for number in found if number.verdict != "agrees"] == []
+
+
 def test_the_quadratic_gives_orbits_that_come_back(rows):
     """The closed form, by steps of the other simulator: after a period the same state, but for the impact."""
     coupled, damping = np.array([[2, -1], [-1, 1]]), np.diag([0.5, 0.0])
