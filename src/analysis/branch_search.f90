@@ -32,6 +32,8 @@ module branch_search
   real(wp), parameter :: doubled_at = 3e-3_wp
   !> The same of a branch that crosses.
   real(wp), parameter :: crossed_at = 4e-3_wp
+  !> A multiplier this near to +1 of an orbit that does not go on tells a family.
+  real(wp), parameter :: nearly_neutral = 1e-6_wp
 
   type, public :: search_t
     type(family_t) :: family
@@ -163,6 +165,11 @@ contains
     integer :: i, side
     logical :: ok
     call trace_branch(search%family, search%plan, seed, found, search%watcher)
+    if (is_of_family(found)) then
+      i = minloc(abs(search%values - seed%parameter), 1)
+      search%found(i)%families = search%found(i)%families + 1
+      return
+    end if
     search%branches = [search%branches, found]
     call note_passages(search, found)
     do i = 1, size(found%points)
@@ -181,6 +188,14 @@ contains
       end select
     end do
   end subroutine follow
+
+  !> Whether an orbit cannot be followed because others lie next to it at the same value: one of a family, by a multiplier +1 as far
+  !> as a stick phase lets it be known.
+  pure logical function is_of_family(found)
+    type(branch_t), intent(in) :: found
+    is_of_family = size(found%points) == 1
+    if (is_of_family) is_of_family = minval(abs(found%points(1)%orbit%multipliers - 1)) < nearly_neutral
+  end function is_of_family
 
   !> Follows an orbit that is on no branch yet.
   recursive subroutine follow_new(search, orbit)

@@ -58,6 +58,16 @@ def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
         assert "fold (SN)" in texts and "graze with a fold (GR-fold)" in texts
 
 
+def test_a_family_of_orbits_is_called_one(run):
+    over = ("--parameter", "drive.ratio", "--from", "0.49", "--to", "0.51", "--searches", "3")
+    out, ended = run("dry_friction_family", *over)
+    assert ended.returncode == 0, ended.stderr
+    assert "orbits that are not isolated (a family, multiplier 1) were met" in ended.stdout
+    with open_result(out) as result:
+        assert "not_known" not in set(decode_flags(result["label"]).values)
+        assert result["branch"].values.max() == 1
+
+
 STOPS = """
 body = { mass = 2, gravity = 9.81 }
 restoring = { law = "linear", stiffness = 50 }
@@ -90,6 +100,10 @@ def test_what_begins_where_both_stops_are_touched_at_once_is_followed_once(separ
         values = np.sort(result["parameter"].values[both])
         assert np.diff(values).min() > 1e-9
         assert set(result["symmetric"].values[both]) == {1}
+        # what touches both stops has one amplitude: a point on the section is drawn
+        with style.context():
+            figure = branches.figures(result, "title")["branches"]
+        assert figure.axes[0].get_ylabel().startswith("position at crank angle 0")
 
 
 def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
