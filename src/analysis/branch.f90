@@ -208,10 +208,9 @@ contains
     do i = 1, most_secants
       middle = (low + high)/2
       call step_to(family, trace, middle, tried, ok, steps)
-      ! At the end itself the equations are singular.
-      if (.not. ok) exit
-      there = tried
-      if (sum(halves_differ(trace)*halves_differ(there)) < 0) then
+      ! At the end itself the equations are singular: it is approached from this side.
+      if (ok) there = tried
+      if (.not. ok .or. sum(halves_differ(trace)*halves_differ(there)) < 0) then
         high = middle
       else
         low = middle
