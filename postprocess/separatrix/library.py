@@ -5,6 +5,7 @@
 This is the binding of libseparatrix (include/separatrix.h, docs/library.md).
 """
 
+import contextlib
 import ctypes
 import functools
 import os
@@ -18,6 +19,7 @@ import numpy as np
 
 from separatrix.errors import CaseError
 from separatrix.program import NATIVE, SOURCE_TREE
+from separatrix.structures.inline import inlined
 
 __all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
 
@@ -102,6 +104,10 @@ class Model:
     @classmethod
     def read(cls, path: str | Path) -> "Model":
         """Return the model of a case file."""
+        with contextlib.suppress(OSError, UnicodeDecodeError):
+            text = Path(path).read_text()
+            if inlined(text, path):
+                return cls.from_settings(text, path, [])
         handle = ctypes.c_void_p()
         _call("separatrix_model_read", os.fsencode(path), ctypes.byref(handle))
         return cls(handle)
@@ -109,6 +115,9 @@ class Model:
     @classmethod
     def from_text(cls, text: str, directory: str | Path = ".") -> "Model":
         """Return the model of a case in memory; files that it names are looked for in `directory`."""
+        name = Path(directory) / "case"
+        if inlined(text, name):
+            return cls.from_settings(text, name, [])
         handle = ctypes.c_void_p()
         _call("separatrix_model_from_text", text.encode(), os.fsencode(directory), ctypes.byref(handle))
         return cls(handle)
@@ -119,6 +128,7 @@ class Model:
 
         `name` stands for the file in messages; files that the case names are looked for in its folder.
         """
+        settings = inlined(text, name, settings)
         handle = ctypes.c_void_p()
         lines = (ctypes.c_char_p * len(settings))(*(line.encode() for line in settings))
         _call(

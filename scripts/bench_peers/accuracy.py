@@ -18,6 +18,8 @@ class Accuracy:
     """Largest of |dx|/max|x| and |dv|/max|v| of final states, where the numbers of impacts agree."""
     counts: int | None
     labels: int
+    typical: float | None = None
+    """Median of the largest deviations of several samples."""
 
 
 def compare(found: Outcomes, reference: Outcomes) -> Accuracy:

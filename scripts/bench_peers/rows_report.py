@@ -101,7 +101,8 @@ def against(result: RowResult, name: str, what: str) -> str:
     if found is None or found.points == 0:
         return ""
     if what == "deviation":
-        return f"{found.deviation:.1e}"
+        typical = "" if found.typical is None else f"{found.typical:.1e}, at most "
+        return f"{typical}{found.deviation:.1e}"
     return f"{found.counts} of {found.points}"
 
 

@@ -7,16 +7,16 @@ module trajectory
   use attractors, only: attractor_t, features_t, find_box
   use capture, only: captor_of, stays_in_family
   use kinds, only: int64, wp
-  use motion, only: advance, motion_t
+  use motion, only: motion_t
   use motion_features, only: features_over
   use motion_state, only: log_t, place_of, tally_t
-  use strobe, only: advance_strobe, advance_strobe_period, begin_tally, energy_now, record_end, section_point, start_strobe, &
-    strobe_t
+  use strobe, only: advance_past_event, advance_strobe, advance_strobe_period, begin_tally, energy_now, record_end, &
+    section_point, start_strobe, strobe_t
   use status, only: reason_settled, reason_time_over
   implicit none
   private
 
-  public :: run_trajectory, run_from_section, begin_course, begin_record, end_record, go_on, is_recorded, go_past_turn, &
+  public :: run_trajectory, run_from_section, begin_course, begin_record, end_record, go_on, is_recorded, go_past_event, &
     go_to_stop, pass_stop, sections_ahead, ends_captured, conclude, fit_window
 
   type, public :: span_t
@@ -193,13 +193,13 @@ contains
     slipped = course%tally%slips > slips
   end subroutine go_to_stop
 
-  !> Moves past a turn of the body to a slip at `speed` [m/s] or faster, if that comes before the next stop.
-  pure subroutine go_past_turn(moving, speed, course)
+  !> Moves past an event, one body past a turn to a slip at `speed` [m/s] or faster, if that comes before the next stop.
+  pure subroutine go_past_event(moving, speed, course)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: speed
     type(course_t), intent(inout) :: course
-    call advance(moving, course%state, course%until, course%tally, course%reason, slip_speed=speed)
-  end subroutine go_past_turn
+    call advance_past_event(moving, course, speed, course%until, course%tally, course%reason)
+  end subroutine go_past_event
 
   !> Sections to come where nothing is due but the question whether the motion has been captured.
   pure integer function sections_ahead(moving, span, course)

@@ -9,9 +9,9 @@ module c_machine
   use case_setup, only: grid_of
   use case_type, only: case_t
   use errors, only: error_t
+  use fleet, only: prepare_flow
   use grid, only: grid_t, slice_motion
   use kinds, only: int64, wp
-  use lane_preparation, only: prepare_lanes
   use model_type, only: check_values, model_t
   use parameter_list, only: put_values
   use span_check, only: check_periods
@@ -66,7 +66,7 @@ contains
       if (allocated(error)) return
       journey%span = span
       journey%describe = describe_regime
-      call prepare_lanes(journey%moving, journey%flow)
+      call prepare_flow(journey%moving, journey%flow)
     end associate
   end subroutine prepare_machine
 

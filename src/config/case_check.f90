@@ -287,10 +287,20 @@ contains
     real(wp), intent(in) :: x
     character(len=:), allocatable :: problem, upper_key, lower_key
     character(len=*), parameter :: second_key = 'effect.second_barrier.position'
-    real(wp) :: upper, lower, second, driver
+    character(len=*), parameter :: driver_key = 'body.driver_x0'
+    character(len=:), allocatable :: from_driver
+    real(wp) :: upper, lower, second, driver(2)
     integer :: i
+    ! Stops on a driving body: its least and its largest place.
     driver = 0
-    if (the_case%laws(1)%name == 'backlash_pair') driver = parameter_value(the_case%laws, 'body.driver_x0', 0.0_wp)
+    from_driver = ''
+    if (the_case%laws(1)%name == 'backlash_pair') then
+      driver = parameter_value(the_case%laws, driver_key, 0.0_wp)
+      do i = 1, size(axes)
+        if (axes(i)%name == driver_key) driver = [minval(axes(i)%values), maxval(axes(i)%values)]
+      end do
+      if (any(abs(driver) > 0)) from_driver = ', measured from '//driver_key
+    end if
     upper = parameter_value(the_case%laws, 'contact.upper', huge(1.0_wp))
     lower = parameter_value(the_case%laws, 'contact.lower', -huge(1.0_wp))
     upper_key = 'contact.upper'
@@ -309,10 +319,10 @@ contains
       upper_key = second_key
     end if
     problem = ''
-    if (x - driver > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier '//upper_key//' = '// &
-                                      to_text(upper)//' m'
-    if (x - driver < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier '//lower_key//' = '// &
-                                      to_text(lower)//' m'
+    if (x - driver(1) > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier '//upper_key//' = '// &
+                                         to_text(upper)//' m'//from_driver
+    if (x - driver(2) < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier '//lower_key//' = '// &
+                                         to_text(lower)//' m'//from_driver
   end function beyond
 
   !> A basin needs two axes or more. Code 65.

@@ -350,7 +350,7 @@ contains
     character(len=*), intent(in) :: key, name
     logical, intent(in) :: or_ground
     type(bodies_t), intent(in) :: bodies
-    number = findloc(bodies%names, name, 1)
+    number = findloc(bodies%names == name, .true., 1)
     if (number > 0 .or. (or_ground .and. name == ground)) return
     number = -1
     ! Of a structure that could not be read nobody knows the points.

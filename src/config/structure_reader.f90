@@ -256,7 +256,7 @@ contains
           row = [(0.0_wp, named=1, n)]
           row(entry%integer) = 1
         case (toml_string)
-          named = findloc(content%point_names, entry%string, 1)
+          named = findloc(content%point_names == entry%string, .true., 1)
           if (named == 0) then
             call report(source, key, 'found "'//entry%string//'"'//hint(entry%string, content%point_names)// &
                         ', allowed a point of the file: '//join(content%point_names, ', '))

@@ -4,11 +4,10 @@
 !> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
 !> stretch of the springs of elastic friction.
 module jointed_section
-  use jointed, only: joint_contact, joint_elastic, most_degrees
+  use jointed, only: joint_contact, joint_elastic
   use jointed_motion, only: jointed_motion_t, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
-  use section_directions, only: directions_of
   use section_size, only: most_coordinates
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
@@ -22,17 +21,13 @@ contains
   !> Number of coordinates on the section.
   pure integer function coordinates_of_jointed(moving) result(n)
     type(jointed_motion_t), intent(in) :: moving
-    real(wp) :: directions(most_degrees, most_degrees)
-    call directions_of(moving%machine, directions, n)
-    n = n + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
+    n = size(moving%directions, 2) + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
   end function coordinates_of_jointed
 
   !> Number of the coordinate that is the velocity of the watched place.
   pure integer function watched_speed(moving) result(at)
     type(jointed_motion_t), intent(in) :: moving
-    real(wp) :: directions(most_degrees, most_degrees)
-    call directions_of(moving%machine, directions, at)
-    at = at + moving%machine%watched
+    at = size(moving%directions, 2) + moving%machine%watched
   end function watched_speed
 
   !> Whether there is room for the coordinates.
@@ -89,13 +84,13 @@ contains
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(jointed_state_t) :: state
-    real(wp) :: directions(most_degrees, most_degrees), q(moving%machine%n), v(moving%machine%n), s, u, limit
+    real(wp) :: q(moving%machine%n), v(moving%machine%n), s, u, limit
     complex(wp) :: turning(moving%harmonics)
     integer :: n, places, j, k
     logical :: ok
     n = moving%machine%n
-    call directions_of(moving%machine, directions, places)
-    q = matmul(directions(:n, :places), point(:places))
+    places = size(moving%directions, 2)
+    q = matmul(moving%directions, point(:places))
     v = point(places + 1:places + n)
     call start_jointed(moving, q, v, 0.0_wp, state, ok)
     turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
@@ -118,14 +113,14 @@ contains
   pure function jointed_point(moving, state) result(point)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(in) :: state
-    real(wp) :: point(most_coordinates), directions(most_degrees, most_degrees), s, u
+    real(wp) :: point(most_coordinates), s, u
     complex(wp) :: turning(moving%harmonics)
     integer :: n, places, j, k
     point = 0
     n = moving%machine%n
-    call directions_of(moving%machine, directions, places)
+    places = size(moving%directions, 2)
     if (places + n + count(moving%machine%joints%kind == joint_elastic) > most_coordinates) return
-    point(:places) = matmul(transpose(directions(:n, :places)), state%q(:n))
+    point(:places) = matmul(transpose(moving%directions), state%q(:n))
     point(places + 1:places + n) = state%v(:n)
     k = places + n
     turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
@@ -144,10 +139,10 @@ contains
   pure function scales_of_jointed(moving, half_range) result(scales)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
-    real(wp) :: scales(most_coordinates), directions(most_degrees, most_degrees), length
+    real(wp) :: scales(most_coordinates), length
     integer :: places, n
     n = moving%machine%n
-    call directions_of(moving%machine, directions, places)
+    places = size(moving%directions, 2)
     length = max(half_range, 1e-3_wp*moving%machine%length_scale)
     scales = length
     scales(places + 1:places + n) = length*moving%machine%frequency

@@ -30,8 +30,8 @@ module strobe
   private
 
   public :: strobe_t, coordinates_of, has_section, section_obstacle, start_strobe, start_is_allowed, resume_strobe, strobe_at, &
-    section_point, section_state, scales_of, without_stops, advance_strobe, advance_strobe_period, begin_tally, driver_now, &
-    energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
+    section_point, section_state, scales_of, without_stops, advance_strobe, advance_strobe_period, advance_past_event, &
+    begin_tally, driver_now, energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
 
   !> `state` is that of the body, of the driven one of two, or of the watched one of several.
   type :: strobe_t
@@ -254,6 +254,21 @@ contains
       call advance(moving, strobe%state, time_end, tally, reason, log)
     end if
   end subroutine advance_strobe
+
+  !> Moves past one event, if that comes before `time_end`; one body past a turn to a slip at `speed` [m/s] or faster.
+  pure subroutine advance_past_event(moving, strobe, speed, time_end, tally, reason)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(inout) :: strobe
+    real(wp), intent(in) :: speed, time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    if (allocated(moving%jointed)) then
+      call advance_jointed(moving%jointed, strobe%jointed, time_end, tally, reason, one_event=.true.)
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    else
+      call advance(moving, strobe%state, time_end, tally, reason, slip_speed=speed)
+    end if
+  end subroutine advance_past_event
 
   !> Moves to the next section and starts the clock anew.
   pure subroutine advance_strobe_period(moving, strobe, tally, reason, log)

@@ -6,12 +6,8 @@
 #include "lane_untrapped.hpp"
 
 #include <cstddef>
-#include <cstdlib>
 
 extern "C" {
-
-const lane_gpu *separatrix_gpu_on_host(void);
-const lane_gpu *separatrix_gpu_cuda(void);
 
 void separatrix_fly_sse2(const lane_machine *, const lane_regions *, lane_batch *);
 void separatrix_fly_avx2(const lane_machine *, const lane_regions *, lane_batch *);
@@ -45,44 +41,5 @@ void separatrix_fly_lanes(int width, const lane_machine *machine, const lane_reg
     separatrix_fly_avx2(machine, regions, batch);
   else
     separatrix_fly_sse2(machine, regions, batch);
-}
-
-// Whether this build can use a GPU.
-int separatrix_gpu_built(void) {
-#ifdef SEPARATRIX_GPU
-  return 1;
-#else
-  return 0;
-#endif
-}
-
-// With $SEPARATRIX_GPU_ON_HOST the host does what a GPU would do, for tests.
-static const lane_gpu *gpu(void) {
-#ifdef SEPARATRIX_GPU
-  if (std::getenv("SEPARATRIX_GPU_ON_HOST") == nullptr)
-    return separatrix_gpu_cuda();
-#endif
-  return separatrix_gpu_on_host();
-}
-
-int separatrix_gpu_count(char *message, int size) { return gpu()->count(message, size); }
-
-int separatrix_gpu_number(int place) { return gpu()->number(place); }
-
-void separatrix_gpu_name(int device, char *text, int size) { gpu()->name(device, text, size); }
-
-int separatrix_gpu_open(int device, int64_t wanted, lane_batch *halves[2], int64_t *batches, char *message,
-                        int size) {
-  return gpu()->open(device, wanted, halves, batches, message, size);
-}
-
-int separatrix_gpu_send(int half, int64_t batches, const lane_machine *machine, const lane_regions *regions,
-                        char *message, int size) {
-  return gpu()->send(half, batches, machine, regions, message, size);
-}
-
-int separatrix_gpu_wait(int half, char *message, int size) {
-  const untrapped around;
-  return gpu()->wait(half, message, size);
 }
 }

@@ -239,7 +239,7 @@ contains
       layer%second_from_edge = 0.5_wp*matmul(layer%from_edge, share**2)
       ! A body that leaves a barrier within the layer is left to the event loop.
       flow%slowest = layer%edge
-      flow%layered = .true.
+      flow%resumes = .true.
       flow%machine%slow = max(flow%machine%slow, layer%edge)
     end associate
   end subroutine set_layer

@@ -104,8 +104,8 @@ module lane_types
     type(machine_t) :: machine
     !> A body must be so fast [m/s] to be put into a lane: out of its Stribeck layer.
     real(wp) :: slowest = 0
-    !> With a Stribeck layer.
-    logical :: layered = .false.
+    !> Lanes take a trajectory back before its next stop: with a Stribeck layer, and structures.
+    logical :: resumes = .false.
     !> A jointed structure.
     type(structure_machine_t), allocatable :: structure
   end type lane_flow_t

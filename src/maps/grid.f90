@@ -91,7 +91,7 @@ contains
     character(len=*), intent(in) :: name
     integer, intent(in) :: axis, row
     integer :: k
-    k = findloc(grid%start_names, name, 1)
+    k = findloc(grid%start_names == name, .true., 1)
     if (k == 0) then
       grid%start_names = [character(len=name_length) :: grid%start_names, name]
       grid%start_axis = [grid%start_axis, axis]

@@ -12,7 +12,7 @@ module trajectories
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
   use motion, only: motion_t
   use status, only: reason_left_domain
-  use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_turn, go_to_stop, outcome_t, pass_stop, &
+  use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_event, go_to_stop, outcome_t, pass_stop, &
     phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
   implicit none
@@ -271,10 +271,7 @@ contains
       if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
-        if (journey%flow%layered) then
-          call go_past_turn(journey%moving, journey%flow%slowest, course)
-          taken = course%reason == 0 .and. course%state%time < course%until .and. flies(journey, course)
-        end if
+        if (journey%flow%resumes) call go_past_events(journey, course, taken)
         if (course%reason == 0 .and. .not. taken) call go_to_stop(journey%moving, course, slipped)
       end if
       if (.not. taken) call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
@@ -289,6 +286,21 @@ contains
       call send_on(journey, course, outcome, lane, batch)
     end associate
   end subroutine attend
+
+  !> Goes past an event, a structure past several, to one after which a lane can take the trajectory, if that comes before the
+  !> next stop.
+  pure subroutine go_past_events(journey, course, taken)
+    type(journey_t), intent(in) :: journey
+    type(course_t), intent(inout) :: course
+    logical, intent(out) :: taken
+    taken = .false.
+    do while (.not. taken .and. course%state%time < course%until)
+      call go_past_event(journey%moving, journey%flow%slowest, course)
+      if (course%reason /= 0) return
+      taken = course%state%time < course%until .and. flies(journey, course)
+      if (.not. allocated(journey%flow%structure)) exit
+    end do
+  end subroutine go_past_events
 
   !> Goes on in the event loop until a lane can take the trajectory, or to its end.
   pure subroutine go_on(journey, catalogue, start, passenger, outcome)

@@ -3,10 +3,11 @@
 
 !> A jointed structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
 module jointed_flows
-  use jointed, only: joint_contact, joint_section, joint_t, jointed_t
+  use jointed, only: joint_contact, joint_section, joint_t, jointed_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: flight_adaptive, options_t
+  use section_directions, only: directions_of
   implicit none
   private
 
@@ -18,6 +19,8 @@ module jointed_flows
     type(jointed_t) :: machine
     type(options_t) :: options
     type(mode_flow_t), allocatable :: flows(:)
+    !> Directions (columns) of the positions that are coordinates on the section.
+    real(wp), allocatable :: directions(:, :)
     integer :: harmonics = 0
     !> Number of the joint that is the section of a machine without a clock; 0: the section is a time.
     integer :: section = 0
@@ -32,10 +35,13 @@ contains
     type(jointed_t), intent(in) :: machine
     type(options_t), intent(in) :: options
     type(jointed_motion_t), intent(out) :: moving
-    integer :: key, joints, i
+    real(wp) :: directions(most_degrees, most_degrees)
+    integer :: key, joints, i, places
     moving%machine = machine
     moving%options = options
     moving%harmonics = harmonics_of(machine)
+    call directions_of(machine, directions, places)
+    moving%directions = directions(:machine%n, :places)
     joints = size(machine%joints)
     if (.not. machine%driven) then
       moving%section = joints + 1

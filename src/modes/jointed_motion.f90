@@ -30,6 +30,8 @@ module jointed_motion
   integer, parameter :: most_stalls = 8, most_holds = 100
   !> An impact within this share of a period after the last belongs to a burst.
   real(wp), parameter :: burst_gap = 1e-6_wp
+  !> After a flight of so many gaps no burst goes on.
+  real(wp), parameter :: shortest_pause = 10
 
 contains
 
@@ -79,8 +81,8 @@ contains
   end subroutine start_jointed
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
-  !> up (codes of module `status`).
-  pure subroutine advance_jointed(moving, state, time_end, tally, reason, log, transitions)
+  !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains.
+  pure subroutine advance_jointed(moving, state, time_end, tally, reason, log, transitions, one_event)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
@@ -88,6 +90,7 @@ contains
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
     type(transitions_t), intent(inout), optional :: transitions
+    logical, intent(in), optional :: one_event
     type(jointed_state_t) :: start
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
@@ -143,6 +146,8 @@ contains
         if (tally%steps > moving%options%step_budget) reason = reason_step_budget
         if (.not. all(abs(state%q(:machine%n)) <= moving%options%domain)) reason = reason_left_domain
         if (any(state%q /= state%q) .or. any(state%v /= state%v)) reason = reason_not_finite
+        if (.not. present(one_event) .or. reason /= 0) cycle
+        if (one_event .and. state%time - before > shortest_pause*burst_gap*machine%period) exit
       end do
       tally%x_min = watch%extremes(1)
       tally%x_max = watch%extremes(2)

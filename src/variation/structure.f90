@@ -6,12 +6,11 @@
 module structure
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
   use hybrid_machine, only: event_t, hybrid_t
-  use jointed, only: joint_contact, joint_elastic, joint_section, jointed_t, most_degrees, most_joints
+  use jointed, only: joint_contact, joint_elastic, joint_section, jointed_t, most_joints
   use jointed_flows, only: jointed_motion_t
   use jointed_state, only: free_force, joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use section_directions, only: directions_of
   use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
   use structure_impact, only: carried_by, strike_with_slopes
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -40,12 +39,11 @@ contains
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: sizes(2)
     type(structure_t) :: structure
-    real(wp) :: directions(most_degrees, most_degrees)
     integer :: places, j
     associate (machine => moving%machine)
       structure%frame%moving = moving
-      call directions_of(machine, directions, places)
-      structure%frame%directions = directions(:machine%n, :places)
+      structure%frame%directions = moving%directions
+      places = size(moving%directions, 2)
       structure%frame%elastic = pack([(j, j=1, size(machine%joints))], machine%joints%kind == joint_elastic)
       structure%frame%places = places
       structure%places = places

@@ -389,3 +389,19 @@ def test_a_map_needs_nothing_that_only_a_sweep_does(separatrix, tmp_path):
     # a typing error is one for every command
     write_case(tmp_path, case + "stpe = 0.1\n")
     assert run(separatrix, "basin", "case.toml", "--validate", folder=tmp_path).code == 65
+
+
+def test_the_driving_body_of_a_pair_moves_its_stops(separatrix, source_dir, tmp_path):
+    """A start is within the stops for every place of the driving body, along an axis too."""
+    axes = "".join(
+        f'\n[[axis]]\nname = "{name}"\nfrom = {low}\nto = {high}\ncount = 3\n'
+        for name, low, high in (("body.driver_x0", -0.04, 0.1), ("v0", 0, 1))
+    )
+    case = tmp_path / "case.toml"
+    case.write_text((source_dir / "examples" / "pair_backlash.toml").read_text() + axes)
+    assert run(separatrix, "basin", case, "--dry-run", folder=tmp_path).code == 0
+    for setting in ("axis[1].to=0.3", "axis[1].from=-0.2"):
+        outcome = run(separatrix, "basin", case, "--dry-run", "--set", setting, folder=tmp_path)
+        assert outcome.code == 65
+        assert "start.x0" in outcome.err
+        assert "body.driver_x0" in outcome.err

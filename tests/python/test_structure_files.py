@@ -438,3 +438,25 @@ def test_what_is_refused(separatrix, matrices, tmp_path):
     refused("mass.mtx:1: found", file="", change=native)
     (tmp_path / "mass.mtx").unlink()
     refused("mass.mtx", code=66, file="", change=native)
+
+
+def test_the_library_flies_what_the_program_flies(matrices, tmp_path, separatrix):
+    """An HDF5 file, by its matrices and by its modes: the same bits from Python as from the program."""
+    import separatrix as sx
+
+    words = [*_mat(tmp_path, *matrices), "--point", f"tip_y={2 * ELEMENTS - 1}", "--reduce", "modal"]
+    main([str(word) for word in [*words, "--modes", 3, "-o", tmp_path / "beam.h5"]])
+    numbers = {"stop": 0.02, "force": 0.1, "omega": 0.9, "x0": 0.01, "v0": 0, "angle": 0}
+    more = 'point.tip = "tip_y"\ndamping_ratio = 0.02'
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.format(file="beam.h5", more=more, **numbers))
+    succeed(separatrix, "trajectory", case, "-o", tmp_path / "motion.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "motion.h5") as file:
+        place = file["x"][:]
+    assert np.array_equal(sx.trajectory(case)["x"], place)
+    softer = sx.load(case).with_({"structure.beam.damping_ratio": 0.05})
+    assert not np.array_equal(sx.trajectory(softer)["x"], place)
+    for file, found in (("none.h5", "no such file"), ("case.toml", "no structure file")):
+        with pytest.raises(sx.CaseError, match=found) as refused:
+            softer.with_({"structure.beam.file": file})
+        assert "structure.beam.file" in str(refused.value)
