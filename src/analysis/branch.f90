@@ -11,6 +11,7 @@ module branch
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use errors, only: error_t
+  use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
   use hybrid_machine, only: event_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
@@ -19,7 +20,8 @@ module branch
   use orbit_sections, only: rotate_to_section, section_points
   use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, same_sequence, &
     scales_of_orbit
-  use soft_graze, only: is_touch, locate_missed_graze
+  use search_watch, only: search_watch_t
+  use soft_graze, only: is_touch
   implicit none
   private
 
@@ -32,37 +34,40 @@ module branch
   integer, parameter :: long_run = 10
   !> Smallest step, as a share of the largest.
   real(wp), parameter :: smallest_step = 1e-7_wp
-  !> Nearness to a graze and to a doubling, in speed and multiplier, at the end of a branch.
-  real(wp), parameter :: at_graze = 1e-6_wp, at_doubling = 1e-2_wp
+  !> Nearness of a multiplier to that of a doubling at the end of a branch.
+  real(wp), parameter :: at_doubling = 1e-2_wp
 
 contains
 
-  !> Follows the orbits through `seed`, which is corrected, both ways. Points come in order from one end to the other.
-  subroutine trace_branch(family, plan, seed, found)
+  !> Follows the orbits through `seed`, which is corrected, both ways. Points come in order from one end to the other. `watch` is
+  !> told of every point.
+  subroutine trace_branch(family, plan, seed, found, watch)
     type(family_t), intent(in) :: family
     type(plan_t), intent(in) :: plan
     type(orbit_t), intent(in) :: seed
     type(branch_t), intent(out) :: found
+    class(search_watch_t), intent(inout), optional :: watch
     type(point_t), allocatable :: back(:), further(:)
     integer :: i
-    call trace_one_way(family, plan, seed, -1, back, found%ending(1))
+    call trace_one_way(family, plan, seed, -1, back, found%ending(1), watch)
     if (found%ending(1) == label_closed) then
       found%ending(2) = label_closed
       allocate (further(0))
     else
-      call trace_one_way(family, plan, seed, 1, further, found%ending(2))
+      call trace_one_way(family, plan, seed, 1, further, found%ending(2), watch)
     end if
     found%points = [[(back(i), i=size(back), 1, -1)], further(min(2, size(further) + 1):)]
   end subroutine trace_branch
 
   !> From the seed in the direction in which the parameter rises (`way` = 1) or falls, up to an end.
-  subroutine trace_one_way(family, plan, seed, way, points, ending)
+  subroutine trace_one_way(family, plan, seed, way, points, ending, watch)
     type(family_t), intent(in) :: family
     type(plan_t), intent(in) :: plan
     type(orbit_t), intent(in) :: seed
     integer, intent(in) :: way
     type(point_t), allocatable, intent(out) :: points(:)
     integer, intent(out) :: ending
+    class(search_watch_t), intent(inout), optional :: watch
     type(trace_t) :: trace, before
     type(error_t), allocatable :: error
     logical :: ok
@@ -81,6 +86,7 @@ contains
       before = trace
       call go_on(family, plan, trace, points, ending)
       if (ending /= no_label) exit
+      if (present(watch)) call watch%tell_point(size(points), trace%now%orbit%parameter)
       if (size(points) < 5) cycle
       if (has_returned(seed, before, trace, family%parameter_size)) ending = label_closed
     end do
@@ -131,7 +137,7 @@ contains
       if (ok) exit
       trace%step = trace%step/2
       if (trace%step < smallest_step*plan%largest_step) then
-        ending = label_not_known
+        call leave_by_graze(family, plan, trace, points, ending)
         return
       end if
     end do
@@ -153,7 +159,9 @@ contains
     if (.not. is_admissible(next%machines, next%now%orbit)) then
       ! A turn of events that no margin foretells, or one that is nearer than the look along the flights.
       trace%step = length/4
-      if (trace%step < smallest_step*plan%largest_step) ending = unforeseen(trace, next)
+      if (trace%step >= smallest_step*plan%largest_step) return
+      call leave_by_graze(family, plan, trace, points, ending)
+      if (ending == label_not_known) ending = unforeseen(trace, next)
       return
     end if
     next%step = min(plan%largest_step, length*merge(0.7_wp, 1.4_wp, steps > many_steps))
@@ -200,10 +208,9 @@ contains
     do i = 1, most_secants
       middle = (low + high)/2
       call step_to(family, trace, middle, tried, ok, steps)
-      ! At the end itself the equations are singular.
-      if (.not. ok) exit
-      there = tried
-      if (sum(halves_differ(trace)*halves_differ(there)) < 0) then
+      ! At the end itself the equations are singular: it is approached from this side.
+      if (ok) there = tried
+      if (.not. ok .or. sum(halves_differ(trace)*halves_differ(there)) < 0) then
         high = middle
       else
         low = middle
@@ -296,32 +303,6 @@ contains
     points = [points, next%now]
   end subroutine end_at_range
 
-  !> Whether an orbit is one of a shorter period, run through several times: in the graze of that the branch ends.
-  pure logical function is_repeated(trace)
-    type(trace_t), intent(in) :: trace
-    real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
-    integer :: i
-    is_repeated = .false.
-    points = section_points(trace%machines, trace%now%orbit)
-    do i = 2, trace%now%orbit%periods
-      is_repeated = is_repeated .or. norm2((points(:, i) - points(:, 1))/trace%machines%centre%size_of) < at_graze
-    end do
-  end function is_repeated
-
-  !> The graze of a soft contact by the orbit that misses it, for the equations of that which touches are singular there.
-  subroutine put_on_graze(family, missing, touch, point)
-    type(family_t), intent(in) :: family
-    type(trace_t), intent(in) :: missing
-    type(margin_t), intent(in) :: touch
-    type(point_t), intent(inout) :: point
-    type(trace_t) :: graze
-    logical :: ok
-    call locate_missed_graze(family, missing, touch, point%orbit%parameter, graze, ok)
-    if (.not. ok) return
-    graze%now%label = point%label
-    point = graze%now
-  end subroutine put_on_graze
-
   !> The orbit where a margin is zero: its label, and on with the sequence of events beyond, if there is one.
   subroutine pass_margin(family, trace, at, passed, points, ending)
     type(family_t), intent(in) :: family
@@ -337,7 +318,7 @@ contains
     ending = no_label
     point = at%now
     point%label = label_of_margin(passed)
-    if (point%label == label_gr .and. is_repeated(at)) then
+    if (point%label == label_gr .and. (is_repeated(at) .or. grazes_twice(at))) then
       ending = label_gr
       points = [points, point]
       return

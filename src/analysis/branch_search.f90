@@ -20,6 +20,7 @@ module branch_search
   use part_of_branch, only: lies_on
   use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, is_admissible, move_along, &
     orbit_of_motion, orbit_t, same_sequence, scales_of_orbit
+  use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -31,6 +32,8 @@ module branch_search
   real(wp), parameter :: doubled_at = 3e-3_wp
   !> The same of a branch that crosses.
   real(wp), parameter :: crossed_at = 4e-3_wp
+  !> A multiplier this near to +1 of an orbit that does not go on tells a family.
+  real(wp), parameter :: nearly_neutral = 1e-6_wp
 
   type, public :: search_t
     type(family_t) :: family
@@ -50,6 +53,8 @@ module branch_search
     !> Rows that give place and speed of what is watched from a section point; whether the section is a time of the drive.
     real(wp), allocatable :: watch(:, :)
     logical :: has_clock = .true.
+    !> Who is told how far the search is, if any.
+    class(search_watch_t), pointer :: watcher => null()
   end type search_t
 
 contains
@@ -83,7 +88,7 @@ contains
     allocate (search%found(i)%orbits(0))
     call machine_neighbourhood(search%family, search%values(i), machines, error)
     if (allocated(error)) return
-    call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i))
+    call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i), search%watcher)
     do k = 1, size(search%found(i)%orbits)
       search%depends = search%depends .or. depends_on_parameter(machines, search%found(i)%orbits(k))
     end do
@@ -159,7 +164,12 @@ contains
     type(orbit_t) :: other
     integer :: i, side
     logical :: ok
-    call trace_branch(search%family, search%plan, seed, found)
+    call trace_branch(search%family, search%plan, seed, found, search%watcher)
+    if (is_of_family(found)) then
+      i = minloc(abs(search%values - seed%parameter), 1)
+      search%found(i)%families = search%found(i)%families + 1
+      return
+    end if
     search%branches = [search%branches, found]
     call note_passages(search, found)
     do i = 1, size(found%points)
@@ -178,6 +188,14 @@ contains
       end select
     end do
   end subroutine follow
+
+  !> Whether an orbit cannot be followed because others lie next to it at the same value: one of a family, by a multiplier +1 as far
+  !> as a stick phase lets it be known.
+  pure logical function is_of_family(found)
+    type(branch_t), intent(in) :: found
+    is_of_family = size(found%points) == 1
+    if (is_of_family) is_of_family = minval(abs(found%points(1)%orbit%multipliers - 1)) < nearly_neutral
+  end function is_of_family
 
   !> Follows an orbit that is on no branch yet.
   recursive subroutine follow_new(search, orbit)

@@ -214,9 +214,13 @@ contains
         p(j) = p(j - 1) + series(j)*cos(j*c)
         q(j) = q(j - 1) + series(j)*sin(j*c)
       end do
+      ! Instant by instant: sums side by side are vectors.
+      displacement = 0
+      do j = 1, n - cut
+        displacement = displacement + ((p(j + 1:j + cut) - p(j))**2 + (q(j + 1:j + cut) - q(j))**2)
+      end do
       do j = 1, cut
-        displacement(j) = sum((p(1 + j:n - cut + j) - p(1:n - cut))**2 + (q(1 + j:n - cut + j) - q(1:n - cut))**2)/(n - cut) &
-                          - mean**2*(1 - cos(j*c))/(1 - cos(c))
+        displacement(j) = displacement(j)/(n - cut) - mean**2*(1 - cos(j*c))/(1 - cos(c))
       end do
       correlations(i) = correlation(displacement)
     end do

@@ -13,6 +13,7 @@ module orbit_search
   use multipliers, only: shifted_determinant
   use orbit_sections, only: section_points
   use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_orbit
+  use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -42,22 +43,25 @@ module orbit_search
 contains
 
   !> Adds to `found` the orbits that starts (columns x [m], v [m/s]) lead to: of `longest` drive periods at most where the
-  !> motion settles, of up to two elsewhere.
-  subroutine find_orbits(family, machines, value, starts, longest, found)
+  !> motion settles, of up to two elsewhere. `watch` is told of every start, twice.
+  subroutine find_orbits(family, machines, value, starts, longest, found, watch)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(inout) :: machines
     real(wp), intent(in) :: value, starts(:, :)
     integer, intent(in) :: longest
     type(found_t), intent(inout) :: found
+    class(search_watch_t), intent(inout), optional :: watch
     real(wp) :: settled(size(starts, 1))
     integer :: i, n
     if (.not. allocated(found%orbits)) allocate (found%orbits(0))
     do i = 1, size(starts, 2)
+      if (present(watch)) call watch%tell_start()
       call settle(machines, starts(:, i), longest, found, settled, n)
       if (n == 0 .or. is_found(machines, settled, n, found)) cycle
       call try_newton(family, machines, value, settled, n, found)
     end do
     do i = 1, size(starts, 2)
+      if (present(watch)) call watch%tell_start()
       do n = 1, min(2, longest)
         call try_newton(family, machines, value, starts(:, i), n, found)
       end do

@@ -16,7 +16,7 @@ module saddle_search
   implicit none
   private
 
-  public :: find_saddle, add_saddle, seek_saddles, section_distance, distance_to_saddle
+  public :: find_saddle, saddle_at, add_saddle, section_distance, distance_to_saddle
 
   integer, parameter :: most_newton = 30
   !> Of natural sizes: Newton's method is not to go further at once, has converged.
@@ -95,15 +95,15 @@ contains
       if (length < converged*1e-2_wp .or. (length < converged*1e2_wp .and. length >= 0.1_wp*before)) exit
     end do
     ok = length < converged*1e2_wp
-    if (ok) call describe(machines, nearest_copy(machines%centre, point, 0*point), periods, saddle, ok)
+    if (ok) call saddle_at(machines, nearest_copy(machines%centre, point, 0*point), periods, saddle, ok)
   end subroutine find_saddle
 
   !> Points, multipliers and word of the orbit through a fixed point; not `ok` if it is no saddle, or of a shorter period.
-  pure subroutine describe(machines, point, periods, saddle, ok)
+  pure subroutine saddle_at(machines, point, periods, saddle, ok)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
-    type(saddle_t), intent(inout) :: saddle
+    type(saddle_t), intent(out) :: saddle
     logical, intent(out) :: ok
     type(tally_t) :: tally
     integer(int64) :: words(periods)
@@ -132,7 +132,7 @@ contains
     end do
     saddle%word = canonical_word(words)
     saddle%watched = matmul(watched_rows(machines%centre), saddle%points)
-  end subroutine describe
+  end subroutine saddle_at
 
   !> Whether a machine without a clock moves from a section point: an equilibrium is met as a cycle of no extent.
   pure logical function moves(machine, point)
@@ -158,22 +158,5 @@ contains
     end do
     saddles = [saddles, saddle]
   end subroutine add_saddle
-
-  !> Adds the saddles of up to `longest` sections that Newton's method comes to from `starts` (section points, columns).
-  pure subroutine seek_saddles(machines, starts, longest, saddles)
-    type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: starts(:, :)
-    integer, intent(in) :: longest
-    type(saddle_t), allocatable, intent(inout) :: saddles(:)
-    type(saddle_t) :: saddle
-    integer :: i, n, number
-    logical :: ok
-    do i = 1, size(starts, 2)
-      do n = 1, longest
-        call find_saddle(machines, starts(:, i), n, saddle, ok)
-        if (ok) call add_saddle(machines%centre, saddle, saddles, number)
-      end do
-    end do
-  end subroutine seek_saddles
 
 end module saddle_search

@@ -13,6 +13,8 @@ module boundary_driver
   use boundary_sets, only: grow_sets
   use case_setup, only: grid_of, span_of
   use catalogue_search, only: check_slices
+  use checkpoint, only: checkpoint_t
+  use checksum, only: crc32
   use command_line, only: command_t
   use edge_state, only: edge_names, edge_texts
   use errors, only: error_t, fail
@@ -20,11 +22,12 @@ module boundary_driver
   use grid, only: grid_t, point_slice, two_axes
   use invariant_sets, only: end_names
   use journal, only: json_number, json_text
-  use kinds, only: wp
+  use kinds, only: int64, int8, wp
   use map_final, only: write_whole
   use map_reader, only: reader_t
   use map_schema, only: schema_t
-  use session, only: describe_file, session_t
+  use session, only: describe_file, identity_of, session_t
+  use signals, only: install_signals
   use status, only: exit_bad_case, exit_done
   use stored_map, only: open_map_session, read_labels, restore_catalogues
   use text, only: replace_all, to_text
@@ -47,6 +50,7 @@ contains
     type(plane_t), allocatable :: planes(:)
     type(names_t), allocatable :: names(:)
     type(schema_t) :: schema
+    type(checkpoint_t) :: kept
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
     integer :: axes(2), i, slices
@@ -69,7 +73,10 @@ contains
                                 ' edges between points of different labels')
       call session%end_with(exit_done)
     end if
-    call session%begin(path, tiled=.false.)
+    call session%begin(path, tiled=.true.)
+    call install_signals(error)
+    if (.not. allocated(error)) call kept%open(session, path, work_identity(session, planes), 'following the boundary', error)
+    call session%stop_if(error)
     call restore_catalogues(reader, session%team, session%journal, grid, session%the_case, catalogues, error)
     call session%stop_if(error)
     do i = 1, size(planes)
@@ -78,11 +85,13 @@ contains
         call session%stop_if(error)
         planes(i)%attractors = catalogues(slice + 1)%attractors
       end associate
-      call search_lines(session, grid, planes(i))
-      call name_points(session%team, session%journal, grid, planes(i), names(i))
+      call search_lines(session, kept, grid, planes(i))
+      call name_points(session, kept, grid, planes(i), names(i))
       call bridge_gaps(planes(i), names(i))
-      call grow_sets(session%team, session%journal, grid, planes(i), command%grow, names(i))
+      call grow_sets(session, kept, grid, planes(i), command%grow, names(i))
     end do
+    if (command%resume) call session%journal%line('resumed', to_text(kept%recalled)//' parts of the work were done before', &
+                                                  '"parts": '//to_text(kept%recalled))
     call report(session, planes)
     call report_names(session, planes, names)
     call describe_file(session, 'boundary', schema)
@@ -92,9 +101,26 @@ contains
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)
     call session%stop_if(error)
     call check_written(session, path)
+    if (session%team%is_root()) call kept%remove(error)
+    call session%stop_if(error)
     call session%journal%line('written', 'wrote '//path)
     call session%end_with(exit_done)
   end subroutine run_boundary
+
+  !> What decides the curves: the case of the map, its labels, how far sets are grown, and the program.
+  function work_identity(session, planes) result(identity)
+    type(session_t), intent(in) :: session
+    type(plane_t), intent(in) :: planes(:)
+    character(len=:), allocatable :: identity
+    integer(int64) :: sum_of_labels
+    integer :: i
+    sum_of_labels = 0
+    do i = 1, size(planes)
+      sum_of_labels = crc32(transfer(planes(i)%labels, [0_int8]), sum_of_labels)
+    end do
+    identity = identity_of(session%the_case, 'boundary')//' '//to_text(sum_of_labels)//' '//to_text(session%command%grow)//' '// &
+               session%provenance%version//' '//session%provenance%commit
+  end function work_identity
 
   !> Where the curves go: as asked, or NAME.boundary.h5 for NAME.basin.h5.
   pure function result_path(command) result(path)

@@ -2,20 +2,21 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> What each part of a basin boundary is: points spread over the lines are tracked to their edge states; then every point is
-!> tried on the saddles that were found; what is left is tracked in its turn. Shared among the ranks point by point.
+!> tried on the saddles that were found; what is left is tracked in its turn. Shared among the ranks point by point; parts that are
+!> done are kept for an interrupted run.
 module boundary_names
   use body_family, only: family_t
   use boundary_search, only: plane_t, side_starts
+  use checkpoint, only: checkpoint_t
   use edge_state, only: edge_not_known, edge_saddle, labeller_t, reaches_saddle, track_edge
   use errors, only: error_t
   use grid, only: grid_t, point_slice, slice_laws, slice_starts
   use invariant_sets, only: set_t
-  use journal, only: journal_t
   use kinds, only: int64, wp
   use machine_family, only: machine_neighbourhood, starts_of_section
-  use saddle_search, only: add_saddle, find_saddle, saddle_t, seek_saddles
+  use saddle_search, only: add_saddle, find_saddle, saddle_at, saddle_t
+  use session, only: session_t
   use start_label, only: label_not_known
-  use team, only: team_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -26,6 +27,8 @@ module boundary_names
   integer, parameter :: most_tracked(3) = [32, 256, 256], most_of_line = 8
   !> Starts from which saddles are sought besides, and their longest period.
   integer, parameter :: sought_starts = 64, sought_periods = 2
+  !> Points to track, starts to seek from, and points to try, that are kept together.
+  integer, parameter :: tracked_of_part = 32, sought_of_part = 16, tried_of_part = 1024
 
   !> Names of the points of a plane, and its saddles; of how many points each saddle is the edge state.
   type, public :: names_t
@@ -42,9 +45,9 @@ module boundary_names
 contains
 
   !> Names the points of a plane whose lines are there.
-  subroutine name_points(team, journal, grid, plane, names)
-    class(team_t), intent(in) :: team
-    type(journal_t), intent(inout) :: journal
+  subroutine name_points(session, kept, grid, plane, names)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(in) :: plane
     type(names_t), intent(out) :: names
@@ -70,13 +73,9 @@ contains
       if (round > 1) points = points_left(plane, names, most_tracked(round))
       if (round > 1 .and. size(points) == 0) exit
       tried = size(names%saddles)
-      call track_points(team, journal, grid, plane, machines, labeller, points, names)
-      if (round == 1) then
-        associate (starts => slice_starts(grid, sought_starts, 0))
-          call seek_saddles(machines, starts_of_section(machines%centre, starts(:2, :)), sought_periods, names%saddles)
-        end associate
-      end if
-      if (size(names%saddles) > tried) call try_saddles(team, grid, plane, machines, names)
+      call track_points(session, kept, grid, plane, machines, labeller, points, names)
+      if (round == 1) call seek_saddles(session, kept, grid, machines, names%saddles)
+      if (size(names%saddles) > tried) call try_saddles(session, kept, grid, plane, machines, names)
     end do
   end subroutine name_points
 
@@ -129,87 +128,194 @@ contains
   end function points_left
 
   !> Names points by tracking them.
-  subroutine track_points(team, journal, grid, plane, machines, labeller, points, names)
-    class(team_t), intent(in) :: team
-    type(journal_t), intent(inout) :: journal
+  subroutine track_points(session, kept, grid, plane, machines, labeller, points, names)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(in) :: plane
     type(neighbourhood_t), intent(in) :: machines
     type(labeller_t), intent(in) :: labeller
     integer, intent(in) :: points(:)
     type(names_t), intent(inout) :: names
-    real(wp), allocatable :: own(:), found(:)
+    real(wp), allocatable :: rows(:)
     type(saddle_t) :: saddle
-    real(wp) :: starts(3 + size(grid%others), 2), place(machines%centre%n)
-    integer :: k, edge, number, width
-    logical :: ok
+    integer :: first, last, i, number, width
+    logical :: ok, found
     names%tracked(points) = .true.
-    width = 3 + size(place)
-    allocate (own(0))
-    call journal%begin('edge states', int(size(points)/team%size(), int64), 0_int64)
-    do k = 1 + team%rank(), size(points), team%size()
-      associate (point => plane%points(points(k)))
-        starts = side_starts(grid, plane, plane%intervals(point%interval))
-        call track_edge(machines, labeller, starts, [point%below, point%above], edge, saddle)
-      end associate
-      place = 0
-      if (edge == edge_saddle) place = saddle%points(:, 1)
-      own = [own, real(k, wp), real(edge, wp), real(saddle%periods, wp), place]
-      call journal%progress(int(k/team%size(), int64))
-    end do
-    call team%allgather(own, found)
-    do k = 1, size(points)
-      associate (row => found(width*(locate(k) - 1) + 1:width*locate(k)), point => points(k))
-        names%edge(point) = nint(row(2))
-        if (names%edge(point) /= edge_saddle) cycle
-        call find_saddle(machines, row(4:), nint(row(3)), saddle, ok)
-        if (.not. ok) then
-          names%edge(point) = edge_not_known
-          cycle
-        end if
-        call add_saddle(machines%centre, saddle, names%saddles, number)
-        names%saddle(point) = number
-      end associate
+    width = 3 + machines%centre%n
+    call session%journal%begin('edge states', int(size(points), int64), 0_int64)
+    do first = 1, size(points), tracked_of_part
+      last = min(size(points), first + tracked_of_part - 1)
+      call kept%recall(session, rows, found)
+      if (.not. found) then
+        call track_part(session, grid, plane, machines, labeller, points(:last), first, rows)
+        call kept%keep(session, rows)
+      end if
+      ! A saddle has its number by the order of the points, whatever the ranks.
+      do i = first, last
+        associate (row => row_of(i), point => points(i))
+          names%edge(point) = nint(row(2))
+          if (names%edge(point) /= edge_saddle) cycle
+          call find_saddle(machines, row(4:), nint(row(3)), saddle, ok)
+          if (.not. ok) then
+            names%edge(point) = edge_not_known
+            cycle
+          end if
+          call add_saddle(machines%centre, saddle, names%saddles, number)
+          names%saddle(point) = number
+        end associate
+      end do
     end do
 
   contains
 
-    !> Row of a point among those of the ranks, each of which has every size-th.
-    pure integer function locate(k)
-      integer, intent(in) :: k
-      integer :: rank, r
-      rank = modulo(k - 1, team%size())
-      locate = 1 + (k - 1)/team%size()
-      do r = 0, rank - 1
-        locate = locate + (size(points) - r + team%size() - 1)/team%size()
+    !> The row of the point number `i`: they come rank by rank.
+    pure function row_of(i) result(row)
+      integer, intent(in) :: i
+      real(wp) :: row(width)
+      integer :: k
+      do k = 1, size(rows), width
+        if (nint(rows(k)) == i) row = rows(k:k + width - 1)
       end do
-    end function locate
+    end function row_of
 
   end subroutine track_points
 
+  !> Tracks the points from number `first` on, each on one rank: number, edge state, periods and a section point of its saddle.
+  subroutine track_part(session, grid, plane, machines, labeller, points, first, rows)
+    type(session_t), intent(inout) :: session
+    type(grid_t), intent(in) :: grid
+    type(plane_t), intent(in) :: plane
+    type(neighbourhood_t), intent(in) :: machines
+    type(labeller_t), intent(in) :: labeller
+    integer, intent(in) :: points(:), first
+    real(wp), allocatable, intent(out) :: rows(:)
+    real(wp), allocatable :: own(:)
+    real(wp) :: starts(3 + size(grid%others), 2), place(machines%centre%n)
+    type(saddle_t) :: saddle
+    integer :: k, edge
+    allocate (own(0))
+    associate (team => session%team)
+      do k = first + team%rank(), size(points), team%size()
+        associate (point => plane%points(points(k)))
+          starts = side_starts(grid, plane, plane%intervals(point%interval))
+          call track_edge(machines, labeller, starts, [point%below, point%above], edge, saddle)
+        end associate
+        place = 0
+        if (edge == edge_saddle) place = saddle%points(:, 1)
+        own = [own, real(k, wp), real(edge, wp), real(saddle%periods, wp), place]
+        call session%journal%progress(int(k, int64))
+      end do
+      call team%allgather(own, rows)
+    end associate
+  end subroutine track_part
+
+  !> Adds the saddles that Newton's method comes to from starts spread over the map, each on one rank, in the order of the starts.
+  subroutine seek_saddles(session, kept, grid, machines, saddles)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
+    type(grid_t), intent(in) :: grid
+    type(neighbourhood_t), intent(in) :: machines
+    type(saddle_t), allocatable, intent(inout) :: saddles(:)
+    real(wp) :: starts(machines%centre%n, sought_starts)
+    real(wp), allocatable :: rows(:)
+    type(saddle_t) :: saddle
+    integer :: first, i, k, number, width
+    logical :: ok, found
+    associate (plane_starts => slice_starts(grid, sought_starts, 0))
+      starts = starts_of_section(machines%centre, plane_starts(:2, :))
+    end associate
+    width = 2 + machines%centre%n
+    call session%journal%begin('starts to seek saddles from', int(sought_starts, int64), 0_int64)
+    do first = 1, sought_starts, sought_of_part
+      call kept%recall(session, rows, found)
+      if (.not. found) then
+        call seek_part(session, machines, starts(:, :first + sought_of_part - 1), first, rows)
+        call kept%keep(session, rows)
+      end if
+      do i = first, first + sought_of_part - 1
+        do k = 1, size(rows), width
+          if (nint(rows(k)) /= i) cycle
+          call saddle_at(machines, rows(k + 2:k + width - 1), nint(rows(k + 1)), saddle, ok)
+          if (ok) call add_saddle(machines%centre, saddle, saddles, number)
+        end do
+      end do
+    end do
+  end subroutine seek_saddles
+
+  !> The saddles that are found from the starts from number `first` on: number, periods, first section point.
+  subroutine seek_part(session, machines, starts, first, rows)
+    type(session_t), intent(inout) :: session
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: starts(:, :)
+    integer, intent(in) :: first
+    real(wp), allocatable, intent(out) :: rows(:)
+    real(wp), allocatable :: own(:)
+    type(saddle_t) :: saddle
+    integer :: i, n
+    logical :: ok
+    allocate (own(0))
+    associate (team => session%team)
+      do i = first + team%rank(), size(starts, 2), team%size()
+        do n = 1, sought_periods
+          call find_saddle(machines, starts(:, i), n, saddle, ok)
+          if (ok) own = [own, real(i, wp), real(n, wp), saddle%points(:, 1)]
+        end do
+        call session%journal%progress(int(i, int64))
+      end do
+      call team%allgather(own, rows)
+    end associate
+  end subroutine seek_part
+
   !> Tries every point without a name on the saddles.
-  subroutine try_saddles(team, grid, plane, machines, names)
-    class(team_t), intent(in) :: team
+  subroutine try_saddles(session, kept, grid, plane, machines, names)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(in) :: plane
     type(neighbourhood_t), intent(in) :: machines
     type(names_t), intent(inout) :: names
-    integer(int64) :: numbers(size(plane%points))
+    real(wp), allocatable :: numbers(:)
+    integer :: first, last, i
+    logical :: found
+    call session%journal%begin('boundary points', int(size(plane%points), int64), 0_int64)
+    do first = 1, size(plane%points), tried_of_part
+      last = min(size(plane%points), first + tried_of_part - 1)
+      call kept%recall(session, numbers, found)
+      if (.not. found) then
+        call try_part(session, grid, plane, machines, names, first, last, numbers)
+        call kept%keep(session, numbers)
+      end if
+      do i = first, last
+        if (nint(numbers(i - first + 1)) == 0) cycle
+        names%edge(i) = edge_saddle
+        names%saddle(i) = nint(numbers(i - first + 1))
+      end do
+    end do
+  end subroutine try_saddles
+
+  !> The saddles that the points `first` to `last` without a name lead to, 0 for none.
+  subroutine try_part(session, grid, plane, machines, names, first, last, found)
+    type(session_t), intent(inout) :: session
+    type(grid_t), intent(in) :: grid
+    type(plane_t), intent(in) :: plane
+    type(neighbourhood_t), intent(in) :: machines
+    type(names_t), intent(in) :: names
+    integer, intent(in) :: first, last
+    real(wp), allocatable, intent(out) :: found(:)
+    integer(int64) :: numbers(first:last)
     real(wp) :: starts(3 + size(grid%others), 2)
     integer :: k, number
-    if (size(numbers) == 0) return
     numbers = 0
-    do k = 1 + team%rank(), size(numbers), team%size()
+    do k = first + session%team%rank(), last, session%team%size()
+      call session%journal%progress(int(k, int64))
       if (names%edge(k) /= edge_not_known .or. .not. is_known(plane, k)) cycle
       starts = side_starts(grid, plane, plane%intervals(plane%points(k)%interval))
       call reaches_saddle(machines%centre, names%saddles, starts, number)
       numbers(k) = number
     end do
-    call team%sum(numbers)
-    where (numbers > 0)
-      names%edge = edge_saddle
-      names%saddle = int(numbers)
-    end where
-  end subroutine try_saddles
+    call session%team%sum(numbers)
+    found = real(numbers, wp)
+  end subroutine try_part
 
 end module boundary_names

@@ -2,16 +2,15 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The boundary lines of one plane of a map, with the work shared among the ranks: edge by edge in turn, so that the result does not
-!> depend on their number.
+!> depend on their number. Parts that are done are kept for an interrupted run.
 module boundary_search
   use attractors, only: attractor_t
   use bisection, only: halve_intervals, interval_t, join_slivers, label_starts
   use boundary_lines, only: crossed_edges, crowded_cells, edge_t, line_point_t, line_t, link_lines
+  use checkpoint, only: checkpoint_t
   use grid, only: grid_t, point_start
-  use journal, only: journal_t
   use kinds, only: int64, wp
   use session, only: session_t
-  use team, only: team_t
   use trajectories, only: journey_t
   implicit none
   private
@@ -22,6 +21,8 @@ module boundary_search
   real(wp), parameter :: accuracy = 1e-10_wp
   !> Numbers of an interval on its way between ranks.
   integer, parameter :: packed = 5
+  !> Edges, and starts to label, that are kept together.
+  integer, parameter :: edges_of_part = 512, starts_of_part = 65536
 
   !> A plane of the grid over two axes through the point `index`, and what labels its starts.
   type, public :: plane_t
@@ -44,15 +45,16 @@ module boundary_search
 contains
 
   !> Finds edges, points and lines of a plane whose labels are there.
-  subroutine search_lines(session, grid, plane)
+  subroutine search_lines(session, kept, grid, plane)
     type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(inout) :: plane
     integer, allocatable :: cells(:, :), centres(:)
     real(wp), allocatable :: corners(:, :, :)
     integer :: k
-    call correct_labels(session%team, grid, plane)
-    call halve_edges(session%team, session%journal, grid, plane)
+    call correct_labels(session, kept, grid, plane)
+    call halve_edges(session, kept, grid, plane)
     call join_slivers(plane%intervals)
     call crowded_cells(shape(plane%labels), plane%edges, plane%intervals, .true., cells)
     allocate (centres(size(cells, 2)))
@@ -61,7 +63,7 @@ contains
       corners(:, k, 1) = plane_starts(grid, plane, cells(1, k), cells(2, k))
       corners(:, k, 2) = plane_starts(grid, plane, cells(1, k) + 1, cells(2, k) + 1)
     end do
-    call share_labels(session%team, plane, (corners(:, :, 1) + corners(:, :, 2))/2, centres)
+    call share_labels(session, kept, plane, (corners(:, :, 1) + corners(:, :, 2))/2, centres)
     call link_lines(plane%first, plane%second, plane%edges, plane%intervals, centres, plane%points, plane%lines)
   end subroutine search_lines
 
@@ -92,26 +94,41 @@ contains
   end function side_starts
 
   !> Labels of starts on all ranks, each start by one of them.
-  subroutine share_labels(team, plane, starts, labels)
-    class(team_t), intent(in) :: team
+  subroutine share_labels(session, kept, plane, starts, labels)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(plane_t), intent(in) :: plane
     real(wp), intent(in) :: starts(:, :)
     integer, intent(out) :: labels(:)
     integer, allocatable :: mine(:), own(:)
     integer(int64), allocatable :: sums(:)
-    integer :: k
-    mine = [(k, k=1 + team%rank(), size(labels), team%size())]
-    allocate (own(size(mine)))
-    call label_starts(plane%journey, plane%attractors, starts(:, mine), own)
-    allocate (sums(size(labels)), source=0_int64)
-    sums(mine) = own
-    if (size(sums) > 0) call team%sum(sums)
-    labels = int(sums)
+    real(wp), allocatable :: values(:)
+    integer :: k, first, last
+    logical :: found
+    do first = 1, size(labels), starts_of_part
+      last = min(size(labels), first + starts_of_part - 1)
+      call kept%recall(session, values, found)
+      if (.not. found) then
+        associate (team => session%team)
+          mine = [(k, k=first + team%rank(), last, team%size())]
+          allocate (own(size(mine)), sums(first:last))
+          call label_starts(plane%journey, plane%attractors, starts(:, mine), own)
+          sums = 0
+          sums(mine) = own
+          call team%sum(sums)
+        end associate
+        values = real(sums, wp)
+        deallocate (own, sums)
+        call kept%keep(session, values)
+      end if
+      labels(first:last) = nint(values)
+    end do
   end subroutine share_labels
 
   !> Computes the inferred labels at the ends of crossed edges, until all of these are computed.
-  subroutine correct_labels(team, grid, plane)
-    class(team_t), intent(in) :: team
+  subroutine correct_labels(session, kept, grid, plane)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(inout) :: plane
     logical, allocatable :: wanted(:, :)
@@ -143,7 +160,7 @@ contains
       do k = 1, size(labels)
         starts(:, k) = plane_starts(grid, plane, places(1, k), places(2, k))
       end do
-      call share_labels(team, plane, starts, labels)
+      call share_labels(session, kept, plane, starts, labels)
       do k = 1, size(labels)
         associate (label => plane%labels(places(1, k), places(2, k)))
           if (label /= labels(k)) plane%corrected = plane%corrected + 1
@@ -156,17 +173,45 @@ contains
   end subroutine correct_labels
 
   !> The intervals of all crossed edges, on all ranks.
-  subroutine halve_edges(team, journal, grid, plane)
-    class(team_t), intent(in) :: team
-    type(journal_t), intent(inout) :: journal
+  subroutine halve_edges(session, kept, grid, plane)
+    type(session_t), intent(inout) :: session
+    type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(inout) :: plane
+    real(wp), allocatable :: part(:), all_values(:)
+    integer :: k, first
+    logical :: found
+    allocate (all_values(0))
+    call session%journal%begin('edges', int(size(plane%edges), int64), 0_int64)
+    do first = 1, size(plane%edges), edges_of_part
+      call kept%recall(session, part, found)
+      if (.not. found) then
+        call halve_part(session, grid, plane, first, min(size(plane%edges), first + edges_of_part - 1), part)
+        call kept%keep(session, part)
+      end if
+      all_values = [all_values, part]
+    end do
+    allocate (plane%intervals(size(all_values)/packed))
+    do k = 1, size(plane%intervals)
+      associate (values => all_values(packed*(k - 1) + 1:packed*k))
+        plane%intervals(k) = interval_t(nint(values(1)), values(2), values(3), nint(values(4)), nint(values(5)), .true.)
+      end associate
+    end do
+  end subroutine halve_edges
+
+  !> The intervals, as numbers one after the other, of the crossed edges `first` to `last`.
+  subroutine halve_part(session, grid, plane, first, last, part)
+    type(session_t), intent(inout) :: session
+    type(grid_t), intent(in) :: grid
+    type(plane_t), intent(in) :: plane
+    integer, intent(in) :: first, last
+    real(wp), allocatable, intent(out) :: part(:)
     integer, allocatable :: mine(:)
-    real(wp), allocatable :: from(:, :), to(:, :), tolerance(:), all_values(:)
+    real(wp), allocatable :: from(:, :), to(:, :), tolerance(:)
     type(interval_t), allocatable :: own(:)
     type(interval_t) :: one
     integer :: k, left
-    mine = [(k, k=1 + team%rank(), size(plane%edges), team%size())]
+    mine = [(k, k=first + session%team%rank(), last, session%team%size())]
     allocate (from(3 + size(grid%others), size(mine)), to(3 + size(grid%others), size(mine)), tolerance(size(mine)), &
               own(size(mine)))
     do k = 1, size(mine)
@@ -181,22 +226,15 @@ contains
         tolerance(k) = tolerance_of(plane, edge)
       end associate
     end do
-    call journal%begin('edges', int(size(mine), int64), 0_int64)
     do
       call halve_intervals(plane%journey, plane%attractors, from, to, tolerance, own, left)
-      call journal%progress(int(max(size(mine) - left, 0), int64))
+      call session%journal%progress(int(first - 1, int64) + max(size(mine) - left, 0)*session%team%size())
       if (left == 0) exit
     end do
     own%edge = mine(own%edge)
-    call team%allgather([(real(own(k)%edge, wp), own(k)%low, own(k)%high, real(own(k)%below, wp), real(own(k)%above, wp), &
-                          k=1, size(own))], all_values)
-    allocate (plane%intervals(size(all_values)/packed))
-    do k = 1, size(plane%intervals)
-      associate (values => all_values(packed*(k - 1) + 1:packed*k))
-        plane%intervals(k) = interval_t(nint(values(1)), values(2), values(3), nint(values(4)), nint(values(5)), .true.)
-      end associate
-    end do
-  end subroutine halve_edges
+    call session%team%allgather([(real(own(k)%edge, wp), own(k)%low, own(k)%high, real(own(k)%below, wp), real(own(k)%above, wp), &
+                                  k=1, size(own))], part)
+  end subroutine halve_part
 
   !> The accuracy as a share of an edge.
   pure real(wp) function tolerance_of(plane, edge) result(tolerance)

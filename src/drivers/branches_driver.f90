@@ -8,6 +8,7 @@ module branches_driver
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
+  use branch_watch, only: branch_watch_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
   use case_setup, only: options_of, output_path
@@ -37,7 +38,7 @@ module branches_driver
   !> Starts at each value at which orbits are searched.
   integer, parameter :: starts = 48
   !> At an impact without speed the derivative is not finite: what is larger than this is rounding.
-  real(wp), parameter :: endless = 1e9_wp
+  real(wp), parameter :: endless = 1e7_wp
   !> Powers of 1/p for the root p of p^3 = p + 1 (Roberts 2018).
   real(wp), parameter :: irrational(2) = [0.7548776662466927_wp, 0.5698402909980532_wp]
 
@@ -46,8 +47,9 @@ contains
   !> Runs the command; ends the program with the exit code on errors.
   subroutine run_branches(command)
     type(command_t), intent(in) :: command
-    type(session_t) :: session
-    type(search_t) :: search
+    type(session_t), target :: session
+    type(search_t), target :: search
+    type(branch_watch_t), target :: watch
     type(curves_t) :: curves
     type(contacts_t) :: contacts
     type(schema_t) :: schema
@@ -77,10 +79,9 @@ contains
     call session%begin(path, tiled=.false.)
     ! One process is enough: the others wait at its end.
     if (session%team%is_root()) then
-      call session%journal%begin('values', int(size(search%values), int64), 0_int64)
+      call watch%begin(session%journal, search)
       do i = 1, size(search%values)
         call search_value(search, i)
-        call session%journal%progress(int(i, int64))
       end do
       call follow_seeds(search)
       if (command%contacts) call look_for_contacts(session, search, contacts)

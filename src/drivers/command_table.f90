@@ -44,9 +44,8 @@ module command_table
       'the boundaries between the basins of a map, as curves', &
       'separatrix boundary MAP [-o FILE]: the boundaries between the basins of a finished map, as curves'//nl// &
       '  Every edge between neighbours of different attractors is halved until its boundary point is known to 1e-10'//nl// &
-      '  of the map; the points are linked to curves. Run it with mpirun to share the work. Nothing to resume: it'//nl// &
-      '  takes a small part of the time of the map. The pieces are named by what they lead to, and the stable and'//nl// &
-      '  unstable sets of the saddles are grown (one body).'//nl// &
+      '  of the map; the points are linked to curves. The pieces are named by what they lead to, and the stable and'//nl// &
+      '  unstable sets of the saddles are grown (one body). Run it with mpirun to share the work.'//nl// &
       '  --grow F           grows these sets within F times the window of the map (default 1; 0: not at all)'//nl), &
     command_row_t('stability', 'CASE', &
       'Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic', &
@@ -115,7 +114,7 @@ module command_table
       '  --dry-run          says what would be done: points, tiles, bytes, estimated time'), &
     option_row_t('--force', '', .false., 'basin sweep branches boundary stability trajectory points merge', &
       '  --force            replaces an existing output'), &
-    option_row_t('--resume', '', .false., 'basin sweep points', &
+    option_row_t('--resume', '', .false., 'basin sweep boundary points', &
       '  --resume           goes on with a run that was stopped or killed, begins one if there is none'), &
     option_row_t('--shard', '', .true., 'basin points', &
       '  --shard I/N        basin, points: only share I of N of the tiles, into OUT.shard-I-of-N.part; merge joins them'), &
@@ -123,7 +122,7 @@ module command_table
       '  --catalogue FILE   basin: takes the attractors from a share of the same map instead of searching them'), &
     option_row_t('--search-only', '', .false., 'basin', &
       '  --search-only      basin --shard: only makes the file of the share, from which all can take the attractors'), &
-    option_row_t('--time-limit', '', .true., 'basin sweep points', &
+    option_row_t('--time-limit', '', .true., 'basin sweep boundary points', &
       '  --time-limit S     stops cleanly after S seconds, to be resumed (exit code 75)'), &
     option_row_t('--ranks-per-node', '', .true., 'basin sweep points', &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'), &

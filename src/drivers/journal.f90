@@ -46,6 +46,7 @@ module journal
     procedure :: line
     procedure :: begin
     procedure :: progress
+    procedure :: under_way
     procedure :: error => report_error
   end type journal_t
 
@@ -158,10 +159,9 @@ contains
     real(wp) :: now, rate
     character(len=:), allocatable :: message, fields
     if (.not. self%active .or. (self%quiet .and. self%copy%descriptor < 0)) return
+    if (done <= self%before) return
+    if (.not. is_due(self)) return
     now = monotonic_seconds()
-    if (now < self%next_progress .or. done <= self%before) return
-    if (.not. (self%terminal .or. self%steady)) self%interval = min(2*self%interval, longest_interval)
-    self%next_progress = now + self%interval
     rate = real(done - self%before, wp)/max(now - self%stretch_started, 1e-3_wp)
     message = to_text(done)//' of '//to_text(self%total)//' '//self%things//', '//to_text(nint(100*real(done, wp) &
       /real(max(self%total, 1_int64), wp)))//' %, '//to_text(rate, 3)//' '//self%things//'/s, ETA '// &
@@ -169,6 +169,31 @@ contains
     fields = ', "done": '//to_text(done)//', "total": '//to_text(self%total)//', "of": '//json_text(self%things)// &
              ', "per_second": '//to_text(rate, 6)//', "resident_bytes": '//to_text(resident_bytes())// &
              ', "written_bytes": '//to_text(self%written)
+    call put_progress(self, message, fields)
+  end subroutine progress
+
+  !> The same of work whose end is not known: how far it is in words, and as members of the JSON object.
+  subroutine under_way(self, message, fields)
+    class(journal_t), intent(inout) :: self
+    character(len=*), intent(in) :: message, fields
+    if (.not. self%active .or. (self%quiet .and. self%copy%descriptor < 0)) return
+    if (is_due(self)) call put_progress(self, message, ', '//fields)
+  end subroutine under_way
+
+  !> Whether it is time to tell; if so the next time is set.
+  logical function is_due(self)
+    class(journal_t), intent(inout) :: self
+    real(wp) :: now
+    now = monotonic_seconds()
+    is_due = now >= self%next_progress
+    if (.not. is_due) return
+    if (.not. (self%terminal .or. self%steady)) self%interval = min(2*self%interval, longest_interval)
+    self%next_progress = now + self%interval
+  end function is_due
+
+  subroutine put_progress(self, message, fields)
+    class(journal_t), intent(inout) :: self
+    character(len=*), intent(in) :: message, fields
     if (self%json) then
       call self%line('progress', message, fields(3:))
       return
@@ -182,7 +207,7 @@ contains
     else
       write (error_unit, '(a)') message
     end if
-  end subroutine progress
+  end subroutine put_progress
 
   subroutine close_line(self)
     class(journal_t), intent(inout) :: self

@@ -61,7 +61,7 @@ contains
       count = count + 1
       events(count) = event
     end do
-    events = events(:count)
+    if (count < size(events)) events = events(:count)
   end subroutine events_of_body
 
   !> Mode after an event and its side; `ahead` is how far x goes until the next.

@@ -75,8 +75,7 @@ contains
     integer, intent(in) :: mode
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
-    type(slip_t) :: system
-    real(wp) :: t, place(2)
+    real(wp) :: place(2)
     integer :: side
     side = pressed_side(mode)
     if (side == 0 .and. moving%exact .and. .not. moving%layer > 0) then
@@ -86,19 +85,31 @@ contains
       call fly_closed(moving%pressed%flow(side), direction_in(mode), t0, y0 - place, t1, y1, flight)
       y1 = y1 + place
     else
-      system%machine = moving%machine
-      system%step_of = steps
-      system%mode = mode
-      y1 = y0
-      t = t0
-      if (present(flight)) flight = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
-      if (side == 0 .and. moving%exact .and. t1 > t0) then
-        call cross_layers(moving, system, sizes, t, t1, y1, flight)
-      else
-        call march(moving, system, sizes, t, t1, huge(1.0_wp), y1, flight)
-      end if
+      call fly_by_steps(moving, sizes, steps, mode, t0, y0, t1, y1, flight)
     end if
   end subroutine fly_slip
+
+  !> The same where it has no closed form from end to end. Apart from it, for a copy of the machine costs more than a closed form.
+  pure subroutine fly_by_steps(moving, sizes, steps, mode, t0, y0, t1, y1, flight)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: sizes(2), steps(2), t0, y0(:), t1
+    integer, intent(in) :: mode
+    real(wp), intent(out) :: y1(:)
+    real(wp), intent(out), optional :: flight(:, :)
+    type(slip_t) :: system
+    real(wp) :: t
+    system%machine = moving%machine
+    system%step_of = steps
+    system%mode = mode
+    y1 = y0
+    t = t0
+    if (present(flight)) flight = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+    if (pressed_side(mode) == 0 .and. moving%exact .and. t1 > t0) then
+      call cross_layers(moving, system, sizes, t, t1, y1, flight)
+    else
+      call march(moving, system, sizes, t, t1, huge(1.0_wp), y1, flight)
+    end if
+  end subroutine fly_by_steps
 
   !> With z = y' + g y + i w_d y a linear slip is z' = (-g + i w_d) z + forcing: its derivative by the start is a decaying
   !> rotation.

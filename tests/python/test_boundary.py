@@ -98,6 +98,42 @@ def test_two_ranks_write_the_same_curves(run, coulomb, curves, tmp_path):
             np.testing.assert_array_equal(one[name][()], other[name][()])
 
 
+def same_content(one: Path, other: Path) -> bool:
+    """Whether two files have the same bits but for who made them."""
+    with h5py.File(one) as first, h5py.File(other) as second:
+        found = []
+        first.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+        found = [name for name in found if not name.startswith("provenance")]
+        return all(np.array_equal(first[name][()], second[name][()]) for name in found)
+
+
+def test_a_stopped_run_goes_on_to_the_same_curves_with_any_ranks(run, coulomb, curves, tmp_path):
+    out = tmp_path / "stopped.h5"
+    part = out.with_name("stopped.h5.part")
+    # a time limit that is over at once leaves one part each time
+    ended = run("boundary", coulomb, "-o", out, "--time-limit", 1e-3)
+    assert ended.returncode == 75 and "--resume goes on" in ended.stderr
+    assert part.exists() and not out.exists()
+    assert run("boundary", coulomb, "-o", out).returncode == 73
+    other = run("boundary", coulomb, "-o", out, "--resume", "--grow", 2)
+    assert other.returncode == 76 and "belongs to another map" in other.stderr
+    size = part.stat().st_size
+    for ranks in (2, 1):
+        ended = run("boundary", coulomb, "-o", out, "--resume", "--time-limit", 1e-3, ranks=ranks)
+        assert ended.returncode == 75, ended.stderr
+        assert part.stat().st_size > size
+        size = part.stat().st_size
+    # what a kill may leave: half a record; and a flipped bit
+    damaged = bytearray(part.read_bytes()[:-5])
+    damaged[-40] ^= 1
+    part.write_bytes(damaged)
+    ended = run("boundary", coulomb, "-o", out, "--resume")
+    assert ended.returncode == 0, ended.stderr
+    assert "2 parts of the work were done before" in ended.stdout
+    assert same_content(out, curves)
+    assert [path.name for path in tmp_path.iterdir()] == ["stopped.h5"]
+
+
 def test_a_refined_map_has_the_same_boundary_as_a_full_one(run, source_dir, coulomb, curves, tmp_path):
     case, basins, out = (tmp_path / name for name in ("refined.toml", "refined.h5", "out.h5"))
     case.write_text(coulomb.with_name("coulomb.toml").read_text() + "\n[refine]\n")

@@ -58,6 +58,54 @@ def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
         assert "fold (SN)" in texts and "graze with a fold (GR-fold)" in texts
 
 
+def test_a_family_of_orbits_is_called_one(run):
+    over = ("--parameter", "drive.ratio", "--from", "0.49", "--to", "0.51", "--searches", "3")
+    out, ended = run("dry_friction_family", *over)
+    assert ended.returncode == 0, ended.stderr
+    assert "orbits that are not isolated (a family, multiplier 1) were met" in ended.stdout
+    with open_result(out) as result:
+        assert "not_known" not in set(decode_flags(result["label"]).values)
+        assert result["branch"].values.max() == 1
+
+
+STOPS = """
+body = { mass = 2, gravity = 9.81 }
+restoring = { law = "linear", stiffness = 50 }
+friction = { law = "viscous", damping = 0.6 }
+contact = { law = "newton", restitution = 0.7, upper = 0.3, lower = -0.3 }
+drive = { law = "harmonic", amplitude = 0.15, ratio = 1.3 }
+run.duration = 200
+start.x0 = 0.05
+"""
+
+
+def test_what_begins_where_both_stops_are_touched_at_once_is_followed_once(separatrix, tmp_path):
+    case, out = tmp_path / "stops.toml", tmp_path / "out.h5"
+    case.write_text(STOPS)
+    words = ("--parameter", "drive.ratio", "--from", "0.65", "--to", "0.8", "--searches", "3")
+    command = [separatrix, "branches", case, "-o", out, *words, "--json"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    # where the linear motion is as large as the play: k a = |k - m w^2 + i c w| 0.3
+    stiffness, mass, damping, natural = 50, 2, 0.6, 5
+    coefficients = [mass**2, damping**2 - 2 * stiffness * mass, stiffness**2 - (stiffness * 0.15 / 0.3) ** 2]
+    graze = np.sqrt(np.roots(coefficients).min()) / natural
+    points = [line for line in map(json.loads, ended.stdout.splitlines()) if line["event"] == "point"]
+    at = [line for line in points if abs(line["parameter"] - graze) < 1e-10]
+    # the motion without impacts goes on with two; one on a side begins there, and its mirror image
+    assert {line["label"] for line in at} == {"GR"}
+    words = sorted(line["word"] for line in at if line["word"].count(".") == 1)
+    assert words == [".", "L.", "R."]
+    with open_result(out) as result:
+        both = (decode_words(result["event_word"]).values == "RL.") & (result["parameter"].values < 0.8)
+        values = np.sort(result["parameter"].values[both])
+        assert np.diff(values).min() > 1e-9
+        assert set(result["symmetric"].values[both]) == {1}
+        # what touches both stops has one amplitude: a point on the section is drawn
+        with style.context():
+            figure = branches.figures(result, "title")["branches"]
+        assert figure.axes[0].get_ylabel().startswith("position at crank angle 0")
+
+
 def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
     out, ended = run(
         "impact_coco", *AMPLITUDE, "--free", "drive.ratio", "--free-from", "0.9", "--free-to", "1.1", "--json"

@@ -52,6 +52,47 @@ def test_two_masses_with_a_stop(follow):
         assert np.prod(multipliers[plain], axis=1).real == pytest.approx(expected, rel=1e-6)
 
 
+TWO_IMPACTS = """
+[body.a]
+mass = 1
+[body.b]
+mass = 0.5
+[spring.g]
+between = ["a"]
+stiffness = 1
+damping = 0.06
+[spring.c]
+between = ["a", "b"]
+stiffness = 0.8
+damping = 0.05
+[contact.w]
+between = ["b"]
+law = "newton"
+restitution = 0.7
+upper = 1.2
+[drive.f]
+law = "force"
+body = "a"
+amplitude = 0.4
+frequency = 0.75
+[watch]
+body = "b"
+[run]
+duration = 500
+"""
+
+
+def test_a_graze_that_is_met_from_the_side_of_the_impact_has_its_name(follow, tmp_path: Path):
+    """Beside it the derivative is beyond what rounding leaves: the branches ended there without a name."""
+    case = tmp_path / "two.toml"
+    case.write_text(TWO_IMPACTS)
+    points, out = follow(case, "drive.f.frequency", 0.83, 0.88, "--searches", "3")
+    with open_result(out) as result:
+        assert "not_known" not in set(decode_flags(result["label"]).values)
+    grazes = [point["parameter"] for point in points if point["label"] == "GR-fold" and point["word"] == "R."]
+    assert grazes == pytest.approx([0.8506164517288], abs=1e-11)
+
+
 def test_a_soft_stop(follow, source_dir: Path, tmp_path: Path):
     """The branch passes the graze both ways, which is where the amplitude without the stop is the gap."""
     text = (source_dir / "examples" / "structure_two_masses.toml").read_text()

@@ -79,15 +79,32 @@ def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     return figure
 
 
+# So large a share of orbits with one and the same amplitude is a machine between two stops.
+_SAME_AMPLITUDE = 0.25
+
+
+def height(result: xr.Dataset) -> tuple[np.ndarray, str]:
+    """Return what is drawn over the parameter, and its name.
+
+    The amplitude; between two stops, where that of all that touches both is the play, a point on the section.
+    """
+    amplitude = (result["x_max"].values - result["x_min"].values) / 2
+    lengths = unit(result["x_max"])
+    largest = np.isclose(amplitude, amplitude.max(), rtol=1e-9, atol=0)
+    if largest.mean() < _SAME_AMPLITUDE:
+        return amplitude, rf"amplitude $(x_\mathrm{{max}} - x_\mathrm{{min}})/2$ ({lengths})"
+    return result["x"].values, f"{result['x'].attrs.get('long_name', 'position on the section')} ({lengths})"
+
+
 def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
-    """Return the amplitude of every orbit over the parameter."""
+    """Return the amplitude of every orbit, or a point on its section, over the parameter."""
     figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
     ax = figure.add_subplot()
     handles = draw(ax, result)
     across = result["parameter"].copy()
     across.name = str(result.attrs["parameter"]).replace(".", "_")
     ax.set_xlabel(axis_label(across))
-    ax.set_ylabel(rf"amplitude $(x_\mathrm{{max}} - x_\mathrm{{min}})/2$ ({unit(result['x_max'])})")
+    ax.set_ylabel(height(result)[1])
     count = int(result["branch"].max())
     caption = [
         *caption_pieces(result, look, describe_case(result)),
@@ -101,7 +118,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
 def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
     """Draw the branches and their labelled points; return what the legend needs."""
     across = result["parameter"].values
-    up = (result["x_max"].values - result["x_min"].values) / 2
+    up = height(result)[0]
     stable, branch = result["stable"].values == 1, result["branch"].values
     labels = decode_flags(result["label"]).values
     for look in ("-", "--"):

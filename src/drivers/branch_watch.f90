@@ -1,0 +1,56 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Tells the log how far a search for branches is.
+module branch_watch
+  use branch_search, only: search_t
+  use journal, only: journal_t, json_number
+  use kinds, only: int64, wp
+  use search_watch, only: search_watch_t
+  use text, only: to_text
+  implicit none
+  private
+
+  type, extends(search_watch_t), public :: branch_watch_t
+    private
+    type(journal_t), pointer :: journal => null()
+    type(search_t), pointer :: search => null()
+    integer(int64) :: tried = 0
+  contains
+    procedure :: begin
+    procedure :: tell_start
+    procedure :: tell_point
+  end type branch_watch_t
+
+contains
+
+  !> Watches a search; both it and the log outlive this.
+  subroutine begin(self, journal, search)
+    class(branch_watch_t), intent(inout), target :: self
+    type(journal_t), intent(inout), target :: journal
+    type(search_t), intent(inout), target :: search
+    self%journal => journal
+    self%search => search
+    search%watcher => self
+    ! Every start is tried twice: where its motion settles, and as it is.
+    call journal%begin('starts', 2_int64*size(search%values)*size(search%starts, 2), 0_int64)
+  end subroutine begin
+
+  subroutine tell_start(self)
+    class(branch_watch_t), intent(inout) :: self
+    self%tried = self%tried + 1
+    call self%journal%progress(self%tried)
+  end subroutine tell_start
+
+  subroutine tell_point(self, points, parameter)
+    class(branch_watch_t), intent(inout) :: self
+    integer, intent(in) :: points
+    real(wp), intent(in) :: parameter
+    associate (branch => size(self%search%branches) + 1)
+      call self%journal%under_way('following branch '//to_text(branch)//': '//to_text(points)//' points this way, '// &
+        self%search%family%path//' = '//to_text(parameter, 6), '"following": '//to_text(branch)//', "points": '// &
+        to_text(points)//', "parameter": '//json_number(parameter))
+    end associate
+  end subroutine tell_point
+
+end module branch_watch
