@@ -10,15 +10,14 @@
 
 namespace {
 
-// Amplitudes of the flights that set off from the state and the phases of `fresh`. Returns those that no mode
-// in lanes has.
+// Amplitudes of the flights that set off from the state and the phases of `fresh`, where `b` has the
+// harmonics. Returns those that no mode in lanes has.
 template <class size>
-inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh, structure_group &g) {
-  structure_bases b;
+inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh, const structure_bases &b,
+                           structure_group &g) {
   mask unknown = fresh;
   put(g.s.start, fresh, g.s.time);
   put(g.s.found, fresh, 0);
-  harmonics_at(m, z, g.s.start, b);
   for (int key = 0; key < modes_of(m); key++) {
     mask in = in_mode(m, z, key, fresh, g.s);
     const structure_mode &t = m.mode[key];
@@ -73,13 +72,14 @@ inline mask chatters_out(const structure_machine &m, const structure_joint &join
          (last * magnitude(rate) <= -1.001 * a * m.chatter_share);
 }
 
-// Flights of the lanes `fresh`. Returns those that do not start as their phases say: joints that should stick
-// but do not, or a chatter that ends.
+// Flights of the lanes `fresh`, where `b` has the harmonics. Returns those that do not start as their phases
+// say: joints that should stick but do not, or a chatter that ends.
 template <class size>
-inline mask set_off(const structure_machine &m, const size &z, mask fresh, structure_group &g) {
-  mask wrong = set_amplitudes(m, z, fresh, g);
+inline mask set_off(const structure_machine &m, const size &z, mask fresh, structure_bases &b,
+                    structure_group &g) {
+  mask wrong = set_amplitudes(m, z, fresh, b, g);
   enter_modes(m, z, fresh & ~wrong, g);
-  look_from_start(m, z, fresh, g);
+  look_from_start(m, z, fresh, b, g);
   const outlook &o = g.first;
   for (int j = 0; j < z.joints; j++) {
     const structure_joint &joint = m.joint[j];
@@ -177,7 +177,7 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
     }
   }
   LANE_COUNT(events, count(changed));
-  rare = rare | set_off(m, z, due & ~rare, g);
+  rare = rare | set_off(m, z, due & ~rare, b, g);
   if (any(rare)) {
     for (int i = 0; i < z.coordinates; i++) {
       put(g.s.q[i], rare, q[i]);

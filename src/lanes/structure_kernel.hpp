@@ -34,9 +34,17 @@ void fly_group(const structure_machine &m, const size &z, int first, lane_batch 
     return;
   load(batch, first, g.s);
   enter_modes(m, z, sent & ~fresh, g);
-  if (any(sent & ~fresh & (g.s.found < 0.5)))
-    look_from_start(m, z, sent & ~fresh, g);
-  mask left = set_off(m, z, fresh, g);
+  structure_bases b;
+  mask left = sent & ~fresh & (g.s.found < 0.5);
+  if (any(left)) {
+    harmonics_at(m, z, g.s.start, b);
+    look_from_start(m, z, left, b, g);
+  }
+  left = mask{};
+  if (any(fresh)) {
+    harmonics_at(m, z, g.s.time, b);
+    left = set_off(m, z, fresh, b, g);
+  }
   put(g.c.status, fresh, lane_flying);
   put(g.c.status, left, lane_left);
   while (!any(sent & (g.c.status != lane_flying))) {

@@ -55,6 +55,11 @@ struct outlook {
   vec f[most_joints], f1[most_joints], f2[most_joints], f3[most_joints];
 };
 
+// Two derivatives more.
+struct far_outlook {
+  vec f4[most_joints], f5[most_joints];
+};
+
 // Exponentials and harmonics at an instant.
 struct structure_bases {
   vec re[most_terms], im[most_terms], cosine[most_waves], sine[most_waves];
@@ -72,8 +77,9 @@ struct structure_group {
   // Length of the panels [s], and what turns the exponentials and harmonics from one to the next.
   vec panel;
   structure_bases step;
-  // The functions at the start.
+  // The functions at the start, and the harmonics there.
   outlook first;
+  vec first_cosine[most_waves], first_sine[most_waves];
 };
 
 // The lanes of `among` that are in mode number `key`.
@@ -140,12 +146,12 @@ inline void bases_at(const structure_machine &m, const size &z, const structure_
   harmonics_at(m, z, g.s.start + elapsed, b);
 }
 
-// The functions of the joints with three derivatives, or with `fourth` one more.
+// The functions of the joints with three derivatives, or with `more` five.
 template <class size>
 inline void functions_at(const structure_machine &m, const size &z, const structure_group &g,
-                         const structure_bases &b, outlook &o, vec *fourth = nullptr) {
+                         const structure_bases &b, outlook &o, far_outlook *more = nullptr) {
   for (int j = 0; j < z.joints; j++) {
-    vec f = g.constant[j], f1 = {}, f2 = {}, f3 = {}, f4 = {};
+    vec f = g.constant[j], f1 = {}, f2 = {}, f3 = {}, f4 = {}, f5 = {};
     for (int k = 0; k < z.terms; k++) {
       vec y = g.part_re[j][k] * b.re[k] - g.part_im[j][k] * b.im[k];
       vec across = g.part_re[j][k] * b.im[k] + g.part_im[j][k] * b.re[k];
@@ -156,8 +162,11 @@ inline void functions_at(const structure_machine &m, const size &z, const struct
       f2 += y2;
       vec y3 = -g.square[k] * y1 - twice * y2;
       f3 += y3;
-      if (fourth)
-        f4 -= g.square[k] * y2 + twice * y3;
+      if (more) {
+        vec y4 = -g.square[k] * y2 - twice * y3;
+        f4 += y4;
+        f5 -= g.square[k] * y3 + twice * y4;
+      }
     }
     for (int n = 0; n < z.waves; n++) {
       double w = (n + 1) * m.drive_frequency, w2 = w * w;
@@ -167,15 +176,19 @@ inline void functions_at(const structure_machine &m, const size &z, const struct
       f1 -= w * slope;
       f2 -= w2 * part;
       f3 += (w2 * w) * slope;
-      if (fourth)
+      if (more) {
         f4 += (w2 * w2) * part;
+        f5 -= (w2 * w2 * w) * slope;
+      }
     }
     o.f[j] = f;
     o.f1[j] = f1;
     o.f2[j] = f2;
     o.f3[j] = f3;
-    if (fourth)
-      fourth[j] = f4;
+    if (more) {
+      more->f4[j] = f4;
+      more->f5[j] = f5;
+    }
   }
 }
 
@@ -289,18 +302,21 @@ inline void put_outlook(int joints, mask where, const outlook &from, outlook &o)
   }
 }
 
-// The functions where the flights of the lanes `in` start.
+// The functions where the flights of the lanes `in` start, where `b` has the harmonics.
 template <class size>
-inline void look_from_start(const structure_machine &m, const size &z, mask in, structure_group &g) {
-  structure_bases b;
+inline void look_from_start(const structure_machine &m, const size &z, mask in, structure_bases &b,
+                            structure_group &g) {
   outlook o;
   for (int k = 0; k < z.terms; k++) {
     b.re[k] = 1;
     b.im[k] = {};
   }
-  harmonics_at(m, z, g.s.start, b);
   functions_at(m, z, g, b, o);
   put_outlook(z.joints, in, o, g.first);
+  for (int n = 0; n < z.waves; n++) {
+    put(g.first_cosine[n], in, b.cosine[n]);
+    put(g.first_sine[n], in, b.sine[n]);
+  }
 }
 
 } // namespace

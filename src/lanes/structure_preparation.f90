@@ -22,8 +22,8 @@ module structure_preparation
 
   public :: prepare_structure_lanes
 
-  !> Over so many radians of the fastest part Taylor's remainder after four terms is below rounding.
-  real(wp), parameter :: taylor_span = 2.5e-4_wp
+  !> Over so many radians of the fastest part Taylor's remainder of a speed after five terms is below rounding.
+  real(wp), parameter :: taylor_span = 2e-3_wp
   !> Radians of a panel, and how much longer panels may be.
   real(wp), parameter :: coarse = 3.0_wp, stretches(panel_lengths) = [4.0_wp, 2.5_wp, 1.6_wp, 1.0_wp]
   !> Shares of the sizes of forces and lengths within which a choice is left to the event loop.

@@ -13,7 +13,7 @@
 
 namespace {
 
-enum { most_panels = 256, most_polishings = 8, most_tries = 24, most_newtons = 5 };
+enum { most_panels = 256, most_polishings = 8, most_tries = 24, most_newtons = 3 };
 
 // Is w > 0 strictly between two times `span` apart? Zero at an end is allowed, and a zero rate there.
 // `error`: bound on the sixth derivative times span^6/14400, the share of the middle coefficient. `halves`:
@@ -230,6 +230,22 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
   }
 }
 
+// Newton's step from `step` to the zero of Taylor's polynomial of the targets.
+template <class size>
+inline vec zero_nearby(const size &z, const structure_target &target, const guard_course &c,
+                       const far_outlook &far, vec step) {
+  vec w4 = {}, w5 = {};
+  for (int j = 0; j < z.joints; j++) {
+    mask is = target.joint == double(j + 1);
+    put(w4, is, -target.side * far.f4[j]);
+    put(w5, is, -target.side * far.f5[j]);
+  }
+  vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, fifth = 0.2 * step;
+  vec w = c.w + step * (c.w1 + half * (c.w2 + third * (c.w3 + fourth * (w4 + fifth * w5))));
+  vec slope = c.w1 + step * (c.w2 + half * (c.w3 + third * (w4 + fourth * w5)));
+  return step - w / slope;
+}
+
 // The end of the panel comes to the zero of the target. Returns the lanes where it was not found.
 template <class size>
 inline mask polish(const structure_machine &m, const size &z, mask asked, structure_walk &p,
@@ -240,21 +256,24 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
   for (int round = 0; round < most_polishings && any(asked); round++) {
     structure_bases b;
     outlook o;
-    vec f4[most_joints];
+    far_outlook far;
     bases_at(m, z, g, s, b);
-    functions_at(m, z, g, b, o, f4);
+    functions_at(m, z, g, b, o, &far);
     c = course_of(z, g, p.target, o);
     vec w = c.w, w1 = c.w1, w2 = c.w2;
     put(low, w > 0.0, s);
     high = pick(w > 0.0, high, s);
     vec step = -w * (w1 * w1 - 0.5 * w * w2) / (w1 * (w1 * w1 - w * w2) + (1.0 / 6) * w * w * c.w3);
+    // Where the step is short Taylor's polynomial is the function: its zero.
+    vec zero = zero_nearby(z, p.target, c, far, step);
+    step = pick(magnitude(step) <= m.close, zero, step);
     vec next = s + step;
     mask guided = (w1 < 0.0) & (next >= low) & (next <= high) & (next > p.t);
     mask close = asked & guided & (magnitude(step) <= m.close) & (magnitude(w) <= -2 * m.close * w1);
     if (any(close)) {
       for (int k = 0; k < z.terms; k++) {
         vec re = b.re[k], im = b.im[k];
-        for (int n = 3; n >= 1; n--) {
+        for (int n = 5; n >= 1; n--) {
           vec part = (1.0 / n) * step, turned = b.re[k] + part * (-g.decay[k] * re - g.turn[k] * im);
           im = b.im[k] + part * (g.turn[k] * re - g.decay[k] * im);
           re = turned;
@@ -262,13 +281,15 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
         put(p.b.re[k], close, re);
         put(p.b.im[k], close, im);
       }
-      vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step;
+      vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, fifth = 0.2 * step;
       for (int j = 0; j < z.joints; j++) {
-        vec f = o.f[j] + step * (o.f1[j] + half * (o.f2[j] + third * (o.f3[j] + fourth * f4[j])));
-        put(p.far.f[j], close, f);
-        put(p.far.f1[j], close, o.f1[j] + step * (o.f2[j] + half * (o.f3[j] + third * f4[j])));
-        put(p.far.f2[j], close, o.f2[j] + step * (o.f3[j] + half * f4[j]));
-        put(p.far.f3[j], close, o.f3[j] + step * f4[j]);
+        vec f5 = far.f5[j], f4 = far.f4[j], f3 = o.f3[j], f2 = o.f2[j], f1 = o.f1[j];
+        vec slope = f1 + step * (f2 + half * (f3 + third * (f4 + fourth * f5)));
+        put(p.far.f[j], close,
+            o.f[j] + step * (f1 + half * (f2 + third * (f3 + fourth * (f4 + fifth * f5)))));
+        put(p.far.f1[j], close, slope);
+        put(p.far.f2[j], close, f2 + step * (f3 + half * (f4 + third * f5)));
+        put(p.far.f3[j], close, f3 + step * (f4 + half * f5));
       }
       make_zero(z, g, p.target, close, p.far);
       put(p.end, close, next);
@@ -303,7 +324,10 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     p.b.re[k] = 1;
     p.b.im[k] = {};
   }
-  harmonics_at(m, z, g.s.start, p.b);
+  for (int n = 0; n < z.waves; n++) {
+    p.b.cosine[n] = g.first_cosine[n];
+    p.b.sine[n] = g.first_sine[n];
+  }
   p.here = g.first;
   p.target = {magnitude(g.s.left), pick(g.s.left > 0.0, 1, -1)};
   make_zero(z, g, p.target, seek & (g.s.left != 0.0), p.here);
