@@ -136,10 +136,10 @@ contains
     call end_record(moving, span, course, log)
     call conclude(moving, no_catalogue, course, outcome)
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
-    ! Newton's method at each period, twenty steps with differences along every coordinate at most.
+    ! Newton's method at each period, four steps in the mean, with differences along every coordinate.
     periods = span%duration/moving%machine%period
     searched = session%the_case%run%extension*periods &
-               + 10*(2*coordinates_of(moving) + 1)*min(periods, real(session%the_case%attractors%max_period, wp))**2
+               + 2*(2*coordinates_of(moving) + 1)*min(periods, real(session%the_case%attractors%max_period, wp))**2
     if ((monotonic_seconds() - began)/periods*searched < worth_a_word) return
     call session%journal%line('search', 'looking for the cycle that it came to; run.average = "window" leaves that out')
   end subroutine fly
