@@ -44,6 +44,21 @@ int separatrix_is_special(const char *path) {
   return stat(path, &facts) == 0 && !S_ISREG(facts.st_mode);
 }
 
+/* Creates a file in a folder and removes it: folders of the system may be writable and yet take no file. */
+static int try_folder(const char *folder) {
+  char *probe = NULL;
+  if (asprintf(&probe, "%s/.separatrix-XXXXXX", folder) < 0)
+    return ENOMEM;
+  const int descriptor = mkstemp(probe);
+  const int status = descriptor >= 0 ? 0 : errno;
+  if (descriptor >= 0) {
+    unlink(probe);
+    close(descriptor);
+  }
+  free(probe);
+  return status;
+}
+
 /* Whether a file can be created in the folder of `path`. */
 int separatrix_folder_status(const char *path) {
   char *folder = folder_of(path);
@@ -55,8 +70,8 @@ int separatrix_folder_status(const char *path) {
     status = errno;
   else if (!S_ISDIR(facts.st_mode))
     status = ENOTDIR;
-  else if (access(folder, W_OK | X_OK) != 0)
-    status = errno;
+  else
+    status = try_folder(folder);
   free(folder);
   return status;
 }

@@ -199,7 +199,7 @@ inline void put_bases(int terms, int waves, mask where, const structure_bases &f
 
 // Walks on panel by panel until the proof fails. Flights that last too long end without an event.
 template <class size>
-inline void walk(const structure_machine &m, const size &z, mask walking, mask &todo, structure_walk &p,
+inline void walk(const structure_machine &m, const size &z, mask walking, mask &sought, structure_walk &p,
                  structure_group &g) {
   while (any(walking)) {
     structure_bases next;
@@ -221,7 +221,7 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
     mask over = walking & (p.panels >= double(most_panels));
     if (any(over)) {
       keep_end(z, over, p, {0, 0}, g);
-      todo = todo & ~over;
+      sought = sought & ~over;
       walking = walking & ~over;
     }
     put_outlook(z.joints, walking, p.far, p.here);
@@ -337,31 +337,31 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
       put(p.here.f1[j], g.s.rising == double(j + 1), vec{});
   p.t = p.end = p.tries = p.panels = vec{};
   p.at_zero = mask{};
-  mask todo = seek, walking = seek, lost = {};
-  while (any(todo)) {
-    walk(m, z, walking, todo, p, g);
+  mask sought = seek, walking = seek, lost = {};
+  while (any(sought)) {
+    walk(m, z, walking, sought, p, g);
     structure_target fallen = earliest_fallen(m, z, g, p.here, p.far);
-    mask aims = todo & (fallen.joint > 0.0), failed = {};
+    mask aims = sought & (fallen.joint > 0.0), failed = {};
     put(p.target.joint, aims, fallen.joint);
     put(p.target.side, aims, fallen.side);
     if (any(aims)) {
       p.at_zero = p.at_zero & ~aims;
       failed = polish(m, z, aims, p, g);
     }
-    mask blind = todo & ~aims;
+    mask blind = sought & ~aims;
     if (any(blind))
       halve(m, z, blind, p, g);
-    mask within = proven_within(m, z, g, todo, p.here, p.far, p.end - p.t) & ~failed;
+    mask within = proven_within(m, z, g, sought, p.here, p.far, p.end - p.t) & ~failed;
     mask found = within & p.at_zero;
     keep_end(z, found, p, p.target, g);
     walking = within & ~p.at_zero;
     put_outlook(z.joints, walking, p.far, p.here);
     put(p.t, walking, p.end);
-    put(p.tries, todo, p.tries + 1.0);
-    failed = failed | (todo & ~found & (p.tries >= double(most_tries)));
+    put(p.tries, sought, p.tries + 1.0);
+    failed = failed | (sought & ~found & (p.tries >= double(most_tries)));
     lost = lost | failed;
-    todo = todo & ~found & ~failed;
-    walking = walking & todo;
+    sought = sought & ~found & ~failed;
+    walking = walking & sought;
   }
   return lost;
 }
