@@ -27,7 +27,6 @@ module boundary_driver
   use map_reader, only: reader_t
   use map_schema, only: schema_t
   use session, only: describe_file, identity_of, session_t
-  use signals, only: install_signals
   use status, only: exit_bad_case, exit_done
   use stored_map, only: open_map_session, read_labels, restore_catalogues
   use text, only: replace_all, to_text
@@ -74,10 +73,9 @@ contains
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.true.)
-    call install_signals(error)
-    if (.not. allocated(error)) call kept%open(session, path, work_identity(session, planes), 'following the boundary', error)
-    call session%stop_if(error)
     call restore_catalogues(reader, session%team, session%journal, grid, session%the_case, catalogues, error)
+    if (.not. allocated(error)) call kept%open(session, path, work_identity(session, planes, catalogues), &
+                                               'following the boundary', error)
     call session%stop_if(error)
     do i = 1, size(planes)
       associate (slice => point_slice(grid, planes(i)%index))
@@ -107,18 +105,24 @@ contains
     call session%end_with(exit_done)
   end subroutine run_boundary
 
-  !> What decides the curves: the case of the map, its labels, how far sets are grown, and the program.
-  function work_identity(session, planes) result(identity)
+  !> What decides the curves: the case of the map with its axes, its labels and attractors, how far sets are grown, and the program.
+  function work_identity(session, planes, catalogues) result(identity)
     type(session_t), intent(in) :: session
     type(plane_t), intent(in) :: planes(:)
+    type(catalogue_t), intent(in) :: catalogues(:)
     character(len=:), allocatable :: identity
     integer(int64) :: sum_of_labels
-    integer :: i
+    integer :: i, k
     sum_of_labels = 0
     do i = 1, size(planes)
       sum_of_labels = crc32(transfer(planes(i)%labels, [0_int8]), sum_of_labels)
     end do
-    identity = identity_of(session%the_case, 'boundary')//' '//to_text(sum_of_labels)//' '//to_text(session%command%grow)//' '// &
+    do i = 1, size(catalogues)
+      do k = 1, size(catalogues(i)%attractors)
+        sum_of_labels = crc32(transfer(catalogues(i)%attractors(k)%points, [0_int8]), sum_of_labels)
+      end do
+    end do
+    identity = identity_of(session%the_case, 'basin')//' '//to_text(sum_of_labels)//' '//to_text(session%command%grow)//' '// &
                session%provenance%version//' '//session%provenance%commit
   end function work_identity
 

@@ -228,7 +228,7 @@ contains
     end do
     do
       call halve_intervals(plane%journey, plane%attractors, from, to, tolerance, own, left)
-      call session%journal%progress(int(first - 1, int64) + max(size(mine) - left, 0)*session%team%size())
+      call session%journal%progress(min(int(last, int64), int(first - 1, int64) + max(size(mine) - left, 0)*session%team%size()))
       if (left == 0) exit
     end do
     own%edge = mine(own%edge)

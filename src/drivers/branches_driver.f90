@@ -219,8 +219,13 @@ contains
     if (families > 0) call session%journal%line('equilibria', 'equilibria were met '//to_text(families)// &
                                                 ' times; they are not followed')
     families = sum(search%found%families)
-    if (families > 0) call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
-                                                to_text(families)//' times; they are not followed')
+    if (maxval(search%found%families) > 1) then
+      call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
+                                to_text(families)//' times; they are not followed')
+    else if (families > 0) then
+      call session%journal%line('neutral', 'an orbit with a multiplier 1 was met that does not go on: one of a family, or '// &
+                                'beside a fold; it is not followed')
+    end if
   end subroutine report
 
   !> Where a branch ends, in words.

@@ -75,8 +75,11 @@ contains
     real(wp), allocatable, intent(out) :: values(:)
     logical, intent(out) :: found
     real(wp), allocatable :: own(:)
+    logical :: sound
     allocate (own(0))
-    if (self%reading) call read_part(self, own, self%reading)
+    sound = .false.
+    if (self%reading) call read_part(self, own, sound)
+    self%reading = sound
     found = session%team%any(self%reading)
     if (.not. found) return
     self%recalled = self%recalled + 1

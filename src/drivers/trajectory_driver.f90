@@ -27,7 +27,6 @@ module trajectory_driver
   use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
   use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
-  use stop_check, only: check_stop
   use strobe, only: coordinates_of
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -83,8 +82,7 @@ contains
     end if
     call session%begin(path, tiled=.false.)
     call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
-    call fly(session, moving, span, grid%start, outcome, log, error)
-    call session%stop_if(error)
+    call fly(session, moving, span, grid%start, outcome, log)
     call describe_cycle(moving, span_of(session%the_case), span, session%the_case%attractors%max_period, grid%start, outcome, &
                         cycle)
     call describe_file(session, 'trajectory', schema)
@@ -111,15 +109,14 @@ contains
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
 
-  !> The motion, with a word on how far it is where it takes its time. Code 75 on a stop signal.
-  subroutine fly(session, moving, span, start, outcome, log, error)
+  !> The motion, with a word on how far it is where it takes its time.
+  subroutine fly(session, moving, span, start, outcome, log)
     type(session_t), intent(inout) :: session
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: start(3)
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout) :: log
-    type(error_t), allocatable, intent(out) :: error
     type(attractor_t) :: no_catalogue(0)
     type(course_t) :: course
     real(wp) :: began, periods, searched
@@ -130,8 +127,6 @@ contains
     do while (is_recorded(course))
       call go_on(moving, no_catalogue, span, course, outcome, log)
       call session%journal%progress(int(course%elapsed/moving%machine%period, int64))
-      call check_stop(session%journal, 0.0_wp, 'flying', error)
-      if (allocated(error)) return
     end do
     call end_record(moving, span, course, log)
     call conclude(moving, no_catalogue, course, outcome)

@@ -81,7 +81,8 @@ contains
   end subroutine start_jointed
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
-  !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains.
+  !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains;
+  !> then a burst, and what stalls, is counted from the call.
   pure subroutine advance_jointed(moving, state, time_end, tally, reason, log, transitions, one_event)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state

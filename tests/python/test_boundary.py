@@ -117,6 +117,12 @@ def test_a_stopped_run_goes_on_to_the_same_curves_with_any_ranks(run, coulomb, c
     assert run("boundary", coulomb, "-o", out).returncode == 73
     other = run("boundary", coulomb, "-o", out, "--resume", "--grow", 2)
     assert other.returncode == 76 and "belongs to another map" in other.stderr
+    # the same labels, on a grid that is a little narrower: places on its edges are others
+    narrow = coulomb.with_name("narrow.h5")
+    case = coulomb.with_name("coulomb.toml")
+    assert run("basin", case, "-o", narrow, "--set", "axis[1].to=1.099999").returncode == 0
+    other = run("boundary", narrow, "-o", out, "--resume")
+    assert other.returncode == 76 and "belongs to another map" in other.stderr
     size = part.stat().st_size
     for ranks in (2, 1):
         ended = run("boundary", coulomb, "-o", out, "--resume", "--time-limit", 1e-3, ranks=ranks)
