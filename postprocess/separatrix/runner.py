@@ -222,7 +222,10 @@ def _follow(
 
 def _pass_on(running: list[_Process], one: _Process, event: dict, progress: Progress) -> None:
     kind, message = event.get("event"), str(event.get("message", ""))
-    if kind == "progress":
+    if kind == "progress" and "of" not in event:
+        # how far work is whose end is not known
+        log.debug("%s", message)
+    elif kind == "progress":
         one.things, one.done, one.total = str(event["of"]), int(event["done"]), int(event["total"])
         same = [other for other in running if other.things == one.things]
         # Shares are alike; one that has not spoken yet has as much to do.

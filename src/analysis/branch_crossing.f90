@@ -22,6 +22,8 @@ module branch_crossing
   !> A branch point is interpolated between so many points, this share of the step apart.
   integer, parameter :: nodes = 6
   real(wp), parameter :: apart = 0.04_wp
+  !> Where one of them cannot be computed, being too near, they are taken twice as far apart, so often.
+  integer, parameter :: most_spreads = 3
   integer, parameter :: most_secants = 30
   !> A test this much smaller than at the ends of the step is near enough to its zero.
   real(wp), parameter :: near_enough = 1e-3_wp
@@ -77,17 +79,20 @@ contains
     type(trace_t) :: node
     type(error_t), allocatable :: error
     real(wp) :: value(nodes), all(size(trace%now%tangent), nodes), tangents(size(trace%now%tangent), nodes), weight(nodes), zero
-    integer :: k, n, steps
+    integer :: i, k, n, steps
     n = size(trace%now%tangent)
     call near_zero(family, trace, test_value(test, trace), test_value(test, next), test, length, zero)
-    do k = 1, nodes
-      call step_to(family, trace, zero + (k - 0.5_wp*(nodes + 1))*apart*length, node, ok, steps)
-      if (.not. ok) return
-      value(k) = test_value(test, node)
-      all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter]
-      tangents(:, k) = node%now%tangent
+    do i = 0, most_spreads - 1
+      do k = 1, nodes
+        call step_to(family, trace, zero + (k - 0.5_wp*(nodes + 1))*apart*2.0_wp**i*length, node, ok, steps)
+        if (.not. ok) exit
+        value(k) = test_value(test, node)
+        all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter]
+        tangents(:, k) = node%now%tangent
+      end do
+      if (ok) call weights_at_zero(value, weight, ok)
+      if (ok) exit
     end do
-    call weights_at_zero(value, weight, ok)
     if (.not. ok) return
     there = node
     associate (orbit => there%now%orbit, place => matmul(all, weight))

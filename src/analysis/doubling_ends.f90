@@ -1,10 +1,10 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The doublings in which branches of twice the period end.
+!> The doublings in which branches of twice the period end, and the branch points in which branches end that cross another.
 module doubling_ends
   use body_family, only: family_t
-  use branch_point, only: branch_t, label_pd
+  use branch_point, only: branch_t, label_bp, label_not_known, label_pd
   use errors, only: error_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, nearest_copy
@@ -23,44 +23,53 @@ module doubling_ends
 
 contains
 
-  !> Puts the ends of branches that are in a doubling where it was located on the branch of half the period: the equations are
-  !> singular there.
+  !> Puts the ends of branches that are in a doubling, or in a branch point, where it was located on the branch of half the period,
+  !> or of the same: the equations are singular there.
   pure subroutine join_doublings(family, branches)
     type(family_t), intent(in) :: family
     type(branch_t), intent(inout) :: branches(:)
     type(orbit_t) :: doubling
-    integer :: b, k
+    integer :: b, k, times
     logical :: found
     do b = 1, size(branches)
       do k = 1, 2
-        if (branches(b)%ending(k) /= label_pd) cycle
-        associate (ended => branches(b)%points(merge(1, size(branches(b)%points), k == 1))%orbit)
-          call nearest_doubling(family, branches, ended, doubling, found)
+        if (all(branches(b)%ending(k) /= [label_pd, label_not_known])) cycle
+        times = merge(2, 1, branches(b)%ending(k) == label_pd)
+        associate (last => branches(b)%points(merge(1, size(branches(b)%points), k == 1)))
+          call nearest_located(family, branches, last%orbit, times, doubling, found)
           if (.not. found) cycle
-          ended%parameter = doubling%parameter
-          ended%y = doubling%y
-          ended%multipliers = doubling%multipliers**2
+          last%orbit%parameter = doubling%parameter
+          last%orbit%y = doubling%y
+          last%orbit%multipliers = doubling%multipliers**times
+          if (times == 2) cycle
+          last%label = label_bp
+          branches(b)%ending(k) = label_bp
         end associate
       end do
     end do
   end subroutine join_doublings
 
-  !> The doubling that an orbit ended in, of those of half its period nearby, with that section point in front that is nearest to
-  !> the orbit's: twins of a symmetric machine double at one value of the parameter.
-  pure subroutine nearest_doubling(family, branches, ended, doubling, found)
+  !> The doubling (`times` 2) or branch point (1) that an orbit ended in, of those of half its period, or of the same, nearby, with
+  !> that section point in front that is nearest to the orbit's: twins of a symmetric machine double at one value of the parameter.
+  pure subroutine nearest_located(family, branches, ended, times, doubling, found)
     type(family_t), intent(in) :: family
     type(branch_t), intent(in) :: branches(:)
     type(orbit_t), intent(in) :: ended
+    integer, intent(in) :: times
     type(orbit_t), intent(out) :: doubling
     logical, intent(out) :: found
     real(wp) :: least, distance, point(size(ended%y))
-    integer :: c, i
+    integer :: c, i, label, multiplier
+    label = merge(label_pd, label_bp, times == 2)
+    multiplier = merge(-1, 1, times == 2)
+    found = minval(abs(ended%multipliers - 1)) <= at_doubling .or. times == 2
+    if (.not. found) return
     least = near_doubling
     do c = 1, size(branches)
       do i = 1, size(branches(c)%points)
         associate (there => branches(c)%points(i))
-          if (2*there%orbit%periods /= ended%periods .or. there%label /= label_pd) cycle
-          if (minval(abs(there%orbit%multipliers + 1)) > at_doubling) cycle
+          if (times*there%orbit%periods /= ended%periods .or. there%label /= label) cycle
+          if (minval(abs(there%orbit%multipliers - multiplier)) > at_doubling) cycle
           if (abs(ended%parameter - there%orbit%parameter) >= at_doubling*family%parameter_size) cycle
           call nearest_section_point(family, there%orbit, ended%y, point, distance)
           if (distance >= least) cycle
@@ -71,7 +80,7 @@ contains
       end do
     end do
     found = least < near_doubling
-  end subroutine nearest_doubling
+  end subroutine nearest_located
 
   !> The section point of an orbit that is nearest to `y`, and its distance in natural sizes: huge if the machine is not to be had.
   pure subroutine nearest_section_point(family, orbit, y, nearest, distance)

@@ -188,6 +188,31 @@ def test_a_refusal_names_what_the_case_has(run, case, said):
     assert not out.exists()
 
 
+# hits both stops in turn; its motion of three periods is symmetric on one side of 0.8209 only
+BETWEEN_STOPS = """
+body = { mass = 1, gravity = 10 }
+restoring = { law = "linear", stiffness = 25 }
+friction = { law = "coulomb_viscous", damping = 0.4, kinetic_coefficient = 0.03 }
+contact = { law = "newton", restitution = 0.6, upper = 0.3, lower = -0.3 }
+drive = { law = "harmonic", amplitude = 0.12, ratio = 1.0 }
+axis = [{ name = "x0", from = -0.3, to = 0.3, count = 30 }, { name = "v0", from = -4, to = 4, count = 30 }]
+"""
+
+
+def test_both_arms_that_break_the_symmetry_end_in_the_branch_point(separatrix, tmp_path):
+    (tmp_path / "stops.toml").write_text(BETWEEN_STOPS)
+    words = "branches stops.toml --parameter drive.ratio --from 0.81 --to 0.83 --searches 6 -o out.h5 -q"
+    subprocess.run([separatrix, *words.split()], cwd=tmp_path, check=True)
+    with open_result(tmp_path / "out.h5") as result:
+        labels = decode_flags(result["label"]).values
+        at = labels == "BP"
+        values, branch = result["parameter"].values[at], result["branch"].values[at]
+        assert np.unique(branch).size == 3 and np.ptp(values) == 0
+        assert np.abs(result["multiplier_real"].values[at, 0] - 1).max() < 1e-8
+        # Newton's method on the map over half a period, which an independent integrator flew
+        assert 0.82089345 < values[0] < 0.82092812
+        assert "not_known" not in set(labels)
+
 # fold at which the impacting motion ends in a run up; grazes at which impacts start in it and in a run down
 ENDS = {
     "coulomb": (1.341271279226, 0.8767783170526, 1.110177089292),
