@@ -185,6 +185,8 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "mean_long": mean_seconds([one for one in found if one.whole >= LONG]),
         "long": sum(one.whole >= LONG for one in found),
         "shaped": sum(one.shaped for one in found),
+        "by_family": sum(one.by_family for one in found),
+        "right": sum(one.right for one in found if one.in_catalogue),
         "faulty": sum(one.rig for one in found),
         "rows": table(["hidden", "cases, d' >= 5", "decided"], rows_of_strong(found)),
         "bars": table(["figure", "bar", "found", "met"], bars(found)),

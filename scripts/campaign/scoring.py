@@ -47,8 +47,10 @@ FAMILIES = {
     "contact over penetration": {"compliant_contact", "kelvin_voigt_contact", "contact_curve"},
     "drive over phase": {"drive_ripple", "drive_harmonics"},
 }
-"""Closed forms and the function of a family. A function names the family of any of its laws; where the law
-that was hidden has another shape than that of the catalogue, so does any closed form of the family."""
+"""Closed forms and the function of a family. A function names the family of any of its laws."""
+TRENDS = ({"viscous", "quadratic_drag"}, {"stribeck"}, {"coulomb"})
+"""Closed forms over speed that rise, fall, and stay. Where the law that was hidden has another shape than
+that of the catalogue, a form of its trend names it too."""
 REGIONS = {
     "viscous": {SPEED, PLANE},
     "coulomb": {SPEED, REVERSAL, PLANE},
@@ -105,6 +107,8 @@ class Score:
     """Share of the held-out gap that it would close; NaN where nothing is said."""
     shaped: bool
     """The law that was hidden has another shape than that of the catalogue."""
+    by_family: bool
+    """Right by the function of its family or a form of its trend, not by its own name."""
     rig: bool
     """The records have the small faults of a rig."""
     whole: int
@@ -152,7 +156,8 @@ def as_hidden(names: frozenset[str], truth: dict) -> frozenset[str]:
     found = set(names)
     for hidden in truth["names"]:
         members = next((one for one in FAMILIES.values() if hidden in one), {hidden})
-        said = {name for name in members if hidden in truth.get("shapes", {}) or name.endswith(FUNCTIONS)}
+        alike = next((one for one in TRENDS if hidden in one and hidden in truth.get("shapes", {})), set())
+        said = {name for name in members if name in alike or name.endswith(FUNCTIONS)}
         if hidden not in found and len(found & said) == 1:
             found = (found - said) | {hidden}
     return frozenset(found)
@@ -210,6 +215,7 @@ def score(truth: dict, result: dict) -> Score:
         if verdict.get("character")
         else math.nan,
         shaped=bool(truth.get("shapes")),
+        by_family=in_catalogue and right and names not in reported(verdict),
         rig=bool(truth.get("rig")),
         whole=truth.get("samples", 0),
         seconds=result["seconds"],

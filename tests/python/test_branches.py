@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from separatrix import style, table
 from separatrix.figures import branches
 from separatrix.open import decode_flags, decode_words, open_result
@@ -104,6 +105,35 @@ def test_what_begins_where_both_stops_are_touched_at_once_is_followed_once(separ
         with style.context():
             figure = branches.figures(result, "title")["branches"]
         assert figure.axes[0].get_ylabel().startswith("position at crank angle 0")
+
+
+STOP, PAIR = "[contact]\nupper = 0.3\n", "[contact]\nupper = 0.3\nlower = -0.3\n"
+
+
+@pytest.mark.parametrize(("case", "parameter", "amplitude", "of_section"), [
+    # few points, or one amplitude without impacts
+    (STOP, "drive.ratio", [0.1], False),
+    (PAIR, "drive.ratio", [0.1, 0.2], False),
+    (PAIR, "contact.restitution", 8 * [0.2], False),
+    ("[contact]\nlaw = \"none\"\n", "body.mass", 8 * [0.3], False),
+    (PAIR, "drive.ratio", [0.3], True),
+    (PAIR, "drive.ratio", [0.1, 0.2, 0.25, 0.3], True),
+    (PAIR, "drive.ratio", [0.1, 0.2, 0.25, 0.26, 0.3], False),
+    # the play is the parameter itself: 0.3 + 0.9 and 0.3 + 1
+    (PAIR, "contact.upper", [0.6, 0.65], True),
+    ("[contact.a]\nupper = 0.3\nlower = -0.3\n[contact.b]\nupper = 1.0\n", "drive.ratio", 3 * [0.3], True),
+])  # fmt: skip
+def test_a_point_on_the_section_is_drawn_where_orbits_touch_both_stops(
+    case, parameter, amplitude, of_section
+):
+    amplitude = np.array(amplitude)
+    columns = {"x_min": -amplitude, "x_max": amplitude, "x": 0 * amplitude}
+    columns["parameter"] = 0.9 + 0.1 * np.arange(amplitude.size)
+    result = xr.Dataset({name: ("point", values, {"units": "m"}) for name, values in columns.items()})
+    result.attrs = {"resolved_case": case, "parameter": parameter}
+    found, text = branches.height(result)
+    assert text.startswith("position" if of_section else "amplitude")
+    assert found == pytest.approx(columns["x"] if of_section else amplitude)
 
 
 def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):

@@ -194,10 +194,37 @@ JUDGED = [
     (truth(["stribeck"]), verdict("named", ["friction_curve"]), (True, True, True, False), "right name"),
     (truth(["stribeck"]), verdict("named", ["quadratic_drag"]), (True, False, False, True), "quadratic_drag"),
     (
-        truth(["stribeck"], shapes={"stribeck": {"stribeck_exponent": 0.7}}),
-        verdict("named", ["quadratic_drag"]),
+        truth(["quadratic_drag"], shapes={"quadratic_drag": {"exponent": 1.5}}),
+        verdict("named", ["viscous"]),
         (True, True, True, False),
         "right name",
+    ),
+    (
+        truth(["stribeck"], shapes={"stribeck": {"stribeck_exponent": 0.7}}),
+        verdict("named", ["stribeck"]),
+        (True, True, True, False),
+        "right name",
+    ),
+    (
+        truth(["stribeck"], shapes={"stribeck": {"stribeck_exponent": 0.7}}),
+        verdict("named", ["friction_curve"]),
+        (True, True, True, False),
+        "right name",
+    ),
+    *(
+        (
+            truth(["stribeck"], shapes={"stribeck": {"stribeck_exponent": 0.7}}),
+            verdict("named", [name]),
+            (True, False, False, True),
+            name,
+        )
+        for name in ("coulomb", "viscous", "quadratic_drag")
+    ),
+    (
+        truth(["compliant_contact"], shapes={"compliant_contact": {"exponent": 2.0}}),
+        verdict("named", ["kelvin_voigt_contact"]),
+        (True, False, False, True),
+        "kelvin_voigt_contact",
     ),
     (
         truth(["cubic_spring"], shapes={"cubic_spring": {"cubic_exponent": 2.0}}),
@@ -225,6 +252,11 @@ def test_verdicts_are_judged(campaign, hidden, said, flags, column):
     found = campaign[1].score(hidden, said)
     assert (found.decided, found.right, found.contains, found.wrong_name) == flags
     assert found.column == column
+    assert found.by_family == (
+        found.right
+        and said["verdict"]["effects"] in (["friction_curve"], ["viscous"])
+        and hidden["names"] != ["viscous"]
+    )
 
 
 def test_parameters_are_judged_by_their_intervals(campaign):

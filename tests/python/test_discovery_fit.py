@@ -14,7 +14,7 @@ from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
 from separatrix.discovery.fitting.base import measure_noise
-from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.fit import blocking, minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, gauss_newton_step
 from separatrix.discovery.fitting.problem import Evaluation
@@ -255,6 +255,41 @@ def test_a_segment_that_cannot_be_flown_is_followed_badly():
     assert not one.far_off(4.0)
     one.evaluation.failed[0] = True
     assert one.far_off(4.0)
+
+
+class Jumping(Residuals):
+    """Three segments that a straight line follows; the last may jump or fail beyond a value."""
+
+    def __init__(self, jump: float, fails: bool) -> None:
+        self.free, self.jump, self.fails = [Free("effect.viscous.damping", 0.0)], jump, fails
+
+    def evaluate(self, values, starts, derivatives=True):
+        residual = np.full((3, 20), float(values[0]))
+        # the start belongs to two samples that nothing else touches
+        residual[:, :2] = 0
+        by_start = np.zeros((3, 20, 2))
+        by_start[:, [0, 1], [0, 1]] = 1
+        slope = -np.where(np.arange(20) < 2, 0.0, np.ones((3, 20)))[:, :, None]
+        failed = np.zeros(3, bool)
+        if values[0] < 1:
+            residual[2, 2:] += self.jump
+            failed[2] = self.fails
+        used = np.ones_like(residual)
+        return Evaluation(
+            residual, used, failed, ~np.zeros(3, bool), residual, residual, [], 0, by_start, slope
+        )
+
+
+@pytest.mark.parametrize(("jump", "fails", "barred"), [
+    (0.0, False, []),
+    # from 18*2**2 in each of three segments: a segment alone loses more than all gain, or less
+    (4.5, False, [2]),
+    (2.5, False, []),
+    (0.0, True, [2]),
+])  # fmt: skip
+def test_a_segment_bars_the_way_of_a_step_where_it_loses_more_than_all_gain(jump, fails, barred):
+    found = blocking(Jumping(jump, fails), np.array([2.0]), np.zeros((3, 2)))
+    np.testing.assert_array_equal(found, barred)
 
 
 def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch):

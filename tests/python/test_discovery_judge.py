@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from separatrix.discovery.decision import decide
 from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import Judged, _together_clear, held_out_bounds, stable
 from separatrix.discovery.fitting.fit import Fit
@@ -121,3 +122,41 @@ def test_a_table_is_something_though_each_of_its_values_could_be_zero():
     assert np.all(np.abs(shape) < 1.96 * np.sqrt(np.diag(covariance)))
     assert clear(shape)
     assert not clear(np.array([0.01, -0.01, 0.0]) + 0.8)
+
+
+@pytest.mark.parametrize(("closable", "p", "gain", "misses", "outcome"), [
+    (2.0, 1e-6, 1.5, [], "none"),
+    (3.0, 1e-6, 1.5, [], "not-in-catalogue"),
+    (3.0, 1e-2, 1.5, [], "none"),
+    (2.0, 1e-2, 1.5, ["first (reduced chi^2 4)"], "not-in-catalogue"),
+    (2.0, 1e-2, 3.0, [], "not-in-catalogue"),
+])  # fmt: skip
+def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is_missing(
+    monkeypatch, closable, p, gain, misses, outcome
+):
+    """20 segments of 50 samples: 0.05 of the noise of a sample is a chi^2 of 2.5."""
+    base = fitted("", np.full(COUNT, 100.0))
+    found = SimpleNamespace(base=base)
+    bench = SimpleNamespace(training=None, held_out=None, options=OPTIONS)
+    monkeypatch.setattr(decide, "missed", lambda data, fit, options: misses)
+    gap = SimpleNamespace(closable=closable, p=p, best=SimpleNamespace(name="velocity"))
+    effect = SimpleNamespace(training=gain / 2)
+    given = decide._give_up(bench, decide.Decision("none", [], [], [], [found], gap, None), effect)
+    assert given.outcome == outcome
+    # the same gap of the base, and no effect that stands out
+    other = decide._without_name(bench, decide.Decision("none", [], [], [], [found], gap, None))
+    assert other.outcome == ("none" if gain > 2.5 else outcome)
+    (reason,) = given.reasons
+    told = f"{np.sqrt(closable / 1000):.2g} of that of a sample (root mean square), p = {p:.2g}"
+    assert (told in reason) == (outcome == "none")
+
+
+@pytest.mark.parametrize(("name", "also", "two"), [
+    ("friction_curve", None, True),
+    ("friction_curve", "effect.friction_curve.backward_1", False),
+    ("restitution_curve", None, False),
+])  # fmt: skip
+def test_a_table_of_friction_is_of_two_directions_unless_its_values_are_shared(name, also, two):
+    one = fitted(name, np.full(COUNT, 47.0))
+    one.problem.free = [Free(f"effect.{name}.force_1", 1.0, also=also)]
+    assert decide._of_two_directions(Judged(one, None, 0.0, 0.0, np.zeros(0), 1)) == two

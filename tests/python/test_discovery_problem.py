@@ -16,9 +16,9 @@ from separatrix.discovery.fitting.machine import (
     on_other_records,
     sensor_zeros,
 )
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.problem import Problem, flight_tolerance
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded
 from separatrix.discovery.options import Options
@@ -63,6 +63,21 @@ def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
         ]
     )
     return problem, values, starts
+
+
+def test_flights_of_a_small_motion_far_from_the_origin_stay_below_its_noise():
+    t = np.arange(200) / RATE
+    motion = np.sin(20 * t)
+
+    def tolerance(size: float, away: float, noise: float) -> float:
+        head = {"sensor_noise_sigma_m": noise}
+        record = make_record("r", {"t": t, "x": away + size * motion}, head)
+        return flight_tolerance(Prepared(record, noise, np.inf, 0.0))
+
+    assert tolerance(1.0, 0.0, 1e-3) == tolerance(1e-6, 0.0, 1e-9) == 1e-8
+    assert tolerance(1e-6, 1.0, 1e-9) == pytest.approx(1e-11, rel=1e-5)
+    assert tolerance(1e-6, -1.0, 1e-9) == pytest.approx(1e-11, rel=1e-5)
+    assert tolerance(1e-6, 1.0, 1e-15) == 1e-14
 
 
 def test_derivatives_are_central_differences(flown):

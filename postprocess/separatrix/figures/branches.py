@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
-from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import axis_label, plain, unit
 from separatrix.layout import compose
@@ -79,8 +79,8 @@ def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     return figure
 
 
-# So large a share of orbits with one and the same amplitude is a machine between two stops.
-_SAME_AMPLITUDE = 0.25
+# So large a share of orbits that touch both stops have one and the same amplitude: it would show little.
+_TOUCH_BOTH = 0.25
 
 
 def height(result: xr.Dataset) -> tuple[np.ndarray, str]:
@@ -90,10 +90,28 @@ def height(result: xr.Dataset) -> tuple[np.ndarray, str]:
     """
     amplitude = (result["x_max"].values - result["x_min"].values) / 2
     lengths = unit(result["x_max"])
-    largest = np.isclose(amplitude, amplitude.max(), rtol=1e-9, atol=0)
-    if largest.mean() < _SAME_AMPLITUDE:
+    both = np.zeros(amplitude.shape, bool)
+    for play in _plays(result):
+        both |= np.isclose(amplitude, play / 2, rtol=1e-9, atol=0)
+    if both.mean() < _TOUCH_BOTH:
         return amplitude, rf"amplitude $(x_\mathrm{{max}} - x_\mathrm{{min}})/2$ ({lengths})"
     return result["x"].values, f"{result['x'].attrs.get('long_name', 'position on the section')} ({lengths})"
+
+
+def _plays(result: xr.Dataset) -> list[np.ndarray]:
+    """Return the distance of the stops of every contact with two, at each orbit."""
+    contact = resolved_case(result).get("contact", {})
+    named = {f"contact.{name}": table for name, table in contact.items() if isinstance(table, dict)}
+    parameter, values = str(result.attrs.get("parameter", "")), result["parameter"].values
+    found = []
+    for path, table in (named or {"contact": contact}).items():
+        if {"lower", "upper"} <= set(table):
+            lower, upper = (
+                values if parameter == f"{path}.{end}" else np.full(values.shape, float(table[end]))
+                for end in ("lower", "upper")
+            )
+            found.append(upper - lower)
+    return found
 
 
 def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:

@@ -12,75 +12,87 @@ import numpy as np
 
 from separatrix.errors import BAD_DATA, NO_INPUT, CaseError
 
+# numbers of a structure: in the case or in its file
+_NUMBERS = ("mass", "stiffness", "damping", "frequency", "damping_ratios")
+
 
 def inlined(text: str, name: str | Path, settings: Iterable[str] = ()) -> list[str]:
     """Return the settings for a case whose [structure.NAME] may name HDF5 files, with their numbers in front.
 
-    `name` stands for the case in messages; files are looked for in its folder. Texts that are no TOML come
-    back as they are: the library says what is wrong with them.
+    `name` stands for the case in messages; files are looked for in its folder. What is not understood comes
+    back as it is: the library says what is wrong with it.
     """
     settings = list(settings)
     if "structure" not in text and not any("structure" in setting for setting in settings):
         return settings
     try:
         tables = tomllib.loads(text).get("structure", {})
-    except tomllib.TOMLDecodeError:
+        paths = [_path(setting) for setting in settings]
+        for setting, path in zip(settings, paths, strict=True):
+            if path[0] == "structure" and not _of_element(path):
+                tables = _changed(tables, path[1:], tomllib.loads(f"v = {setting.partition('=')[2]}")["v"])
+    except (tomllib.TOMLDecodeError, TypeError):
         return settings
-    files = {key: table["file"] for key, table in tables.items() if _has_file(table)}
-    tables = dict(tables)
-    rest = []
-    for setting in settings:
-        path, _, value = setting.partition("=")
-        parts = [part.strip() for part in path.split(".")]
-        if parts[0] != "structure" or len(parts) not in (2, 3) or (len(parts) == 3 and parts[2] != "file"):
-            rest.append(setting)
-            continue
-        given = _value(value)
-        if len(parts) == 3 and isinstance(given, str):
-            files[parts[1]] = given
-        elif len(parts) == 2 and _has_file(given):
-            files[parts[1]], tables[parts[1]] = given["file"], given
-        else:
-            if len(parts) == 2:
-                files.pop(parts[1], None)
-            rest.append(setting)
+    if not isinstance(tables, Mapping):
+        return settings
     folder = Path(name).parent
-    return [
-        *(
-            f"structure.{key}={_toml(_without_file(tables.get(key, {}), folder / file, name, key))}"
-            for key, file in files.items()
-        ),
-        *rest,
-    ]
+    full = {
+        key: f"structure.{key}={_toml(_without_file(table, folder / table['file'], name, key))}"
+        for key, table in tables.items()
+        if isinstance(table, Mapping) and isinstance(table.get("file"), str)
+    }
+    before, after = [], []
+    for setting, path in zip(settings, paths, strict=True):
+        if path[0] != "structure" or (_of_element(path) and path[1] in full):
+            after.append(setting)
+        elif len(path) == 1 or path[1] not in full:
+            before.append(setting)
+    return [*before, *full.values(), *after]
 
 
-def _has_file(table: object) -> bool:
-    return isinstance(table, Mapping) and isinstance(table.get("file"), str)
+def _path(setting: str) -> list[str]:
+    return setting.partition("=")[0].strip().split(".")
 
 
-def _value(text: str) -> object:
-    """Return the value of a setting, None where it is not TOML."""
-    try:
-        return tomllib.loads(f"value={text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text.strip()
+def _of_element(path: list[str]) -> bool:
+    """Whether a setting is of an element of a list, which no file has."""
+    return len(path) > 1 and "[" in "".join(path[1:])
+
+
+def _changed(tables: object, path: list[str], value: object) -> object:
+    """Return the tables with a value put in its place, as the program does it; TypeError in a list."""
+    if not path:
+        return value
+    if isinstance(tables, list):
+        raise TypeError
+    tables = tables if isinstance(tables, Mapping) else {}
+    return {**tables, path[0]: _changed(tables.get(path[0], {}), path[1:], value)}
 
 
 def _without_file(table: Mapping, path: Path, name: str | Path, key: str) -> dict:
     """Return a table with the numbers of its file; a point may have the name that it has in the file."""
-    content, points = _read(path, f"{name}: key 'structure.{key}.file'")
-    for number in content:
+    at = f"{name}: key 'structure.{key}"
+    content, points = _read(path, f"{at}.file'")
+    for number in _NUMBERS:
         if number in table:
+            raise CaseError(f"{at}.{number}': found beside a file, allowed one or the other", BAD_DATA)
+    named = table.get("point", {})
+    if not isinstance(named, Mapping):
+        raise CaseError(f"{at}.point': found {named!r}, allowed a table of points", BAD_DATA)
+    rows = dict(points)
+    for point, place in named.items():
+        if point in points:
             raise CaseError(
-                f"{name}: key 'structure.{key}.{number}': found beside a file, allowed one or the other",
+                f"{at}.point.{point}': found a point of the file again, allowed another name", BAD_DATA
+            )
+        if isinstance(place, str) and place not in points:
+            raise CaseError(
+                f'{at}.point.{point}\': found "{place}", allowed a point of the file: {", ".join(points)}',
                 BAD_DATA,
             )
-    named = {
-        point: points.get(place, place) if isinstance(place, str) else place
-        for point, place in dict(table.get("point", {})).items()
-    }
+        rows[point] = points[place] if isinstance(place, str) else place
     kept = {entry: value for entry, value in table.items() if entry not in ("file", "point")}
-    return {**kept, **content, "point": {**points, **named}}
+    return {**kept, **content, "point": rows}
 
 
 def _read(path: Path, at: str) -> tuple[dict, dict]:

@@ -4,6 +4,8 @@
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
 from separatrix.discovery.decision.judge import Judged, admissible, equivalent, sizeable
@@ -86,7 +88,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     if shaped is not None and not (_of_two_directions(shaped[0]) and bench.options.most_effects > 1):
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
-        return _give_up(decision)
+        return _give_up(bench, decision, best)
     rounds = list(decision.rounds)
     *more, closed = with_more(bench, rounds, best)
     if shaped is not None:
@@ -102,7 +104,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         base = decision.rounds[0].base
         fit = minimise(base.problem, base.fit.values, base.fit.starts, patient=True)
         return decide(bench, replace(base, fit=fit), settled=True)
-    return _give_up(decision)
+    return _give_up(bench, decision, best)
 
 
 def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
@@ -223,24 +225,45 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
 
 def _without_name(bench: Bench, decision: Decision) -> Decision:
     """Nothing in the catalogue helps: either there is no gap, or the catalogue lacks what makes it."""
-    fits = [(bench.training, decision.rounds[0].base)]
-    if bench.held_out is not None and decision.foretold is not None:
-        fits.append((bench.held_out, decision.foretold))
-    left = [one for data, fitted in fits for one in missed(data, fitted.fit, bench.options)]
+    left, wide = _gap_of_base(bench, decision)
     if left:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
-    elif fits[0][1].fit.sample_chi2 > bench.options.adequate_chi2:
+    elif decision.rounds[0].base.fit.sample_chi2 > bench.options.adequate_chi2:
         decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
+    if wide:
+        decision.outcome = "not-in-catalogue"
+        name = decision.base_ceiling.best.name
+        decision.reasons.append(f"forces that depend on {name} would explain more, no effect does")
+    return decision
+
+
+def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:
+    """Effects stand out of chance, but none is all that is missing."""
+    base = decision.rounds[0].base
+    told = sizeable(2 * best.training, base.fit, bench.options)
+    if told or any(_gap_of_base(bench, decision)):
+        decision.outcome = "not-in-catalogue"
+        decision.reasons.append(
+            "the best effects of the catalogue leave a gap that a flexible force would close"
+        )
+        return decision
+    gap = decision.base_ceiling
+    share = np.sqrt(max(gap.closable, 2 * best.training) / base.fit.samples)
+    decision.reasons.append(
+        "an effect stands out of chance, but is not all, and what is missing is small beside the noise: it "
+        f"or a flexible force explains {share:.2g} of that of a sample (root mean square), p = {gap.p:.2g}"
+    )
+    return decision
+
+
+def _gap_of_base(bench: Bench, decision: Decision) -> tuple[list[str], bool]:
+    """The records that the base machine misses, and whether a flexible force explains what is no trifle."""
+    base = decision.rounds[0].base
+    fits = [(bench.training, base)]
+    if bench.held_out is not None and decision.foretold is not None:
+        fits.append((bench.held_out, decision.foretold))
+    left = [one for data, fitted in fits for one in missed(data, fitted.fit, bench.options)]
     gap = decision.base_ceiling
     significant = gap.p < bench.options.gap_share * bench.options.detection_level
-    if significant and sizeable(gap.closable, fits[0][1].fit, bench.options):
-        decision.outcome = "not-in-catalogue"
-        decision.reasons.append(f"forces that depend on {gap.best.name} would explain more, no effect does")
-    return decision
-
-
-def _give_up(decision: Decision) -> Decision:
-    decision.outcome = "not-in-catalogue"
-    decision.reasons.append("the best effects of the catalogue leave a gap that a flexible force would close")
-    return decision
+    return left, significant and sizeable(gap.closable, base.fit, bench.options)

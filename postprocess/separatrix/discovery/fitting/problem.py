@@ -11,8 +11,20 @@ from separatrix.discovery.measured.preflight import Prepared, even_interval
 from separatrix.discovery.measured.segments import Segments, padded
 from separatrix.errors import SeparatrixError
 
-# of the adaptive flight, over a motion of about 1 m: far below any noise, a third quicker than 1e-9
+# of the adaptive flight, relative to the place counted from the origin: a third quicker than 1e-9; the share
+# of the noise that its error may be where a small motion is far from the origin, and where rounding begins
 _TOLERANCE = 1e-8
+_NOISE_SHARE = 0.01
+_ROUNDING = 1e-14
+
+
+def flight_tolerance(prepared: Prepared) -> float:
+    """Return the relative tolerance of flights whose errors are far below the noise of a record."""
+    farthest = np.max(np.abs(prepared.samples.x), initial=0.0)
+    allowed = _NOISE_SHARE * prepared.sigma
+    if allowed >= _TOLERANCE * farthest:
+        return _TOLERANCE
+    return float(max(_ROUNDING, allowed / farthest))
 
 
 @dataclass
@@ -125,6 +137,7 @@ class Problem:
             "v": None if fitted.v is None else fitted.v[samples],
             "samples": samples,
             "force": _force_argument(record, fitted.place[first]),
+            "tolerance": flight_tolerance(self.prepared[number]),
         }
 
     def evaluate(
@@ -255,7 +268,11 @@ class Problem:
         directions: np.ndarray | None,
     ):
         more = {} if part["force"] is None else {"force": part["force"]}
-        more |= {"derivatives": directions is not None, "directions": directions, "tolerance": _TOLERANCE}
+        more |= {
+            "derivatives": directions is not None,
+            "directions": directions,
+            "tolerance": part["tolerance"],
+        }
         return self.model.segments(active, given, start, part["offsets"], part["times"], **more)
 
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
