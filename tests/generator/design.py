@@ -147,14 +147,17 @@ def is_long(seed: int, number: int) -> bool:
     return int(np.random.default_rng([seed, 4, block]).permutation(BLOCK)[place]) < LONG
 
 
-def draw(seed: int, number: int) -> Case:
-    """The case of this number; a regime in which its effect cannot have the size asked for is drawn again."""
+def draw(seed: int, number: int, plain: bool = False) -> Case:
+    """The case of this number; a regime in which its effect cannot have the size asked for is drawn again.
+
+    `plain`: a short one with the law of the catalogue and no faults of the rig.
+    """
     kind, name, target = plan(seed, number)
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, 3, number, attempt])
-        more = np.random.default_rng([seed, 5, number, attempt])
+        more = None if plain else np.random.default_rng([seed, 5, number, attempt])
         try:
-            case = _draw(random, more, number, kind, name, target, is_long(seed, number))
+            case = _draw(random, more, number, kind, name, target, is_long(seed, number) and not plain)
         except (SimulationError, Unreachable):
             continue
         case.seed = [seed, number, attempt]
@@ -230,14 +233,14 @@ def _rig(random: np.random.Generator) -> dict[str, float]:
 
 def _draw(
     random: np.random.Generator,
-    more: np.random.Generator,
+    more: np.random.Generator | None,
     number: int,
     kind: str,
     name: str,
     target: float,
     long: bool,
 ) -> Case:
-    """A case; what is only drawn of some comes from `more`."""
+    """A case; what is only drawn of some comes from `more`, if there is one."""
     regime = _regime(random, name)
     its = REGIMES[regime]
     nominal = its.machine()
@@ -245,7 +248,8 @@ def _draw(
         key: getattr(nominal, key) * (1 + SCATTER[key] * random.standard_normal()) for key in its.unknowns
     }
     base = nominal.copy(**scatter)
-    rig, periods = _rig(more), int(more.integers(PERIODS, LONGEST + 1)) if long else None
+    rig = {} if more is None else _rig(more)
+    periods = int(more.integers(PERIODS, LONGEST + 1)) if long else None
     experiments = _experiments(random, regime, periods)
     shapes = more if kind == "single" else None
     case = Case(

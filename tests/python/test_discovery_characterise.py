@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("library")
 
 @pytest.fixture(scope="module")
 def hide(source_dir, tmp_path_factory):
-    """Records and the sealed truth of a case."""
+    """Records and the sealed truth of a case without faults of the rig."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(source_dir / "tests" / "generator"))
         patch.syspath_prepend(str(source_dir / "scripts"))
@@ -34,7 +34,7 @@ def hide(source_dir, tmp_path_factory):
 
         def hidden(number: int) -> tuple[Path, dict]:
             folder = tmp_path_factory.mktemp(f"case{number}")
-            records.write_case(folder / "case", folder / "truth.json", draw(SEED, number))
+            records.write_case(folder / "case", folder / "truth.json", draw(SEED, number, plain=True))
             return folder / "case", json.loads((folder / "truth.json").read_text())
 
         yield hidden

@@ -31,7 +31,7 @@ def test_branches_are_those_of_the_program(grazing: sx.Case, separatrix: Path, t
         grazing, "drive.amplitude", 0.05, 0.3, searches=3, progress=lambda *what: told.append(what)
     )
     assert_same(mine, sx.open_result(tmp_path / "theirs.h5"))
-    assert {things for things, _, _ in told} == {"values"}
+    assert {things for things, _, _ in told} == {"starts"}
     found = mine.separatrix.labelled_points.set_index("label")
     assert found.loc["GR-fold", "drive.amplitude"] == pytest.approx(0.1, abs=1e-11)
     assert found.loc["SN", "multiplier_1"] == pytest.approx(1.0, abs=1e-8)
