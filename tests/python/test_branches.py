@@ -243,6 +243,7 @@ def test_both_arms_that_break_the_symmetry_end_in_the_branch_point(separatrix, t
         assert 0.82089345 < values[0] < 0.82092812
         assert "not_known" not in set(labels)
 
+
 # fold at which the impacting motion ends in a run up; grazes at which impacts start in it and in a run down
 ENDS = {
     "coulomb": (1.341271279226, 0.8767783170526, 1.110177089292),
