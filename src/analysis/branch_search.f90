@@ -189,8 +189,8 @@ contains
     end do
   end subroutine follow
 
-  !> Whether an orbit that cannot be followed has a multiplier +1, as far as a stick phase lets it be known: it is one of a family, or
-  !> beside a fold.
+  !> Whether an orbit that cannot be followed has a multiplier +1, as far as a stick phase lets it be known: it is one of a family,
+  !> or beside a fold.
   pure logical function is_of_family(found)
     type(branch_t), intent(in) :: found
     is_of_family = size(found%points) == 1
