@@ -12,6 +12,9 @@ import statistics
 from rates import Rate, difference, rate
 from scoring import PRECISE, Score
 
+# samples from which on a case is a long one
+LONG = 50_000
+
 
 def bars(found: list[Score]) -> list[list[str]]:
     """Rows of the table of bars: figure, bar, found, met."""
@@ -56,7 +59,7 @@ def bars(found: list[Score]) -> list[list[str]]:
             [o.region for o in strong if o.region is not None],
         ),
     ]
-    quick = [one.seconds for one in found if one.whole < 50_000]
+    quick = [one.seconds for one in found if one.whole < LONG]
     mean = statistics.fmean(quick) if quick else math.nan
     rows.append(
         ["processor time of a short case, mean", "<= 10 s", f"{mean:.1f} s of {len(quick)}",

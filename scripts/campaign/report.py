@@ -11,13 +11,12 @@ from pathlib import Path
 import effects
 import figure
 import records
-from bars import bars
+from bars import LONG, bars
 from markdown import table
 from rates import Rate, rate
 from scoring import HAVE_A_TERM, PRECISE, SEPARABLE, STRONG, Score, score
 
 TEMPLATE = Path(__file__).resolve().parent / "discovery.md.in"
-LONG = 50_000
 METHODS = ("STLSQ", "ensemble SINDy")
 
 

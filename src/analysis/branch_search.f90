@@ -7,8 +7,8 @@
 module branch_search
   use body_family, only: family_t
   use branch, only: trace_branch
+  use branch_ends, only: join_ends
   use branch_point, only: branch_t, label_bp, label_pd, plan_t, point_t, set_sizes
-  use doubling_ends, only: join_doublings
   use errors, only: error_t
   use kinds, only: wp
   use hybrid_machine, only: hybrid_t
@@ -112,7 +112,7 @@ contains
       end do
     end do
     call leave_out_parts(search)
-    call join_doublings(search%family, search%branches)
+    call join_ends(search%family, search%branches)
     do i = 1, size(search%branches)
       call mark_symmetry(search%family, search%branches(i))
     end do

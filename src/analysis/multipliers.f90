@@ -14,8 +14,8 @@ module multipliers
 
 contains
 
-  !> Eigenvalues, largest modulus first; with imaginary parts that are none left out. `determinant`: of the matrix, from its
-  !> factors: the entries of a matrix with a large multiplier know the small one no more.
+  !> Eigenvalues, largest modulus first; with imaginary parts that are none left out. `determinant`: of a matrix of two
+  !> rows, from its factors: the entries of one with a large multiplier know the small one no more.
   pure function multipliers_of(matrix, determinant) result(values)
     real(wp), intent(in) :: matrix(:, :)
     real(wp), intent(in), optional :: determinant

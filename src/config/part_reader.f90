@@ -13,7 +13,7 @@ module part_reader
     parameters_of, part_family, part_kind, part_law, set_value, value_of
   use structure_reader, only: read_structure
   use suggest, only: nearest_word
-  use text, only: join, replace_all, starts_with, to_text
+  use text, only: join, number_in, replace_all, starts_with, to_text
   use toml_bindings, only: toml_array, toml_string, toml_table
   implicit none
   private
@@ -350,7 +350,7 @@ contains
     character(len=*), intent(in) :: key, name
     logical, intent(in) :: or_ground
     type(bodies_t), intent(in) :: bodies
-    number = findloc(bodies%names == name, .true., 1)
+    number = number_in(bodies%names, name)
     if (number > 0 .or. (or_ground .and. name == ground)) return
     number = -1
     ! Of a structure that could not be read nobody knows the points.

@@ -13,7 +13,7 @@ module structure_reader
   use structure_data, only: joined, most_file_coordinates, point_name_length, structure_data_t
   use structure_reduction, only: coordinates_of, keep_modes
   use suggest, only: nearest_word
-  use text, only: join, starts_with, to_text
+  use text, only: join, number_in, starts_with, to_text
   use toml_bindings, only: toml_array, toml_integer, toml_string
   implicit none
   private
@@ -256,7 +256,7 @@ contains
           row = [(0.0_wp, named=1, n)]
           row(entry%integer) = 1
         case (toml_string)
-          named = findloc(content%point_names == entry%string, .true., 1)
+          named = number_in(content%point_names, entry%string)
           if (named == 0) then
             call report(source, key, 'found "'//entry%string//'"'//hint(entry%string, content%point_names)// &
                         ', allowed a point of the file: '//join(content%point_names, ', '))

@@ -7,7 +7,7 @@ module text
   implicit none
   private
 
-  public :: to_text, interval_text, read_number, join, number_length, replace_all, starts_with
+  public :: to_text, interval_text, read_number, join, number_length, replace_all, starts_with, number_in
 
   !> Shortest common form of a number: integers plain, reals with up to 17 significant digits so
   !> that reading them back gives the same bits.
@@ -194,5 +194,12 @@ contains
     character(len=*), intent(in) :: string
     digits_in = verify(string, '0123456789') - 1
   end function digits_in
+
+  !> Number of a name in a list, 0 if it is not there. The names are compared first: `findloc` of gfortran 12 finds no text among
+  !> elements of another length.
+  pure integer function number_in(names, name) result(number)
+    character(len=*), intent(in) :: names(:), name
+    number = findloc(names == name, .true., 1)
+  end function number_in
 
 end module text

@@ -37,7 +37,8 @@ module branches_driver
 
   !> Starts at each value at which orbits are searched.
   integer, parameter :: starts = 48
-  !> At an impact without speed the derivative is not finite: what is larger than this is rounding.
+  !> At an impact without speed the derivative is not finite: a located graze leaves a speed of rounding, and what is larger than
+  !> this comes from that.
   real(wp), parameter :: endless = 1e7_wp
   !> Powers of 1/p for the root p of p^3 = p + 1 (Roberts 2018).
   real(wp), parameter :: irrational(2) = [0.7548776662466927_wp, 0.5698402909980532_wp]

@@ -14,6 +14,7 @@ module grid
   use law_table, only: change_parameter, is_start_parameter, law_choice_t
   use motion, only: motion_t
   use motion_state, only: options_t
+  use text, only: number_in
   implicit none
   private
 
@@ -91,7 +92,7 @@ contains
     character(len=*), intent(in) :: name
     integer, intent(in) :: axis, row
     integer :: k
-    k = findloc(grid%start_names == name, .true., 1)
+    k = number_in(grid%start_names, name)
     if (k == 0) then
       grid%start_names = [character(len=name_length) :: grid%start_names, name]
       grid%start_axis = [grid%start_axis, axis]

@@ -9,8 +9,6 @@ from beams import RATIOS, cantilever, single_impact_orbits
 from program import run, succeed
 from scipy import io, sparse
 from scipy.integrate import solve_ivp
-from separatrix.errors import CaseError
-from separatrix.library import Model
 from separatrix.structures.cli import main
 
 ELEMENTS = 12
@@ -462,51 +460,3 @@ def test_the_library_flies_what_the_program_flies(matrices, tmp_path, separatrix
         with pytest.raises(sx.CaseError, match=found) as refused:
             softer.with_({"structure.beam.file": file})
         assert "structure.beam.file" in str(refused.value)
-
-
-# the table of the structure in the case, settings on top, whether that is a case
-SETTINGS = [
-    ('[structure.beam]\nfile = "beam.h5"', (), True),
-    ('[structure.beam]\nfile = "beam.h5"', ("structure.beam.mass=[[1.0]]",), False),
-    ('[structure.beam]\nfile = "beam.h5"', ("structure.beam.frequency=[1.0, 2.0]",), False),
-    ('[structure.beam]\nfile = "beam.h5"', ("structure.beam.point.tip=[1.0, 2.0]",), False),
-    ('[structure.beam]\nfile = "beam.h5"\npoint.tip = 1', (), False),
-    ('[structure.beam]\nfile = "beam.h5"\npoint = 3', (), False),
-    ('[structure.beam]\nfile = "other.h5"', ('structure.beam.point.tip="tip_y"',), True),
-    ('[structure.beam]\nfile = "other.h5"', ('structure.beam.point.tip="tip_z"',), False),
-    ('[structure.beam]\nfile = "other.h5"\npoint.tip = "tip_y"', ("structure.beam.x0=[0.1, 0.0]",), True),
-    ('[structure.beam]\nfile = "other.h5"\npoint.tip = 1', ("structure.beam.modes=1",), True),
-    ('[structure.beam]\nfile = "none.h5"', ('structure.beam.file="beam.h5"',), True),
-    ('[structure.beam]\nfile = "none.h5"', ('structure.beam={file = "beam.h5"}',), True),
-    ('[structure.beam]\nfile = "beam.h5"', ("structure.beam.file=3",), False),
-    ('[structure.beam]\nx0 = [0.0, 0.0]\nfile = "beam.h5"', ("structure.beam.x0[1]=0.2",), True),
-    ("", ('structure.beam.file="beam.h5"',), True),
-    ("structure = 1", (), False),
-    ("structure = 1", ('structure.beam.file="beam.h5"',), True),
-    ('[[structure]]\nfile = "beam.h5"', (), False),
-    ('[[structure]]\nfile = "beam.h5"', ('structure.beam.file="beam.h5"',), False),
-    ("[structure]\nbeam = 1", (), False),
-]
-
-
-@pytest.mark.parametrize(("table", "settings", "allowed"), SETTINGS)
-def test_the_library_takes_the_structures_that_the_program_takes(
-    separatrix, library, tmp_path, table, settings, allowed
-):
-    for name, point in (("beam", "tip"), ("other", "tip_y")):
-        with h5py.File(tmp_path / f"{name}.h5", "w") as file:
-            group = file.create_group("structure")
-            group["frequency"] = [1.0, 6.3]
-            group["frequency"].attrs["units"] = "rad/s"
-            group[f"point/{point}"] = [2.0, -2.0]
-    fill = {"file": "", "more": "", "stop": 0.5, "force": 0.05, "omega": 0.9, "x0": 0, "v0": 0, "angle": 0}
-    text = CASE.format(**fill).replace('[structure.beam]\nfile = ""', table)
-    (tmp_path / "case.toml").write_text(text)
-    words = [word for setting in settings for word in ("--set", setting)]
-    ended = run(separatrix, "trajectory", tmp_path / "case.toml", "--validate", *words, folder=tmp_path)
-    assert ended.code == (0 if allowed else 65), ended
-    if allowed:
-        Model.from_settings(text, tmp_path / "case.toml", settings)
-    else:
-        with pytest.raises(CaseError):
-            Model.from_settings(text, tmp_path / "case.toml", settings)

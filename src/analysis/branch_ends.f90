@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The doublings in which branches of twice the period end, and the branch points in which branches end that cross another.
-module doubling_ends
+module branch_ends
   use body_family, only: family_t
   use branch_point, only: branch_t, label_bp, label_not_known, label_pd
   use errors, only: error_t
@@ -14,21 +14,21 @@ module doubling_ends
   implicit none
   private
 
-  public :: join_doublings
+  public :: join_ends
 
-  !> Nearness of an end to a doubling, in multiplier and as a share of the range.
-  real(wp), parameter :: at_doubling = 1e-3_wp
+  !> Nearness of an end to what was located, in multiplier and as a share of the range.
+  real(wp), parameter :: nearly = 1e-3_wp
   !> The same of section points, in natural sizes: they go with the root of the parameter.
-  real(wp), parameter :: near_doubling = 3e-2_wp
+  real(wp), parameter :: near_points = 3e-2_wp
 
 contains
 
   !> Puts the ends of branches that are in a doubling, or in a branch point, where it was located on the branch of half the period,
   !> or of the same: the equations are singular there.
-  pure subroutine join_doublings(family, branches)
+  pure subroutine join_ends(family, branches)
     type(family_t), intent(in) :: family
     type(branch_t), intent(inout) :: branches(:)
-    type(orbit_t) :: doubling
+    type(orbit_t) :: located
     integer :: b, k, times
     logical :: found
     do b = 1, size(branches)
@@ -36,50 +36,50 @@ contains
         if (all(branches(b)%ending(k) /= [label_pd, label_not_known])) cycle
         times = merge(2, 1, branches(b)%ending(k) == label_pd)
         associate (last => branches(b)%points(merge(1, size(branches(b)%points), k == 1)))
-          call nearest_located(family, branches, last%orbit, times, doubling, found)
+          call nearest_located(family, branches, last%orbit, times, located, found)
           if (.not. found) cycle
-          last%orbit%parameter = doubling%parameter
-          last%orbit%y = doubling%y
-          last%orbit%multipliers = doubling%multipliers**times
+          last%orbit%parameter = located%parameter
+          last%orbit%y = located%y
+          last%orbit%multipliers = located%multipliers**times
           if (times == 2) cycle
           last%label = label_bp
           branches(b)%ending(k) = label_bp
         end associate
       end do
     end do
-  end subroutine join_doublings
+  end subroutine join_ends
 
   !> The doubling (`times` 2) or branch point (1) that an orbit ended in, of those of half its period, or of the same, nearby, with
   !> that section point in front that is nearest to the orbit's: twins of a symmetric machine double at one value of the parameter.
-  pure subroutine nearest_located(family, branches, ended, times, doubling, found)
+  pure subroutine nearest_located(family, branches, ended, times, located, found)
     type(family_t), intent(in) :: family
     type(branch_t), intent(in) :: branches(:)
     type(orbit_t), intent(in) :: ended
     integer, intent(in) :: times
-    type(orbit_t), intent(out) :: doubling
+    type(orbit_t), intent(out) :: located
     logical, intent(out) :: found
     real(wp) :: least, distance, point(size(ended%y))
     integer :: c, i, label, multiplier
     label = merge(label_pd, label_bp, times == 2)
     multiplier = merge(-1, 1, times == 2)
-    found = minval(abs(ended%multipliers - 1)) <= at_doubling .or. times == 2
+    found = minval(abs(ended%multipliers - 1)) <= nearly .or. times == 2
     if (.not. found) return
-    least = near_doubling
+    least = near_points
     do c = 1, size(branches)
       do i = 1, size(branches(c)%points)
         associate (there => branches(c)%points(i))
           if (times*there%orbit%periods /= ended%periods .or. there%label /= label) cycle
-          if (minval(abs(there%orbit%multipliers - multiplier)) > at_doubling) cycle
-          if (abs(ended%parameter - there%orbit%parameter) >= at_doubling*family%parameter_size) cycle
+          if (minval(abs(there%orbit%multipliers - multiplier)) > nearly) cycle
+          if (abs(ended%parameter - there%orbit%parameter) >= nearly*family%parameter_size) cycle
           call nearest_section_point(family, there%orbit, ended%y, point, distance)
           if (distance >= least) cycle
           least = distance
-          doubling = there%orbit
-          doubling%y = point
+          located = there%orbit
+          located%y = point
         end associate
       end do
     end do
-    found = least < near_doubling
+    found = least < near_points
   end subroutine nearest_located
 
   !> The section point of an orbit that is nearest to `y`, and its distance in natural sizes: huge if the machine is not to be had.
@@ -106,4 +106,4 @@ contains
     end do
   end subroutine nearest_section_point
 
-end module doubling_ends
+end module branch_ends
