@@ -3,8 +3,8 @@
 
 !> Dry and viscous friction. While sliding in direction s = +1 or -1 the force on the body is
 !>   -s (K + E exp(-|v/v_s|^delta)) - b v,
-!> or, where it fades, -s (K + (F - K)/(1 + |v|/v_f)) - b v with the break-away force F, with -d v |v| where it is in a fluid; at rest it is whatever holds the body, up
-!> to the break-away force. Nothing is smoothed.
+!> or, where it fades, -s (K + (F - K)/(1 + |v|/v_f)) - b v with the break-away force F, or, in a fluid, -s (K + d v^2) - b v; at
+!> rest it is whatever holds the body, up to the break-away force. Nothing is smoothed.
 module friction_law
   use elementary, only: exponential, logarithm
   use kinds, only: wp
