@@ -24,6 +24,8 @@ module mode_flow
     logical :: modal = .false.
     !> Joints that are constraints, and those of them that do not depend on the others.
     integer, allocatable :: held(:), independent(:)
+    !> Joints that the constraints, all with surfaces of constant speed, keep from moving or at one speed.
+    logical, allocatable :: still(:)
     !> Structure with the springs of the joints.
     real(wp), allocatable :: stiffness(:, :), damping(:, :)
     !> Where unit coordinates of the independent constraints move the structure, statically in the metric of the masses.
@@ -111,7 +113,7 @@ contains
     type(mode_flow_t), intent(inout) :: flow
     real(wp), allocatable :: w(:, :), g(:, :), column(:), unit(:), answer(:)
     real(wp) :: left
-    integer :: i, k, m
+    integer :: i, j, k, m
     logical :: ok
     m = size(flow%held)
     allocate (w(machine%n, m))
@@ -154,7 +156,27 @@ contains
       call solve(g, column, flow%hold(:, i), ok)
     end do
     flow%reaction = matmul(flow%hold, matmul(transpose(w), machine%mobility))
+    flow%still = [(keeps_still(machine, flow, j), j=1, size(machine%joints))]
   end subroutine set_constraints
+
+  !> Whether the speed of joint `j` is constant in this mode: nothing is left of its row by the constraints.
+  pure logical function keeps_still(machine, flow, j)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    integer, intent(in) :: j
+    real(wp) :: alone(machine%n), left(machine%n)
+    integer :: i
+    keeps_still = .not. allocated(machine%joints(j)%offset%harmonic)
+    alone = matmul(machine%mobility, machine%joints(j)%row)
+    left = alone
+    do i = 1, size(flow%independent)
+      associate (joint => machine%joints(flow%held(flow%independent(i))))
+        keeps_still = keeps_still .and. .not. allocated(joint%offset%harmonic)
+        left = left - flow%carried(:, i)*sum(joint%row*alone)
+      end associate
+    end do
+    keeps_still = keeps_still .and. sum(machine%joints(j)%row*left) <= 1e-10_wp*sum(machine%joints(j)%row*alone)
+  end function keeps_still
 
   !> Harmonics of the forces on the coordinates, those of springs on moving surfaces included, and of the surfaces of the
   !> constraints.

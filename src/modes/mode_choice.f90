@@ -6,7 +6,7 @@
 !> principle). Where the level at rest is higher, all joints that it cannot hold go together, with the force of sliding.
 !> Ties are settled by the same problem for the next derivative, twice; what is still tied sticks, or stays closed.
 module mode_choice
-  use boxed_forces, only: solve_boxed
+  use boxed_forces, only: depends_on, solve_boxed
   use jointed, only: joint_contact, joint_friction, jointed_t, most_joints
   use jointed_state, only: free_force, is_held, joint_force, joint_motion, jointed_state_t
   use kinds, only: wp
@@ -198,6 +198,7 @@ contains
       size_of_y = sizes(machine, question, trial, turning, force)
       call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
+      call keep_loaded(machine, question, y, side, rounding*size_of_y)
       call classify(machine, question, side, verdict)
       if (.not. is_tied(question, r, y, side, rounding*size_of_y)) return
       ! The next derivative decides among those that are tied.
@@ -413,6 +414,22 @@ contains
       end if
     end do
   end subroutine narrow
+
+  !> Friction at its level that joints which hold keep from moving is no tie: it slides at no speed, and they bear what comes.
+  pure subroutine keep_loaded(machine, question, y, side, tolerance)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(inout) :: question
+    real(wp), intent(in) :: y(:), tolerance(:)
+    integer, intent(in) :: side(:)
+    integer :: i
+    associate (n => question%count)
+      do i = 1, n
+        if (side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
+        if (machine%joints(question%joint(i))%kind /= joint_friction) cycle
+        question%fixed(i) = depends_on(question%g(:n, :n), i, side(:n) == 0)
+      end do
+    end associate
+  end subroutine keep_loaded
 
   pure subroutine classify(machine, question, side, verdict)
     type(jointed_t), intent(in) :: machine
