@@ -61,12 +61,11 @@ contains
   end subroutine settle
 
   !> What the guards that have fallen bring about. `stalled`: what cannot be decided is held for an instant.
-  pure subroutine transition(moving, state, list, fallen, stalled, burst, tally, ok)
+  pure subroutine transition(moving, state, list, fallen, stalled, tally, ok)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:), stalled
-    integer, intent(inout) :: burst
     type(tally_t), intent(inout) :: tally
     logical, intent(out) :: ok
     complex(wp) :: turning(moving%harmonics)
@@ -129,22 +128,15 @@ contains
       end do
       ok = .true.
       if (any(hit /= 0)) then
-        burst = burst + 1
-        plastic = burst > long_burst
+        state%burst = state%burst + 1
+        plastic = state%burst > long_burst
         if (plastic) call add_near(moving, state, turning, touching)
         call strike(machine, state, turning, touching, plastic, speed, lost, ok)
         do j = 1, size(machine%joints)
           if (hit(j) /= 0) call count_impact(tally, hit(j), abs(speed(j)))
         end do
       end if
-      do j = 1, size(machine%joints)
-        if (machine%joints(j)%kind /= joint_friction) cycle
-        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        if (start%phase(j) == 0) at_rest(j) = .not. any(hit /= 0) .or. &
-          abs(u) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, start)
-        if (abs(u) <= rounding_of_speed(machine, j, state)) at_rest(j) = .true.
-        if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
-      end do
+      call judge_friction(machine, start, turning, any(hit /= 0), state, at_rest)
       if (stalled) then
         call hold(moving, state, turning, at_rest, touching)
         return
@@ -159,6 +151,30 @@ contains
       end do
     end associate
   end subroutine transition
+
+  !> Which friction joints are at rest, and the directions of the others. One that stuck in the state `before` is at rest unless
+  !> an impact has set it in motion: what its speed was then is rounding.
+  pure subroutine judge_friction(machine, before, turning, struck, state, at_rest)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before
+    complex(wp), intent(in) :: turning(:)
+    logical, intent(in) :: struck
+    type(jointed_state_t), intent(inout) :: state
+    logical, intent(inout) :: at_rest(:)
+    real(wp) :: s, u, last
+    integer :: j
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind /= joint_friction) cycle
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      if (before%phase(j) == 0) then
+        call joint_motion(machine, j, before%q, before%v, before%time, turning, s, last)
+        at_rest(j) = .not. struck .or. &
+          abs(u - last) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, before)
+      end if
+      if (abs(u) <= rounding_of_speed(machine, j, state)) at_rest(j) = .true.
+      if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
+    end do
+  end subroutine judge_friction
 
   !> The slider of elastic friction stops: its spring holds what friction was.
   pure subroutine stop_slider(machine, j, state, turning)
