@@ -70,59 +70,16 @@ contains
     logical, intent(out) :: ok
     complex(wp) :: turning(moving%harmonics)
     type(jointed_state_t) :: start
-    integer :: touching(most_joints), hit(most_joints), g, j
+    integer :: touching(most_joints), hit(most_joints), j
     logical :: at_rest(most_joints), plastic
-    real(wp) :: s, u, speed(most_joints), lost
+    real(wp) :: speed(most_joints), lost
     associate (machine => moving%machine)
       turning = turning_at(machine%frequency, state%time, moving%harmonics)
       start = state
       at_rest = .false.
       touching = 0
       hit = 0
-      do g = 1, size(list)
-        if (.not. fallen(g)) cycle
-        j = list(g)%joint
-        select case (list(g)%meaning)
-        case (slide_ends)
-          if (machine%joints(j)%kind == joint_elastic) then
-            call stop_slider(machine, j, state, turning)
-            call append_word(tally, word_stick)
-            tally%sticks = tally%sticks + 1
-          else
-            at_rest(j) = .true.
-          end if
-        case (slides_up, slides_down)
-          if (machine%joints(j)%kind == joint_elastic) then
-            state%phase(j) = merge(1, -1, list(g)%meaning == slides_up)
-            ! The speed of the slide starts at zero where the spring has just been let go at rest, else it is what it is.
-            call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-            state%left(j) = merge(1, 0, abs(u) <= rounding_of_speed(machine, j, state))
-          end if
-        case (meets_upper, meets_lower)
-          touching(j) = merge(1, -1, list(g)%meaning == meets_upper)
-          if (machine%joints(j)%kind == joint_soft) then
-            call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-            state%phase(j) = touching(j)
-            state%left(j) = touching(j)
-            state%touch_speed(j) = abs(u)
-            call count_impact(tally, touching(j), abs(u))
-            touching(j) = 0
-          else
-            hit(j) = touching(j)
-          end if
-        case (lets_go)
-          touching(j) = state%phase(j)
-        case (leaves)
-          state%left(j) = sign(1, state%phase(j))
-          state%phase(j) = 0
-        case (force_ends)
-          state%phase(j) = 2*state%phase(j)
-          state%left(j) = sign(1, state%phase(j))
-        case (force_returns)
-          state%phase(j) = state%phase(j)/2
-          state%left(j) = sign(1, state%phase(j))
-        end select
-      end do
+      call change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
       do j = 1, size(machine%joints)
         if (machine%joints(j)%kind == joint_contact .and. state%phase(j) /= 0) touching(j) = state%phase(j)
       end do
@@ -151,6 +108,64 @@ contains
       end do
     end associate
   end subroutine transition
+
+  !> What each fallen guard says of its own joint: its phase, or that it is at rest, touches, is hit.
+  pure subroutine change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
+    type(jointed_t), intent(in) :: machine
+    complex(wp), intent(in) :: turning(:)
+    type(joint_guard_t), intent(in) :: list(:)
+    logical, intent(in) :: fallen(:)
+    type(jointed_state_t), intent(inout) :: state
+    type(tally_t), intent(inout) :: tally
+    logical, intent(inout) :: at_rest(:)
+    integer, intent(inout) :: touching(:), hit(:)
+    real(wp) :: s, u
+    integer :: g, j
+    do g = 1, size(list)
+      if (.not. fallen(g)) cycle
+      j = list(g)%joint
+      select case (list(g)%meaning)
+      case (slide_ends)
+        if (machine%joints(j)%kind == joint_elastic) then
+          call stop_slider(machine, j, state, turning)
+          call append_word(tally, word_stick)
+          tally%sticks = tally%sticks + 1
+        else
+          at_rest(j) = .true.
+        end if
+      case (slides_up, slides_down)
+        if (machine%joints(j)%kind == joint_elastic) then
+          state%phase(j) = merge(1, -1, list(g)%meaning == slides_up)
+          ! The speed of the slide starts at zero where the spring has just been let go at rest, else it is what it is.
+          call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+          state%left(j) = merge(1, 0, abs(u) <= rounding_of_speed(machine, j, state))
+        end if
+      case (meets_upper, meets_lower)
+        touching(j) = merge(1, -1, list(g)%meaning == meets_upper)
+        if (machine%joints(j)%kind == joint_soft) then
+          call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+          state%phase(j) = touching(j)
+          state%left(j) = touching(j)
+          state%touch_speed(j) = abs(u)
+          call count_impact(tally, touching(j), abs(u))
+          touching(j) = 0
+        else
+          hit(j) = touching(j)
+        end if
+      case (lets_go)
+        touching(j) = state%phase(j)
+      case (leaves)
+        state%left(j) = sign(1, state%phase(j))
+        state%phase(j) = 0
+      case (force_ends)
+        state%phase(j) = 2*state%phase(j)
+        state%left(j) = sign(1, state%phase(j))
+      case (force_returns)
+        state%phase(j) = state%phase(j)/2
+        state%left(j) = sign(1, state%phase(j))
+      end select
+    end do
+  end subroutine change_phases
 
   !> Which friction joints are at rest, and the directions of the others. One that stuck in the state `before` is at rest unless
   !> an impact has set it in motion: what its speed was then is rounding.
