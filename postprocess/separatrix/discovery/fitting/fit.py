@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.normal_equations import (
     Blocks,
     Reduced,
@@ -13,7 +14,7 @@ from separatrix.discovery.fitting.normal_equations import (
     eliminate,
     gauss_newton_step,
 )
-from separatrix.discovery.fitting.problem import Evaluation, Problem
+from separatrix.discovery.fitting.problem import Problem
 
 _HUBER = 1.5
 _TOLERANCE = 0.02
@@ -86,7 +87,8 @@ class Fit:
     def freedom(self) -> int:
         """Residuals less unknowns, over the good segments."""
         good = self.good
-        return int(self.counts[good].sum() - 2 * good.sum() - (~self.at_bound).sum())
+        starts = self.evaluation.unknowns * good.sum()
+        return int(self.counts[good].sum() - starts - (~self.at_bound).sum())
 
     @property
     def reduced_chi2(self) -> float:
