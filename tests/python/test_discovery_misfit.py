@@ -43,7 +43,7 @@ def fit(first: float, second: float) -> SimpleNamespace:
     size = np.repeat([first, second], SEGMENTS)
     return SimpleNamespace(
         chi2=size * (SAMPLES - 2),
-        evaluation=SimpleNamespace(unknowns=2),
+        unknowns=2,
         counts=np.full(2 * SEGMENTS, SAMPLES),
         good=np.ones(2 * SEGMENTS, bool),
         reduced_chi2=0.5 * (first + second),

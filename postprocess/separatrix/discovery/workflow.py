@@ -113,7 +113,11 @@ def _prepared(record: Record, model, rest: Record | None, options: Options) -> P
 
 
 def _split(
-    records: list[Record], hold_out: list[Record], model, rest: Record | None, options: Options
+    records: list[Record],
+    hold_out: list[Record],
+    model,
+    rest: Record | None = None,
+    options: Options | None = None,
 ) -> tuple[list[Record], list[Record], str]:
     """Training and held-out records; by default the last record, or the end of the only one."""
     if hold_out:
@@ -124,7 +128,7 @@ def _split(
         raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
     at = int((1 - _END) * whole.t.size)
-    period = _prepared(whole, model, rest, options).period_samples
+    period = _prepared(whole, model, rest, options or Options()).period_samples
     if period is not None:
         # the end needs some periods too
         latest = whole.t[-1] - _END_PERIODS * period * whole.interval

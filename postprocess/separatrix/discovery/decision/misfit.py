@@ -32,7 +32,7 @@ def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
     for number in range(len(data.prepared)):
         rows = (record == number) & fit.good
         squares, more = fit.condensed(rows)
-        freedom = int(fit.counts[rows].sum() - fit.evaluation.unknowns * rows.sum() + more)
+        freedom = int(fit.counts[rows].sum() - fit.unknowns * rows.sum() + more)
         if freedom > 0:
             found[number] = (float((fit.chi2[rows].sum() + squares) / freedom), freedom)
     return found

@@ -62,6 +62,8 @@ class Fit:
     exhausted: bool = False
     # what condensed stretches leave over, and its degrees of freedom
     left_over: tuple[np.ndarray, np.ndarray] | None = None
+    # of each segment: its start, or none where the motion is known
+    unknowns: int = 2
 
     @property
     def converged(self) -> bool:
@@ -87,7 +89,7 @@ class Fit:
     def freedom(self) -> int:
         """Residuals less unknowns, over the good segments."""
         good = self.good
-        starts = self.evaluation.unknowns * good.sum()
+        starts = self.unknowns * good.sum()
         return int(self.counts[good].sum() - starts - (~self.at_bound).sum())
 
     @property
@@ -321,7 +323,7 @@ def _finished(problem, values, starts, current, movable, iterations) -> Fit:
     chi2 = np.sum(current.used * current.residual**2, axis=1)
     counts = current.used.sum(axis=1)
     found = Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound, movable)
-    return replace(found, left_over=problem.left_over())
+    return replace(found, left_over=problem.left_over(), unknowns=current.unknowns)
 
 
 def _open(

@@ -60,7 +60,7 @@ class Prediction:
     def _freedom(self) -> int:
         good = self.good
         own = len(self.problem.free) - self.covariance.shape[0]
-        starts = self.fit.evaluation.unknowns * good.sum()
+        starts = self.fit.unknowns * good.sum()
         return int(self.fit.counts[good].sum() - starts - own)
 
 

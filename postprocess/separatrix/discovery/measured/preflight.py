@@ -259,7 +259,10 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
             )
         return record
     if not wanted:
-        notes.append("the machine has no measured force: column 'force' is not used")
+        notes.append(
+            "the machine has no measured force: column 'force' is not used (that of a joint which is driven "
+            'along its motion is compared with --compare force and drive.law = "measured_force")'
+        )
         return replace(record, force=None)
     usual = None
     for first, last in record.pieces:
