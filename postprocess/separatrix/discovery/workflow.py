@@ -32,6 +32,11 @@ _TWO_BODIES = (
     "coordinate of the driving one under a measured force (docs/discovery-guide.md, Base machines)"
 )
 
+_STRUCTURE = (
+    'body.law: found several bodies or a structure, allowed for a base machine "point_mass": effects belong '
+    "to one body, and segments of others are not flown yet (docs/discovery-guide.md, Base machines)"
+)
+
 
 def discover(
     base: object,
@@ -99,8 +104,10 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
 def _model(base: object):
     named = isinstance(base, str | Path)
     model = Model.read(base) if named else base
-    if "body.driven_mass" in model.parameters:
-        raise SeparatrixError(f"{base}: {_TWO_BODIES}" if named else _TWO_BODIES)
+    refused = {"body.driven_mass": _TWO_BODIES, "body.in_sequence": _STRUCTURE}
+    for path, why in refused.items():
+        if path in model.parameters:
+            raise SeparatrixError(f"{base}: {why}" if named else why)
     return model
 
 
