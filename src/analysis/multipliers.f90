@@ -48,8 +48,8 @@ contains
     call leave_out_hidden(matrix, values)
   end function multipliers_of
 
-  !> Makes those of the eigenvalues (largest first) that are not known no numbers: each moves, to first order, by the rounding of the
-  !> matrix times its condition |x||y|/|y'x| (Golub, Van Loan, Matrix Computations, 7.2.2), a double one by the root of that.
+  !> Makes those of the eigenvalues (largest first) that are not known no numbers: each moves, to first order, by the rounding of
+  !> the matrix times its condition |x||y|/|y'x| (Golub, Van Loan, Matrix Computations, 7.2.2), a double one by the root of that.
   pure subroutine leave_out_hidden(matrix, values)
     real(wp), intent(in) :: matrix(:, :)
     complex(wp), intent(inout) :: values(:)
