@@ -3,8 +3,8 @@
 
 !> Dry and viscous friction. While sliding in direction s = +1 or -1 the force on the body is
 !>   -s (K + E exp(-|v/v_s|^delta)) - b v,
-!> or, where it fades, -s (K + (F - K)/(1 + |v|/v_f)) - b v with the break-away force F; at rest it is whatever holds the body, up
-!> to the break-away force. Nothing is smoothed.
+!> or, where it fades, -s (K + (F - K)/(1 + |v|/v_f)) - b v with the break-away force F, or, in a fluid, -s (K + d v^2) - b v; at
+!> rest it is whatever holds the body, up to the break-away force. Nothing is smoothed.
 module friction_law
   use elementary, only: exponential, logarithm
   use kinds, only: wp
@@ -36,6 +36,8 @@ module friction_law
     real(wp) :: second_excess = 0, second_velocity = 1, second_exponent = 1
     !> v_f [m/s]; 0: it does not fade.
     real(wp) :: fading_speed = 0
+    !> d [N s^2/m^2].
+    real(wp) :: drag = 0
   end type friction_t
 
 contains
@@ -81,13 +83,15 @@ contains
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
     case ('friction:coulomb_hyperbolic')
       if (law%break_away > law%kinetic) law%fading_speed = value_of(choice, 'fading_velocity')
+    case ('friction:coulomb_quadratic')
+      law%drag = value_of(choice, 'drag')
     end select
   end function friction_of_part
 
   !> Whether sliding friction depends on the speed other than linearly.
   pure elemental logical function falls(law)
     type(friction_t), intent(in) :: law
-    falls = law%excess > 0 .or. law%fading_speed > 0
+    falls = law%excess > 0 .or. law%fading_speed > 0 .or. law%drag > 0
   end function falls
 
   !> Whether the forces of two laws add up to one law of their kind.
@@ -138,6 +142,7 @@ contains
     sliding_friction = -direction*(law%kinetic + stribeck_excess(law, direction*v)) - law%damping*v
     if (law%fading_speed > 0) sliding_friction = sliding_friction &
       - direction*(law%break_away - law%kinetic)/(1 + max(direction*v, -law%fading_speed/2)/law%fading_speed)
+    if (law%drag > 0) sliding_friction = sliding_friction - direction*law%drag*v**2
   end function sliding_friction
 
   !> E exp(-(v/v_s)^delta) [N] at the sliding speed `speed` [m/s]; smooth continuation below zero.
@@ -163,6 +168,7 @@ contains
     slope = -law%damping
     if (law%fading_speed > 0) slope = slope + (law%break_away - law%kinetic)/ &
       (law%fading_speed*(1 + max(direction*v, -law%fading_speed/2)/law%fading_speed)**2)
+    if (law%drag > 0) slope = slope - 2*direction*law%drag*v
     if (.not. law%excess > 0) return
     slope = slope + law%excess*falloff(direction*v/law%stribeck_velocity, law%stribeck_exponent)/law%stribeck_velocity
     if (law%second_excess > 0) slope = slope &

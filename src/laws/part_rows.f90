@@ -15,11 +15,12 @@ module part_rows
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
   character(len=law_length), parameter :: springs(3) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
     'spring:pendulum']
-  character(len=law_length), parameter :: frictions(5) = [character(len=law_length) :: 'friction:coulomb', &
-    'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic']
+  character(len=law_length), parameter :: frictions(6) = [character(len=law_length) :: 'friction:coulomb', &
+    'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic', &
+    'friction:coulomb_quadratic']
   character(len=law_length), parameter :: contacts(3) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt', &
     'contact:massless']
-  character(len=law_length), parameter :: joints(11) = [springs, frictions, contacts]
+  character(len=law_length), parameter :: joints(12) = [springs, frictions, contacts]
   !> Contacts with the laws of one body, which keep their parameters.
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
@@ -29,7 +30,7 @@ module part_rows
   character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
   character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
 
-  type(law_row_t), parameter, public :: part_laws(32) = [ &
+  type(law_row_t), parameter, public :: part_laws(33) = [ &
     law_row_t('body', 'structure', 'several bodies and structures, with springs, joints and drives between them', &
               'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
     law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
@@ -49,6 +50,7 @@ module part_rows
               'Armstrong-Helouvry, Automatica 30 (1994)'), &
     law_row_t('part', frictions(5), 'force + (static_force - force)/(1 + |u|/v_f)', &
               'Galvanetto, Bishop, Chaos Solitons Fractals 5 (1995)'), &
+    law_row_t('part', frictions(6), 'dry friction and d u|u|: drag of a fluid, a damper with an orifice', ''), &
     law_row_t('part', contacts(1), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
               'Glocker, Set-Valued Force Laws (2001)'), &
     law_row_t('part', contacts(2), 'stops with spring K and damper D', ''), &
@@ -60,7 +62,7 @@ module part_rows
 
   !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
   !> drive, one place.
-  type(parameter_row_t), parameter, public :: part_parameters(189) = [ &
+  type(parameter_row_t), parameter, public :: part_parameters(195) = [ &
     parameter_row_t('body', 'structure', 'in_sequence', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other'), &
     (parameter_row_t('part', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
@@ -92,9 +94,9 @@ module part_rows
     (parameter_row_t('part', points(i), 'row', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
                      'its displacement for one of each coordinate'), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the first body between'), i=1, 11), &
+                     'number of the first body between'), i=1, 12), &
     (parameter_row_t('part', joints(i), 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the second body between'), i=1, 11), &
+                     'number of the second body between'), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
                      .false., 'number of the first body between'), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
@@ -114,11 +116,11 @@ module part_rows
     (parameter_row_t('part', springs(i), 'free_length', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
                      'second minus first where the spring is without force'), i=1, 3), &
     (parameter_row_t('part', frictions(i), 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                     'friction while sliding; at high speed where it depends on the speed'), i=1, 5), &
+                     'friction while sliding; at high speed where it depends on the speed'), i=1, 6), &
     (parameter_row_t('part', frictions(i), 'static_force', 'N', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
-                     'friction at break-away; that of sliding if absent, never below it'), i=1, 5), &
+                     'friction at break-away; that of sliding if absent, never below it'), i=1, 6), &
     (parameter_row_t('part', frictions(i), 'velocity', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'velocity of the surface of the first body or the ground: a belt'), i=1, 5), &
+                     'velocity of the surface of the first body or the ground: a belt'), i=1, 6), &
     parameter_row_t('part', frictions(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'of the spring'), &
     parameter_row_t('part', frictions(3), 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
@@ -129,6 +131,8 @@ module part_rows
                     'delta'), &
     parameter_row_t('part', frictions(5), 'fading_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
                     'v_f'), &
+    parameter_row_t('part', frictions(6), 'drag', 'N s^2/m^2', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+                    'd'), &
     parameter_row_t('part', contacts(1), 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
                     'e'), &
     parameter_row_t('part', contacts(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &

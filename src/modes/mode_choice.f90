@@ -297,7 +297,7 @@ contains
     type(jointed_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(in) :: force(:)
-    real(wp) :: size_of_y(most_joints), parts(machine%n)
+    real(wp) :: size_of_y(most_joints), parts(machine%n), s, u, r, by_place, by_speed
     integer :: i, n
     n = machine%n
     parts = abs(force) + abs(machine%load) + matmul(abs(machine%damping), abs(state%v(:n))) &
@@ -309,6 +309,12 @@ contains
     do i = 1, size(machine%joints)
       if (machine%joints(i)%kind == joint_friction) parts = parts &
         + abs(machine%joints(i)%row)*machine%joints(i)%friction%break_away
+      ! The force of a stiff joint is the small difference of large ones.
+      call joint_motion(machine, i, state%q, state%v, state%time, turning, s, u)
+      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, r, by_place, by_speed)
+      associate (row => abs(machine%joints(i)%row))
+        parts = parts + row*(abs(by_place)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
+      end associate
     end do
     size_of_y = 0
     do i = 1, question%count

@@ -59,6 +59,8 @@ class Structure:
     soft: Sequence[Soft] = ()
     rigid: Sequence[Rigid] = ()
     tolerance: float = 1e-12
+    #: Two events of one guard within a step are not seen [s].
+    longest_step: float = 0.05
     events: list[tuple[str, int, float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -205,7 +207,14 @@ class Structure:
                 meaning.append(("open", i))
                 number += 1
             else:
-                guards.append(watch(lambda s, z, r=row, j=joint: j.side * (j.stop - r @ z[:n])))
+                # What moves away is no impact: root finding would find again the one that it comes from.
+                guards.append(
+                    watch(
+                        lambda s, z, r=row, j=joint: max(
+                            j.side * (j.stop - r @ z[:n]), LATE if j.side * (r @ z[n:]) < 0 else -np.inf
+                        )
+                    )
+                )
                 meaning.append(("hit", i))
         way = solve_ivp(
             slope,
@@ -215,7 +224,7 @@ class Structure:
             rtol=self.tolerance,
             atol=self.tolerance * 1e-2,
             events=guards,
-            max_step=0.05,
+            max_step=self.longest_step,
         )
         if way.status != 1:
             return until, way.y[:, -1], None
