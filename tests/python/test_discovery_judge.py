@@ -236,3 +236,34 @@ def test_the_base_is_fitted_again_from_a_lower_minimum_though_no_candidate_conve
     monkeypatch.setattr(decide, "minimise", lambda *_, **__: next(fits))
     found = decide.renewed(SimpleNamespace(), SimpleNamespace(base=base, judged=[one]))
     assert (found is not None and found.fit is lower) == (gained > 1)
+
+
+@pytest.mark.parametrize(("decrement", "exhausted", "gain", "settled"), [
+    (12.0, True, 1000.0, True),
+    (12.0, True, 100.0, False),
+    (12.0, False, 1000.0, False),
+    (0.1, False, 1.0, True),
+])  # fmt: skip
+def test_a_kink_from_where_little_of_the_gain_is_missing_is_the_end_of_a_fit(
+    decrement, exhausted, gain, settled
+):
+    """As Stribeck friction that gains 1300 and of which steps of no length gain the 12 that one promises."""
+    one = judged(np.full(COUNT, gain / COUNT), np.zeros(COUNT))
+    one.fitted.fit.decrement, one.fitted.fit.exhausted = decrement, exhausted
+    assert one.settled == settled
+    one.fitted.fit.caught = True
+    assert not one.settled
+
+
+@pytest.mark.parametrize(("training", "rivals"), [(-10.0, ["viscous"]), (-2.0, []), (5.0, [])])
+def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(monkeypatch, training, rivals):
+    """As of two drags of which one is 10 ahead where it was fitted, the other 20 where it was foretold."""
+    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
+    monkeypatch.setattr(judge, "ahead", lambda one, other: 20.0)
+    pool = [contender("quadratic_drag", 1000.0), contender("viscous", 1000.0)]
+    pool[0].training += training
+    for one, held_out in zip(pool, (20.0, 0.0), strict=True):
+        one.prediction, one.held_out = SimpleNamespace(), held_out
+    best, close = foremost(pool, OPTIONS)
+    assert best.name == "quadratic_drag"
+    assert [one.name for one in close] == rivals

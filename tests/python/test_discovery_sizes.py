@@ -60,7 +60,7 @@ def test_one_motion_has_one_verdict_at_every_rate_of_sampling(effect):
 
 
 def candidate(training: float, left: float, samples: float, p: float = 0.0) -> Judged:
-    """An effect that gained so much and leaves so much in chi^2, which forces explain unless `p` is chance."""
+    """An effect that gained so much and leaves so much in chi^2, by chance with a probability of `p`."""
     fit = SimpleNamespace(samples=samples, excess=left, sample_chi2=1 + left / samples)
     prediction = SimpleNamespace(excess=left)
     one = Judged(SimpleNamespace(fit=fit), prediction, training, training, np.zeros(0), 1)

@@ -201,7 +201,7 @@ def renewed(bench: Bench, first: Round, settled: bool = False) -> Fitted | None:
     lowest_misfit = sorted(first.judged, key=lambda one: -one.training)[:_LEADERS]
     if not lowest_misfit:
         return None
-    best = next((one for one in first.judged if one.fitted.fit.converged), None)
+    best = next((one for one in first.judged if one.settled), None)
     changed = best is not None and not settled and _noise_renewed(bench, best)
     fits = [minimise(base.problem, base.fit.values, base.fit.starts, patient=True)]
     for one in lowest_misfit:

@@ -40,12 +40,12 @@ def choice(
 
 
 def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
-    """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
+    """Return the settled candidate of most evidence, and all that it does not beat clearly for its misfit.
 
-    A fit that has not converged may not be named, but what it gained so far may stand against a name.
+    A fit that is not at its end may not be named, but what it gained so far may stand against a name.
     """
     order = sorted(pool, key=lambda one: -one.evidence)
-    best = next((one for one in order if one.fitted.fit.converged), order[0])
+    best = next((one for one in order if one.settled), order[0])
     return best, [one for one in order if one is not best and not clear_of(best, one, options)]
 
 
@@ -54,7 +54,7 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     options = bench.options
     best.own = share_beside_faults(best.fitted, base)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
-    best.gates["converged"] = best.fitted.fit.converged
+    best.gates["converged"] = best.settled
     best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()

@@ -20,6 +20,8 @@ _BLOCKS = 2
 _FEW = 5
 # share of the mean information on an effect below which a segment says nothing of it
 _SILENT = 0.01
+# share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
+_KINK_SHARE = 0.01
 
 
 @dataclass
@@ -42,6 +44,13 @@ class Judged:
     def name(self) -> str:
         """The effect that was added last."""
         return self.fitted.names[-1]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the fit is at its end: converged, or at a kink from where little of the gain is missing."""
+        fit = self.fitted.fit
+        kink = fit.exhausted and not fit.caught and fit.decrement < _KINK_SHARE * 2 * self.training
+        return bool(fit.converged or kink)
 
     @property
     def evidence(self) -> float:
@@ -180,10 +189,16 @@ def _together_clear(fitted: Fitted, places: list[int]) -> bool:
 
 
 def clear_of(best: Judged, other: Judged, options: Options) -> bool:
-    """Whether a candidate beats another one clearly, also where that is given small faults of the rig."""
+    """Whether a candidate beats another one clearly, also where that is given small faults of the rig.
+
+    Records that were fitted and records that were not must not clearly contradict each other.
+    """
     least = margin(best, other, options)
     over = lead(best, other)
-    return over >= least and over * share_beside_faults(best.fitted, other.fitted) >= least
+    fitted = best.training - best.parameters - (other.training - other.parameters)
+    if over < least or min(fitted, over - fitted) <= -least:
+        return False
+    return over * share_beside_faults(best.fitted, other.fitted) >= least
 
 
 def margin(best: Judged, other: Judged, options: Options) -> float:
