@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, flexible, judge
+from separatrix.discovery.decision import decide, flexible, judge, several
 from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import Judged, _together_clear, held_out_bounds, stable
 from separatrix.discovery.fitting.fit import Fit
@@ -267,3 +267,30 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
     best, close = foremost(pool, OPTIONS)
     assert best.name == "quadratic_drag"
     assert [one.name for one in close] == rivals
+
+
+def test_each_of_several_effects_is_held_against_its_family(monkeypatch):
+    """Where an effect of the family has nearly as much evidence alone and nobody tried it in the set."""
+
+    def named(*names):
+        return replace(contender(names[-1], 10.0), fitted=replace(fitted(names[-1], np.ones(2)), names=names))
+
+    alone = [contender(name, size) for name, size in (("viscous", 100.0), ("quadratic_drag", 90.0),
+                                                      ("stribeck", 5.0), ("offset_force", 95.0),
+                                                      ("cubic_spring", 80.0))]  # fmt: skip
+    tried = []
+
+    def fit_set(bench, first, names):
+        tried.append(tuple(names))
+        return names
+
+    monkeypatch.setattr(several, "fit_set", fit_set)
+    monkeypatch.setattr(several, "over_base", lambda bench, base, foretold, made: made)
+    monkeypatch.setattr(several, "admissible", lambda *_: (True, ""))
+    first = SimpleNamespace(judged=alone, base=None, foretold=None)
+    bench = SimpleNamespace(options=OPTIONS)
+    whole = named("viscous", "cubic_spring")
+    assert list(several._swapped(bench, first, whole, [whole])) == [["quadratic_drag", "cubic_spring"]]
+    assert tried == [("quadratic_drag", "cubic_spring")]
+    known = [whole, named("cubic_spring", "quadratic_drag")]
+    assert list(several._swapped(bench, first, whole, known)) == []
