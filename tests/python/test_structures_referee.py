@@ -12,6 +12,7 @@ import pytest
 from program import succeed
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "referee"))
+import random_structures
 from structures import Friction, Rigid, Soft, Structure
 
 TIES = """
@@ -136,3 +137,12 @@ def test_events_are_those_of_the_referee(separatrix, name, tmp_path):
     theirs = [at for _, _, at in referee.events]
     assert len(ours) >= 5
     assert ours == pytest.approx(theirs, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_machines_that_nobody_chose(separatrix, seed, tmp_path):
+    """Bodies, springs, friction and stops drawn at random: the referee meets the same events, none of them many times."""
+    events, lost, of_one_time = random_structures.compared(seed, str(separatrix), tmp_path)
+    assert events > 0
+    assert not lost
+    assert of_one_time < 8

@@ -47,9 +47,11 @@ def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
 
 
 def _sensor(problem: Problem, fit: Fit, u: np.ndarray) -> np.ndarray:
-    """What square and cube of the place add to x and v as they are measured."""
+    """What square and cube of the place add to x and v as they are measured; nothing where the force is compared."""
     count, length = u.shape
     table = np.zeros((count, fit.evaluation.residual.shape[1], len(_POWERS)))
+    if problem.in_force:
+        return table
     swing = float(np.std(fit.evaluation.x[problem.segments.inside & fit.good[:, None]]))
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
