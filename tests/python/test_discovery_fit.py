@@ -324,7 +324,9 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         return SimpleNamespace(names=one.names, fit=SimpleNamespace(converged=True), gain=1.0)
 
     def judge_one(base, foretold, one, prediction):
-        return SimpleNamespace(name=one.names[-1], fitted=one, training=one.gain, evidence=one.gain)
+        found = SimpleNamespace(name=one.names[-1], fitted=one, training=one.gain, evidence=one.gain)
+        found.prediction = prediction
+        return found
 
     monkeypatch.setattr(
         rounds, "candidate", lambda model, free, names, name, _: SimpleNamespace(names=(*names, name))

@@ -9,7 +9,8 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.partial import preferred
-from separatrix.discovery.fitting.heldout import Prediction, ahead, gained
+from separatrix.discovery.fitting.heldout import Prediction, _records_own, ahead, gained, gained_together
+from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.options import Options
 
 SEGMENTS = 40
@@ -19,7 +20,7 @@ def prediction(chi2, score, misfit):
     """A prediction of segments with these squared errors and scores."""
     chi2 = np.asarray(chi2, float)
     every = np.ones(chi2.size, bool)
-    fit = SimpleNamespace(chi2=chi2, counts=np.full(chi2.size, 50), good=every)
+    fit = SimpleNamespace(chi2=chi2, counts=np.full(chi2.size, 50), good=every, converged=True)
     problem = SimpleNamespace(free=[])
     return Prediction(
         np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, misfit, np.zeros((0, 0))
@@ -101,3 +102,24 @@ def test_wrong_machines_are_held_against_each_other_by_their_errors():
     worse, better = prediction([900.0], [-10.0], 500.0), prediction([400.0], [-30.0], 1.0)
     assert ahead(better, worse) == pytest.approx(250.0)
     assert ahead(worse, better) == pytest.approx(-250.0)
+
+
+def test_what_a_base_may_still_gain_is_no_gain_of_a_candidate():
+    """As of a base whose clock was not at its minimum on the held-out record."""
+    base, one = prediction([90.0, 80.0], [0.0, 0.0], 2.0), prediction([50.0, 70.0], [0.0, 0.0], 2.0)
+    assert gained_together(one, base) == pytest.approx([20.0, 5.0])
+    base.fit.converged, base.fit.decrement = False, 30.0
+    assert gained_together(one, base) == pytest.approx([12.5, -2.5])
+    base.fit.decrement = 1000.0
+    assert gained_together(one, base).sum() == pytest.approx(0.0)
+    # one that is behind stays there
+    base.fit.converged, one.fit.converged, one.fit.decrement = True, False, 1000.0
+    assert gained_together(base, one).sum() == pytest.approx(-25.0)
+
+
+def test_a_guess_gives_crank_and_clock_of_the_record():
+    guess = prediction([1.0], [0.0], 1.0)
+    guess.problem.free = [Free("restoring.stiffness", 9.0), Free("nuisance:clock", 0.0, record=0)]
+    guess.fit.values = np.array([8.0, 1e-4])
+    own = [Free("nuisance:phase", 0.0, record=0), Free("nuisance:clock", 0.0, record=0)]
+    assert _records_own(guess, own, np.array([0.3, 0.0])).tolist() == [0.3, 1e-4]

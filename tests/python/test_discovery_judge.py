@@ -7,11 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide
+from separatrix.discovery.decision import decide, flexible, judge, several
 from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import Judged, _together_clear, held_out_bounds, stable
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.problem import Evaluation
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
 
@@ -81,13 +82,17 @@ def contender(name: str, evidence: float) -> Judged:
     return Judged(one, None, evidence + 1, 0.0, np.zeros(0), 1)
 
 
-@pytest.mark.parametrize(("other", "behind", "rivals"), [
-    ("stribeck", 2.9, ["stribeck"]),
-    ("stribeck", 3.1, []),
-    ("asymmetric_friction", 5.9, ["asymmetric_friction"]),
-    ("asymmetric_friction", 6.1, []),
+@pytest.mark.parametrize(("other", "behind", "own", "rivals"), [
+    ("stribeck", 2.9, 1.0, ["stribeck"]),
+    ("stribeck", 3.1, 1.0, []),
+    ("asymmetric_friction", 5.9, 1.0, ["asymmetric_friction"]),
+    ("asymmetric_friction", 6.1, 1.0, []),
+    # small faults of a rig explain most of what tells them apart
+    ("stribeck", 20.0, 0.1, ["stribeck"]),
+    ("stribeck", 40.0, 0.1, []),
 ])  # fmt: skip
-def test_two_names_of_one_motion_need_more_to_be_told_apart(other, behind, rivals):
+def test_two_names_of_one_motion_need_more_to_be_told_apart(monkeypatch, other, behind, own, rivals):
+    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: own)
     pool = [contender("offset_force", 50.0), contender(other, 50.0 - behind)]
     best, close = foremost(pool, OPTIONS)
     assert best.name == "offset_force"
@@ -139,7 +144,7 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
     found = SimpleNamespace(base=base)
     bench = SimpleNamespace(training=None, held_out=None, options=OPTIONS)
     monkeypatch.setattr(decide, "missed", lambda data, fit, options: misses)
-    gap = SimpleNamespace(closable=closable, p=p, best=SimpleNamespace(name="velocity"))
+    gap = SimpleNamespace(closable=closable, p=p, best=SimpleNamespace(name="velocity"), fit=base.fit)
     effect = SimpleNamespace(training=gain / 2)
     given = decide._give_up(bench, decide.Decision("none", [], [], [], [found], gap, None), effect)
     assert given.outcome == outcome
@@ -160,3 +165,132 @@ def test_a_table_of_friction_is_of_two_directions_unless_its_values_are_shared(n
     one = fitted(name, np.full(COUNT, 47.0))
     one.problem.free = [Free(f"effect.{name}.force_1", 1.0, also=also)]
     assert decide._of_two_directions(Judged(one, None, 0.0, 0.0, np.zeros(0), 1)) == two
+
+
+@pytest.mark.parametrize("foretells", [True, False])
+def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, foretells):
+    one = judged(np.full(COUNT, 2.0), np.full(COUNT, 2.0 if foretells else -2.0))
+
+    def pass_gates(_, best, *__):
+        best.gates = dict.fromkeys(("detect", "stable", "converged", "admissible"), True)
+        best.gates["hold-out"] = bool(best.held_out > 0)
+
+    monkeypatch.setattr(decide, "ceiling", lambda *_: None)
+    monkeypatch.setattr(decide, "flexible_member", lambda *_: (one, []))
+    monkeypatch.setattr(decide, "pass_gates", pass_gates)
+    monkeypatch.setattr(decide, "judge_ceiling", lambda _, best: best.gates.update(adequate=True))
+    found = SimpleNamespace(base=one.fitted, screened=SimpleNamespace(tests=1.0))
+    bench = SimpleNamespace(scales=SimpleNamespace(mass=1.0))
+    assert (decide._shaped(bench, found) is not None) == foretells
+
+
+def excess(size: float) -> SimpleNamespace:
+    """A fit of a table, and no finer one."""
+    return SimpleNamespace(fitted=SimpleNamespace(fit=SimpleNamespace(excess=size), finer=None))
+
+
+def test_a_table_that_left_most_of_a_gap_is_not_fitted_again():
+    tables = [("friction_curve", None, True, excess(80.0)), ("spring_curve", None, True, excess(20.0))]
+    # one that did not converge may do so beside another base
+    tables.append(("force_curve", None, True, None))
+    found = SimpleNamespace(base=SimpleNamespace(fit=SimpleNamespace(excess=100.0)), tables=tables)
+    assert flexible._far_tables(found) == {"friction_curve"}
+    tables[0][3].fitted.finer = SimpleNamespace(fit=SimpleNamespace(excess=30.0))
+    assert flexible._far_tables(found) == set()
+
+
+def test_more_knots_end_sooner_where_a_closed_form_is_far_ahead():
+    few, more = (fitted("friction_curve", np.full(COUNT, size)) for size in (200.0, 150.0))
+    ahead, near = (fitted("coulomb", np.full(COUNT, size)) for size in (50.0, 149.0))
+    assert flexible._pointless(few, more, ahead)
+    assert not flexible._pointless(few, more, near)
+    assert not flexible._pointless(few, more, None)
+
+
+@pytest.mark.parametrize(("carried", "outcome"), [(True, "none"), (False, "not-in-catalogue")])
+def test_a_gap_that_a_segment_in_a_wrong_minimum_carries_is_none(monkeypatch, carried, outcome):
+    """As of a body that sticks, where the base machine follows one segment far worse than all others."""
+    chi2 = np.full(COUNT, 50.0)
+    chi2[3] = 400.0
+    gap = SimpleNamespace(p=1e-10, closable=90.0, fit=None)
+    left = {COUNT: gap, COUNT - 1: SimpleNamespace(p=0.1, closable=20.0) if carried else gap}
+    monkeypatch.setattr(decide, "ceiling", lambda problem, fit_, mass: left[int(fit_.good.sum())])
+    monkeypatch.setattr(decide, "missed", lambda *_: [])
+    table, no = np.zeros((COUNT, 1)), np.zeros(COUNT, bool)
+    flown = Evaluation(table, table, no, ~no, table, table, [], np.zeros(COUNT, int))
+    base = replace(fitted("", chi2), fit=replace(fit(chi2, decrement=40.0), evaluation=flown))
+    bench = SimpleNamespace(options=OPTIONS, training=None, held_out=None, scales=SimpleNamespace(mass=1.0))
+    decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], gap, None)
+    best = judged(np.full(COUNT, 1.0), np.zeros(COUNT))
+    assert decide._give_up(bench, decision, best).outcome == outcome
+
+
+@pytest.mark.parametrize("gained", [0.5, 30.0])
+def test_the_base_is_fitted_again_from_a_lower_minimum_though_no_candidate_converged(monkeypatch, gained):
+    base = fitted("", np.full(COUNT, 100.0))
+    one = judged(np.full(COUNT, gained / COUNT), np.zeros(COUNT))
+    one.fitted.fit.decrement = 100.0
+    lower = fit(np.full(COUNT, 100.0 - 2 * gained / COUNT))
+    fits = iter([base.fit, lower])
+    monkeypatch.setattr(decide, "shared_values", lambda *_: None)
+    monkeypatch.setattr(decide, "minimise", lambda *_, **__: next(fits))
+    found = decide.renewed(SimpleNamespace(), SimpleNamespace(base=base, judged=[one]))
+    assert (found is not None and found.fit is lower) == (gained > 1)
+
+
+@pytest.mark.parametrize(("decrement", "exhausted", "gain", "settled"), [
+    (12.0, True, 1000.0, True),
+    (12.0, True, 100.0, False),
+    (12.0, False, 1000.0, False),
+    (0.1, False, 1.0, True),
+])  # fmt: skip
+def test_a_kink_from_where_little_of_the_gain_is_missing_is_the_end_of_a_fit(
+    decrement, exhausted, gain, settled
+):
+    """As Stribeck friction that gains 1300 and of which steps of no length gain the 12 that one promises."""
+    one = judged(np.full(COUNT, gain / COUNT), np.zeros(COUNT))
+    one.fitted.fit.decrement, one.fitted.fit.exhausted = decrement, exhausted
+    assert one.settled == settled
+    one.fitted.fit.caught = True
+    assert not one.settled
+
+
+@pytest.mark.parametrize(("training", "rivals"), [(-10.0, ["viscous"]), (-2.0, []), (5.0, [])])
+def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(monkeypatch, training, rivals):
+    """As of two drags of which one is 10 ahead where it was fitted, the other 20 where it was foretold."""
+    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
+    monkeypatch.setattr(judge, "ahead", lambda one, other: 20.0)
+    pool = [contender("quadratic_drag", 1000.0), contender("viscous", 1000.0)]
+    pool[0].training += training
+    for one, held_out in zip(pool, (20.0, 0.0), strict=True):
+        one.prediction, one.held_out = SimpleNamespace(), held_out
+    best, close = foremost(pool, OPTIONS)
+    assert best.name == "quadratic_drag"
+    assert [one.name for one in close] == rivals
+
+
+def test_each_of_several_effects_is_held_against_its_family(monkeypatch):
+    """Where an effect of the family has nearly as much evidence alone and nobody tried it in the set."""
+
+    def named(*names):
+        return replace(contender(names[-1], 10.0), fitted=replace(fitted(names[-1], np.ones(2)), names=names))
+
+    alone = [contender(name, size) for name, size in (("viscous", 100.0), ("quadratic_drag", 90.0),
+                                                      ("stribeck", 5.0), ("offset_force", 95.0),
+                                                      ("cubic_spring", 80.0))]  # fmt: skip
+    tried = []
+
+    def fit_set(bench, first, names):
+        tried.append(tuple(names))
+        return names
+
+    monkeypatch.setattr(several, "fit_set", fit_set)
+    monkeypatch.setattr(several, "over_base", lambda bench, base, foretold, made: made)
+    monkeypatch.setattr(several, "admissible", lambda *_: (True, ""))
+    first = SimpleNamespace(judged=alone, base=None, foretold=None)
+    bench = SimpleNamespace(options=OPTIONS)
+    whole = named("viscous", "cubic_spring")
+    assert list(several._swapped(bench, first, whole, [whole])) == [["quadratic_drag", "cubic_spring"]]
+    assert tried == [("quadratic_drag", "cubic_spring")]
+    known = [whole, named("cubic_spring", "quadratic_drag")]
+    assert list(several._swapped(bench, first, whole, known)) == []

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from separatrix.discovery.decision import misfit
+from separatrix.discovery.decision import decide, misfit
 from separatrix.discovery.decision.decide import Decision, _without_name
 from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet
 from separatrix.discovery.fitting.base import limit_noise
@@ -58,11 +58,14 @@ def test_the_records_that_are_missed_are_named():
 
 
 @pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])
-def test_nothing_is_missing_only_if_all_records_are_explained(training, held_out, outcome):
+def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, training, held_out, outcome):
+    # without faults of a rig
+    monkeypatch.setattr(decide, "cleaned", lambda problem, fitted: fitted)
     bench = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
     first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
-    foretold = SimpleNamespace(fit=fit(1, held_out))
-    decision = Decision("none", [], [], [], [first], SimpleNamespace(p=0.5), foretold)
+    foretold = SimpleNamespace(problem=None, fit=fit(1, held_out))
+    gap = SimpleNamespace(p=0.5, fit=first.base.fit)
+    decision = Decision("none", [], [], [], [first], gap, foretold)
     assert _without_name(bench, decision).outcome == (outcome or "not-in-catalogue")
     assert bool(decision.reasons) == (not outcome)
 

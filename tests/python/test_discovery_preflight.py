@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.preflight import _check_velocity, prepare
 from separatrix.discovery.measured.records import Record, make_record
 from separatrix.discovery.measured.segments import padded
 from separatrix.discovery.workflow import _split
@@ -155,3 +155,20 @@ def test_channels_that_cannot_be_what_they_are_called_are_refused(channel, facto
     record = make_record("odd", {"t": t, "x": x, channel: factor * true[channel]}, {"phase": 0})
     with pytest.raises(SeparatrixError, match=words):
         prepare(record, Model.from_text(CASE))
+
+
+@pytest.mark.parametrize(("size", "accepted"), [(1.0, True), (-1.0, False)])
+def test_a_velocity_is_recognised_where_x_moves_less_than_its_noise_from_sample_to_sample(size, accepted):
+    """As 50 000 samples at 4 kHz with noise of 1 % of the motion."""
+    t = np.arange(50_000) / 4000
+    random = np.random.default_rng(3)
+    x = 0.8 + 0.2 * np.cos(RATE * t) + 2e-3 * random.standard_normal(t.size)
+    v = -0.2 * RATE * np.sin(RATE * t) + 2e-3 * RATE * random.standard_normal(t.size)
+    record = make_record("fast", {"t": t, "x": x, "v": size * v}, {"phase": 0})
+    notes = []
+    if accepted:
+        _check_velocity(record, notes)
+        assert notes == []
+    else:
+        with pytest.raises(SeparatrixError, match="'v' is not the velocity of 'x'"):
+            _check_velocity(record, notes)

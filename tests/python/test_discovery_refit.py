@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from separatrix.discovery.fitting import data as data_module
 from separatrix.discovery.fitting import refit
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
@@ -60,3 +61,36 @@ def test_a_start_from_afar_is_spared_where_the_base_leads(linear, added, chi2, f
     found = Fitted(("viscous",), None, SimpleNamespace(free=FREE), fit([9.0, 0.5], chi2), (1,))
     candidate = SimpleNamespace(linear=np.array([linear]))
     assert refit._enough(found, base, candidate, None) == enough
+
+
+@pytest.mark.parametrize(("both", "agreed"), [
+    ((300.0, 310.0), True),
+    ((102.0, 103.0), False),
+    ((300.0, 400.0), False),
+])  # fmt: skip
+def test_two_starts_that_end_alike_far_behind_the_base_are_enough(both, agreed):
+    """Though no other effect has converged yet."""
+    known = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 100.0), ())
+    one, other = (
+        Fitted(("viscous",), None, SimpleNamespace(free=FREE), fit([9.0, 0.5], chi2), (1,)) for chi2 in both
+    )
+    assert refit._agree({"near"}, one, other, known, None) == agreed
+
+
+@pytest.mark.parametrize(("others", "tried"), [(400.0, False), (101.0, True)])
+def test_segments_are_not_rescued_where_all_others_are_far_behind_a_rival(monkeypatch, others, tried):
+    asked = []
+
+    def rescued(problem, fit_, suspects, guesses, spread):
+        asked.append(len(guesses))
+        return fit_.starts, np.zeros(4, bool)
+
+    poor = fit([9.0, 0.5], 1.0)
+    poor.chi2[:] = [others, others, others, 9000.0]
+    monkeypatch.setattr(data_module, "rescued", rescued)
+    monkeypatch.setattr(data_module, "_without", lambda *_: poor)
+    records = SimpleNamespace(smoothed_starts=lambda _: poor.starts, smoothed_errors=lambda _: poor.starts)
+    found = data_module.polished(records, None, poor, 0, 8, rival=fit([8.0], 100.0))
+    assert found is poor
+    # of the fit, and of the machine of the others; from the smoother, and from the rival
+    assert asked == ([2, 2] if tried else [])

@@ -60,11 +60,11 @@ def test_one_motion_has_one_verdict_at_every_rate_of_sampling(effect):
 
 
 def candidate(training: float, left: float, samples: float, p: float = 0.0) -> Judged:
-    """An effect that gained so much and leaves so much, in chi^2, as no chance would."""
+    """An effect that gained so much and leaves so much in chi^2, by chance with a probability of `p`."""
     fit = SimpleNamespace(samples=samples, excess=left, sample_chi2=1 + left / samples)
     prediction = SimpleNamespace(excess=left)
     one = Judged(SimpleNamespace(fit=fit), prediction, training, training, np.zeros(0), 1)
-    one.ceiling = SimpleNamespace(p=p, closable=left)
+    one.ceiling = SimpleNamespace(p=p, closable=left if p < 0.01 else 0.0, fit=fit)
     return one
 
 
@@ -72,6 +72,21 @@ def test_a_gap_that_is_closed_but_for_a_hundredth_is_adequate_whatever_the_rest_
     """As 23854 to 1.14 at 20 000 samples; what leaves a tenth does not."""
     assert adequate(candidate(training=1e8, left=2800, samples=20_000), Options())
     assert not adequate(candidate(training=1e5, left=28_000, samples=20_000), Options())
+
+
+def test_noise_that_is_larger_than_it_was_said_to_be_is_no_gap():
+    """As velocities of a sensor that is not quite linear: no force explains what is left."""
+    assert adequate(candidate(training=512, left=400, samples=2400, p=0.02), Options())
+    assert not adequate(candidate(training=512, left=400, samples=2400, p=1e-3), Options())
+    assert not adequate(candidate(training=512, left=3000, samples=2400, p=0.02), Options())
+
+
+def test_what_is_left_over_is_no_trifle_beside_an_effect_that_explains_less():
+    """As a second mode of 0.05 of the noise, of which further harmonics of the drive explain a little."""
+    assert not adequate(candidate(training=26, left=159, samples=64_402), Options())
+    assert adequate(candidate(training=100, left=159, samples=64_402), Options())
+    # what chance leaves is nothing, however little the effect explains
+    assert adequate(candidate(training=26, left=159, samples=64_402, p=0.1), Options())
 
 
 def test_what_is_far_below_the_noise_of_a_sample_is_no_gap():

@@ -14,15 +14,20 @@ from separatrix.discovery.decision.rounds import Bench, Round, run_round
 from separatrix.discovery.decision.several import with_more
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
-from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted, shared_values
+from separatrix.discovery.fitting.rescue import suspicious
+from separatrix.discovery.fitting.rig import cleaned
+from separatrix.discovery.options import Options
 
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
 _RENEWALS = 3
 _LEADERS = 3
 _LOWER = 1.0
 _LOWER_SHARE = 0.01
+# segments that may be caught in a wrong minimum
+_CAUGHT = 3
 
 
 @dataclass
@@ -84,7 +89,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     if best.gates["adequate"]:
         return _conclude(bench, decision, best, rivals)
     if shaped is None and found is not first:
-        shaped = _shaped(bench, found)
+        shaped = _shaped(bench, found, first)
     if shaped is not None and not (_of_two_directions(shaped[0]) and bench.options.most_effects > 1):
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
@@ -116,10 +121,13 @@ def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
     return _conclude(bench, decision, *shaped)
 
 
-def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
-    """A family whose built-in shapes are wrong and that closes the gap as a function."""
+def _shaped(bench: Bench, found: Round, earlier: Round | None = None) -> tuple[Judged, list[Judged]] | None:
+    """A family whose built-in shapes are wrong and that closes the gap as a function.
+
+    What a function foretells is its proof: one that helps no held-out record only follows the fitted ones.
+    """
     base = ceiling(found.base.problem, found.base.fit, bench.scales.mass)
-    member = flexible_member(bench, found, base)
+    member = flexible_member(bench, found, base, earlier)
     if member is None:
         return None
     one, rivals = member
@@ -127,7 +135,10 @@ def _shaped(bench: Bench, found: Round) -> tuple[Judged, list[Judged]] | None:
     if not _detected(one):
         return None
     judge_ceiling(bench, one)
-    return member if one.gates["adequate"] and one.gates["admissible"] and one.gates["converged"] else None
+    needed = [
+        one.gates[gate] for gate in ("adequate", "admissible", "converged", "hold-out") if gate in one.gates
+    ]
+    return member if all(needed) else None
 
 
 def _of_two_directions(one: Judged) -> bool:
@@ -188,17 +199,18 @@ def renewed(bench: Bench, first: Round, settled: bool = False) -> Fitted | None:
     """
     base = first.base
     lowest_misfit = sorted(first.judged, key=lambda one: -one.training)[:_LEADERS]
-    best = next((one for one in first.judged if one.fitted.fit.converged), None)
-    if best is None:
+    if not lowest_misfit:
         return None
-    changed = not settled and _noise_renewed(bench, best)
+    best = next((one for one in first.judged if one.settled), None)
+    changed = best is not None and not settled and _noise_renewed(bench, best)
     fits = [minimise(base.problem, base.fit.values, base.fit.starts, patient=True)]
     for one in lowest_misfit:
         values = shared_values(base, one.fitted)
         fits.append(minimise(base.problem, values, one.fitted.fit.starts))
     fits = [fit for fit in fits if fit.good.sum() >= fits[0].good.sum()]
     lowest = min(fits, key=lambda fit: fit.total)
-    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * best.training):
+    led = (best or lowest_misfit[0]).training
+    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * led):
         return None
     return Fitted(base.names, base.model, base.problem, lowest, base.added)
 
@@ -241,7 +253,8 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
 def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:
     """Effects stand out of chance, but none is all that is missing."""
     base = decision.rounds[0].base
-    told = sizeable(2 * best.training, base.fit, bench.options)
+    # over a base that is not at its minimum a gain may be its own
+    told = base.fit.converged and sizeable(2 * best.training, base.fit, bench.options)
     if told or any(_gap_of_base(bench, decision)):
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
@@ -258,12 +271,25 @@ def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:
 
 
 def _gap_of_base(bench: Bench, decision: Decision) -> tuple[list[str], bool]:
-    """The records that the base machine misses, and whether a flexible force explains what is no trifle."""
+    """The records that the base machine misses, and whether a flexible force explains what is no trifle.
+
+    Small faults of a rig count as noise. What a few segments carry that are followed far worse than all
+    others may be a wrong minimum of theirs.
+    """
     base = decision.rounds[0].base
-    fits = [(bench.training, base)]
+    fits = [(bench.training, decision.base_ceiling.fit)]
     if bench.held_out is not None and decision.foretold is not None:
-        fits.append((bench.held_out, decision.foretold))
-    left = [one for data, fitted in fits for one in missed(data, fitted.fit, bench.options)]
-    gap = decision.base_ceiling
-    significant = gap.p < bench.options.gap_share * bench.options.detection_level
-    return left, significant and sizeable(gap.closable, base.fit, bench.options)
+        fits.append((bench.held_out, cleaned(decision.foretold.problem, decision.foretold.fit)))
+    left = [one for data, fit in fits for one in missed(data, fit, bench.options)]
+    wide = _wide(decision.base_ceiling, base.fit, bench.options)
+    caught = suspicious(base.fit) if wide else np.zeros(0, int)
+    if 0 < caught.size <= _CAUGHT:
+        others = without_segments(base.fit, caught)
+        wide = _wide(ceiling(base.problem, others, bench.scales.mass), others, bench.options)
+    return left, wide
+
+
+def _wide(gap: Ceiling, fit: Fit, options: Options) -> bool:
+    """Whether a flexible force explains more than chance and what is no trifle."""
+    significant = gap.p < options.gap_share * options.detection_level
+    return significant and sizeable(gap.closable, fit, options)

@@ -4,30 +4,42 @@
 
 from collections.abc import Iterator
 
-from separatrix.discovery.decision.judge import Judged, admissible, lead, margin
+from separatrix.discovery.decision.judge import Judged, admissible, clear_of, margin
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.refit import WORSE, Fitted
+from separatrix.discovery.fitting.refit import WORSE, Fitted, gain_over
 from separatrix.library import effects
 
 # share of the best evidence, or of what free forces explain, from which on a family is tried
 _PROMISING = 0.3
 # share of a gap that more knots must leave for still more to be tried, though they are not worth it yet
 _SATURATED = 0.8
+# the same for a table that is far behind a closed form; share that a table leaves of a gap it does not close
+_SLOW = 0.5
+_LEFT = 0.5
+# log-likelihood by which a table is far behind
+_FAR_BEHIND = 30.0
 
 
-def flexible_member(bench: Bench, found: Round, ceiling: Ceiling) -> tuple[Judged, list[Judged]] | None:
-    """The best family as a function, and its rivals of other families; or None."""
-    fitted = [one for member in _promising(bench, found, ceiling) for one in best_table(bench, found, member)]
+def flexible_member(
+    bench: Bench, found: Round, ceiling: Ceiling, earlier: Round | None = None
+) -> tuple[Judged, list[Judged]] | None:
+    """The best family as a function, and its rivals of other families; or None.
+
+    Tables that left most of the gap in an `earlier` round of the same records are not fitted again.
+    """
+    far = _far_tables(earlier) if earlier is not None else set()
+    members = [one for one in _promising(bench, found, ceiling) if one.effect not in far]
+    fitted = [one for member in members for one in best_table(bench, found, member)]
     if not fitted:
         return None
     able = [one for one in fitted if admissible(one, found.base, bench.options)[0]]
     best = max(able or fitted, key=lambda one: one.evidence)
     family = effects()[best.name].family
     others = [one for one in [*found.judged, *fitted] if effects()[one.name].family != family]
-    return best, [one for one in others if lead(best, one) < margin(best, one, bench.options)]
+    return best, [one for one in others if not clear_of(best, one, bench.options)]
 
 
 def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
@@ -48,6 +60,17 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
         if share > _PROMISING:
             shares[member] = share
     return sorted(shares, key=lambda member: -shares[member])
+
+
+def _far_tables(found: Round) -> set[str]:
+    """Tables of a round that leave most of the gap on as many knots as they got."""
+    gap = max(0.0, found.base.fit.excess)
+    closing: dict[str, bool] = {}
+    for effect, _, _, one in found.tables:
+        if one is not None:
+            best = min(fit.fit.excess for fit in (one.fitted, one.fitted.finer) if fit is not None)
+            closing[effect] = closing.get(effect, False) or best < _LEFT * gap
+    return {effect for effect, closes in closing.items() if not closes}
 
 
 def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) -> Iterator[Judged]:
@@ -73,6 +96,9 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
     """The table of a family, from a `known` machine."""
     best = None
     seen = member.seen(known)
+    ahead = max(
+        (one.fitted for one in found.judged if one.fitted.fit.converged), default=None, key=_closeness
+    )
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in KNOTS:
             knots = knots_at(member, seen, count)
@@ -86,7 +112,7 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
                 # more knots than these records can tell apart, no function, or one far from its shape yet
                 if best is not None and made.fit.total < best.fitted.fit.total + WORSE:
                     best.fitted.finer = made
-                if count > KNOTS[0] and _saturated(known, made):
+                if count > KNOTS[0] and _pointless(known, made, ahead):
                     break
                 known = min(known, made, key=lambda one: one.fit.excess)
                 if strict:
@@ -96,20 +122,31 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
             one = found.judge(made, bench.foretell(made, found.foretold))
             if best is not None and one.evidence < best.evidence + margin(best, one, bench.options):
                 best.fitted.finer = made
-                if _saturated(best.fitted, made):
+                if _pointless(best.fitted, made, ahead):
                     break
                 # far from its shape yet: it follows the fitted records and foretells no others
                 continue
+            slow = best is not None and _pointless(best.fitted, made, ahead)
             best = one
+            if slow:
+                break
         if best is not None:
             known = best.fitted
     return best
 
 
-def _saturated(one: Fitted, more: Fitted) -> bool:
-    """Whether more knots leave nearly as much of a gap, or there is none left."""
+def _closeness(one: Fitted) -> float:
+    return -one.fit.excess
+
+
+def _pointless(one: Fitted, more: Fitted, ahead: Fitted | None) -> bool:
+    """Whether more knots leave nearly as much of a gap, or there is none left.
+
+    Where a closed form is far ahead, most of it is nearly as much.
+    """
     before, after = (max(0.0, fitted.fit.excess) for fitted in (one, more))
-    return after >= _SATURATED * before
+    far = ahead is not None and gain_over(more, ahead)[0] < -_FAR_BEHIND
+    return after >= (_SLOW if far else _SATURATED) * before
 
 
 def _begun(found: Round, family: str) -> Fitted:

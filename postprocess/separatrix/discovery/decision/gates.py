@@ -8,11 +8,10 @@ from separatrix.discovery.decision.judge import (
     Judged,
     adequate,
     admissible,
+    clear_of,
     detection,
     held_out_bounds,
     judged,
-    lead,
-    margin,
     sizeable,
     stable,
 )
@@ -20,6 +19,7 @@ from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.rig import share_beside_faults
 from separatrix.discovery.options import Options
 
 
@@ -40,20 +40,21 @@ def choice(
 
 
 def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
-    """Return the converged candidate of most evidence, and all that it does not beat clearly for its misfit.
+    """Return the settled candidate of most evidence, and all that it does not beat clearly for its misfit.
 
-    A fit that has not converged may not be named, but what it gained so far may stand against a name.
+    A fit that is not at its end may not be named, but what it gained so far may stand against a name.
     """
     order = sorted(pool, key=lambda one: -one.evidence)
-    best = next((one for one in order if one.fitted.fit.converged), order[0])
-    return best, [one for one in order if one is not best and lead(best, one) < margin(best, one, options)]
+    best = next((one for one in order if one.settled), order[0])
+    return best, [one for one in order if one is not best and not clear_of(best, one, options)]
 
 
 def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
     """Set the p value of a candidate and every gate but the adequacy."""
     options = bench.options
+    best.own = share_beside_faults(best.fitted, base)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
-    best.gates["converged"] = best.fitted.fit.converged
+    best.gates["converged"] = best.settled
     best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
@@ -66,10 +67,10 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
 
 def _of_some_size(best: Judged, options: Options) -> bool:
     """Whether what an effect explains, where it was fitted or foretold, is no fault of a rig."""
-    seen = sizeable(2 * best.training, best.fitted.fit, options, options.least_effect)
+    seen = sizeable(2 * best.own * best.training, best.fitted.fit, options, options.least_effect)
     if best.prediction is None:
         return seen
-    return seen or sizeable(2 * best.held_out, best.prediction.fit, options, options.least_effect)
+    return seen or sizeable(2 * best.own * best.held_out, best.prediction.fit, options, options.least_effect)
 
 
 def judge_ceiling(bench: Bench, one: Judged) -> None:

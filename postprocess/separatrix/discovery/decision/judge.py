@@ -9,8 +9,9 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.heldout import Prediction, ahead, gained
+from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
 from separatrix.discovery.fitting.refit import Fitted, gain_over
+from separatrix.discovery.fitting.rig import share_beside_faults
 from separatrix.discovery.options import Options
 from separatrix.library import effects
 
@@ -19,6 +20,8 @@ _BLOCKS = 2
 _FEW = 5
 # share of the mean information on an effect below which a segment says nothing of it
 _SILENT = 0.01
+# share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
+_KINK_SHARE = 0.01
 
 
 @dataclass
@@ -34,11 +37,20 @@ class Judged:
     p: float = 1.0
     gates: dict[str, bool] = field(default_factory=dict)
     ceiling: Ceiling | None = None
+    # share of the gain that small faults of a rig do not explain
+    own: float = 1.0
 
     @property
     def name(self) -> str:
         """The effect that was added last."""
         return self.fitted.names[-1]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the fit is at its end: converged, or at a kink from where little of the gain is missing."""
+        fit = self.fitted.fit
+        kink = fit.exhausted and not fit.caught and fit.decrement < _KINK_SHARE * 2 * self.training
+        return bool(fit.converged or kink)
 
     @property
     def evidence(self) -> float:
@@ -53,7 +65,7 @@ def judged(
     training, _ = gain_over(fitted, base)
     parts = np.zeros(0)
     if prediction is not None and foretold is not None:
-        parts = gained(prediction, foretold)
+        parts = gained_together(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
     return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
 
@@ -67,8 +79,12 @@ def lead(one: Judged, other: Judged) -> float:
 
 
 def detection(one: Judged, tested: float, inflation: float) -> float:
-    """Family-wise p value of what a candidate gained, for candidates worth so many independent tests."""
-    return family_wise(2 * (one.training + one.held_out) / inflation, one.parameters, tested)
+    """Family-wise p value of what a candidate gained, for candidates worth so many independent tests.
+
+    What small faults of the rig may explain of it is no gain.
+    """
+    gained = one.own * (one.training + one.held_out)
+    return family_wise(2 * gained / inflation, one.parameters, tested)
 
 
 def family_wise(gain: float, parameters: int, tested: float) -> float:
@@ -172,6 +188,19 @@ def _together_clear(fitted: Fitted, places: list[int]) -> bool:
     return bool(values @ information @ values > chi2.ppf(0.95, len(places)))
 
 
+def clear_of(best: Judged, other: Judged, options: Options) -> bool:
+    """Whether a candidate beats another one clearly, also where that is given small faults of the rig.
+
+    Records that were fitted and records that were not must not clearly contradict each other.
+    """
+    least = margin(best, other, options)
+    over = lead(best, other)
+    fitted = best.training - best.parameters - (other.training - other.parameters)
+    if over < least or min(fitted, over - fitted) <= -least:
+        return False
+    return over * share_beside_faults(best.fitted, other.fitted) >= least
+
+
 def margin(best: Judged, other: Judged, options: Options) -> float:
     """Evidence by which a candidate must beat another one: more where the two are names of one motion."""
     scale = options.separation * max(1.0, best.fitted.fit.reduced_chi2)
@@ -211,14 +240,20 @@ def adequate(one: Judged, options: Options) -> bool:
     """Whether what is left is noise, or little of a gap that was closed nearly all.
 
     Either it is no more than a share of the gap, however significant, or the fit is like noise and a flexible
-    force explains nothing more that is sizeable.
+    force explains nothing more, or less than the effect does and nothing that is sizeable; or it explains
+    nothing more of what is somewhat more than noise. Small faults of a rig count as noise.
     """
-    fit = one.fitted.fit
+    fit = one.ceiling.fit
     gained = max(0.0, 2 * one.training)
     share = gained / max(gained + one.ceiling.closable, 1e-300)
-    clean = one.ceiling.p > options.detection_level or not sizeable(one.ceiling.closable, fit, options)
+    trifle = share > 0.5 and not sizeable(one.ceiling.closable, fit, options)
+    clean = one.ceiling.p > options.detection_level or trifle
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
-    return bool((fit.sample_chi2 <= options.adequate_chi2 and (clean or closed)) or _all_closed(one, options))
+    if fit.sample_chi2 <= options.adequate_chi2 and (clean or closed):
+        return True
+    # no force explains more: the noise is larger than it was said or measured to be
+    noisier = one.ceiling.p > options.detection_level and share >= options.adequate_share
+    return bool((noisier and fit.sample_chi2 <= options.missed_chi2) or _all_closed(one, options))
 
 
 def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None) -> bool:
@@ -229,8 +264,7 @@ def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None
 
 def _all_closed(one: Judged, options: Options) -> bool:
     """Whether the gap is closed but for a share that has another reason, where it was fitted and foretold."""
-    fit = one.fitted.fit
-    left = max(one.ceiling.closable, fit.excess, 0.0)
+    left = max(one.ceiling.closable, one.ceiling.fit.excess, 0.0)
     if left > options.remaining * (2 * one.training + left):
         return False
     if one.prediction is None:

@@ -42,14 +42,13 @@ class Bench:
     options: Options
 
     def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
-        """Score the held-out records; the starts that an `other` prediction found there are tried too."""
+        """Score the held-out records; from where an `other` prediction ended there, too."""
         if self.held_out is None:
             return None
         free, fit = fitted.problem.free, fitted.fit
-        guess = None if other is None else other.fit.starts
         misfit = max(1.0, fit.reduced_chi2)
         known = Known(fit.values, fitted.covariance, fitted.unseen)
-        return predict(self.held_out, fitted.model, free, known, misfit, guess)
+        return predict(self.held_out, fitted.model, free, known, misfit, other)
 
 
 @dataclass
@@ -122,7 +121,7 @@ def run_round(
             known.get(name),
         )
         # what is far behind a machine that leaves only noise and foretells need not foretell
-        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, foretold)
+        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, _leading(found))
         found.judged.append(_simplest(bench, found, found.judge(fitted, told)))
         fitted = found.judged[-1].fitted
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
@@ -167,10 +166,16 @@ def _simplest(bench: Bench, found: Round, whole: Judged) -> Judged:
     if whole.prediction is None and bench.held_out is not None:
         return best
     for part, fitted in halves(bench.training, found.base, found.candidates[whole.name], whole.fitted):
-        one = found.judge(fitted, bench.foretell(fitted, found.foretold))
+        one = found.judge(fitted, bench.foretell(fitted, whole.prediction))
         if one.evidence > best.evidence:
             best, found.candidates[whole.name] = one, part
     return best
+
+
+def _leading(found: Round) -> Prediction | None:
+    """What foretells the held-out records best so far: its starts there are the nearest."""
+    told = [one for one in found.judged if one.prediction is not None and one.held_out > 0]
+    return max(told, key=lambda one: one.held_out).prediction if told else found.foretold
 
 
 def _out_of_race(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """More than one effect: found one by one, fitted jointly, and each held against leaving it out."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+
+import numpy as np
 
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
 from separatrix.discovery.decision.judge import Judged, admissible, judged
@@ -13,17 +15,21 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, hopeless, refit
 from separatrix.discovery.fitting.screen import screen, signature
+from separatrix.library import effects
 
 _PAIRS = 6
 # share of what is left of the gap that an effect must close for another one to be looked for on top of it
 _CLOSES = 0.5
+# share of the evidence of an effect alone from which on another of its family is tried in its place
+_SHARE = 0.3
 
 
 def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, list[Judged], bool]:
     """The best several effects, their rivals, and whether they close the gap together.
 
     On top of the best effect a second is tried, and the pairs that the screen finds; then a third, and so on,
-    as long as each is needed and closes most of what was left. The rounds are added to `rounds`.
+    as long as each is needed and closes most of what was left. Each is held against others of its family in
+    its place. The rounds are added to `rounds`.
     """
     first, found = rounds[0], best
     close: list[Judged] = []
@@ -32,12 +38,15 @@ def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, 
         if not grown:
             break
         larger, close = choice(bench, first.base, first.foretold, grown, foremost)
+        swapped = [*_swapped(bench, first, larger, grown)]
+        if swapped:
+            larger, close = choice(bench, first.base, first.foretold, [*grown, *swapped], foremost)
         pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
         judge_ceiling(bench, larger)
         larger.gates["drop"] = _all_needed(bench, first, larger, found)
         if larger.gates["adequate"] and larger.gates["drop"]:
             return larger, close, True
-        if not (larger.gates["drop"] and larger.fitted.fit.converged and _closes_most(found, larger)):
+        if not (larger.gates["drop"] and larger.settled and _closes_most(found, larger)):
             break
         found = larger
     return found, close, False
@@ -61,6 +70,25 @@ def _grown(bench: Bench, rounds: list[Round], found: Judged) -> list[Judged]:
                 sets.append(over_base(bench, first.base, first.foretold, made))
                 tried.add(frozenset(pair))
     return sets
+
+
+def _swapped(bench: Bench, first: Round, whole: Judged, tried: list[Judged]) -> Iterator[Judged]:
+    """The set with one effect in the place of another of its family, where nobody tried that."""
+    known = {frozenset(one.fitted.names) for one in tried}
+    alone = {one.name: one for one in first.judged}
+    for name in whole.fitted.names:
+        rest = [other for other in whole.fitted.names if other != name]
+        least = _SHARE * alone[name].evidence if name in alone else -np.inf
+        for one in first.judged:
+            of_family = effects()[one.name].family == effects()[name].family
+            if one.name in whole.fitted.names or not of_family or one.evidence < least:
+                continue
+            if frozenset([one.name, *rest]) in known:
+                continue
+            made = fit_set(bench, first, [one.name, *rest])
+            swapped = None if made is None else over_base(bench, first.base, first.foretold, made)
+            if swapped is not None and admissible(swapped, first.base, bench.options)[0]:
+                yield swapped
 
 
 def _closes_most(before: Judged, after: Judged) -> bool:

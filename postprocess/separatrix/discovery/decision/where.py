@@ -8,20 +8,24 @@ projected out. Its error comes from resampling blocks of segments; flags are cor
 (Benjamini and Hochberg).
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
 from separatrix.discovery.fitting.motions import after_impacts, scaled_motion
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns
+from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.options import Options
 from separatrix.discovery.wording import Units, units_of
 
 _LEVEL = 0.01
 _BLOCK = 2
+# share of what the best map explains from which on another tells as much
+_NEARLY = 0.8
 
 
 @dataclass
@@ -63,6 +67,7 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     columns = force_columns(problem, fit, np.concatenate(tables, axis=2), mass)
     force, error = _forces(fitted, columns, options)
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
+    flags &= _telling(fitted, columns, [member.shape[2] for member in tables])
     found, first = [], 0
     for name, unit, edges, other, member in maps:
         part = slice(first, first + member.shape[2])
@@ -143,6 +148,27 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
     formal = 1 / np.sqrt(whole_size)
     live = np.diag(total)[p:] > 0
     return np.where(live, force, 0.0), np.where(live, np.maximum(spread, formal), np.inf)
+
+
+def _telling(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
+    """Bins of the maps of which all bins together explain nearly as much as those of any other.
+
+    Where a motion repeats itself, the place, the speed and the phase of a missing force go together.
+    """
+    fit = fitted.fit
+    evaluation, weights = fit.evaluation, fit.evaluation.used * fit.good[:, None]
+    p = evaluation.by_parameter.shape[2]
+    whole = np.concatenate([evaluation.by_parameter, columns], axis=2)
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[
+        0
+    ].total()
+    left, score = project(matrix, gradient, p, ~fit.at_bound)
+    gains, edges = [], np.cumsum([0, *sizes])
+    for first, last in itertools.pairwise(edges):
+        part = slice(first, last)
+        step = solve_scaled(left[part, part], score[part], np.ones(last - first, bool))
+        gains.append(float(score[part] @ step) - (last - first))
+    return np.repeat(np.array(gains) >= _NEARLY * max(gains), sizes)
 
 
 def benjamini_hochberg(p: np.ndarray, level: float) -> np.ndarray:

@@ -18,6 +18,7 @@ from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knot
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns, kick_columns
+from separatrix.discovery.fitting.rig import cleaned
 from separatrix.discovery.fitting.screen import project
 
 _PIECES = 5
@@ -39,6 +40,8 @@ class Ceiling:
     """All families; `p` is corrected for their number."""
 
     families: list[Family]
+    # the fit that they were tried on: without what faults of a rig may explain
+    fit: Fit
 
     @property
     def p(self) -> float:
@@ -57,14 +60,15 @@ class Ceiling:
 
 
 def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
-    """Try every family on the residuals of a fit."""
+    """Try every family on what faults of a rig leave of the residuals of a fit."""
+    fit = cleaned(problem, fit)
     families = []
     for name, columns in _families(problem, fit, mass).items():
         gain, rank = _gain(fit, columns)
         families.append(Family(name, gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     gain, rank = _piecewise_gain(problem, fit, mass)
     families.append(Family("pieces", gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
-    return Ceiling(families)
+    return Ceiling(families, fit)
 
 
 def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:

@@ -116,7 +116,7 @@ def fit_member(
         values[paths.index(member.anchor)] = begun[0][0]
     problem = Problem(extended, data.prepared, data.stages[data.last], [*free, *added])
     fit = minimise(problem, values, known.fit.starts, most=40, patient=True)
-    fit = polished(data, problem, fit, data.last, 40)
+    fit = polished(data, problem, fit, data.last, 40, rival=base.fit)
     return Fitted(names, extended, problem, fit, place)
 
 

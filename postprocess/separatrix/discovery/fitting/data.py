@@ -26,6 +26,8 @@ _FEWEST = 10
 _FEW = 0.25
 # natural periods that a segment may last where the drive is slow
 _MOST_SWINGS = 1.5
+# squares by which a fit is far behind another, whatever its suspicious segments may gain
+_FAR_BEHIND = 60.0
 # standard errors of the speed within which a body may be at rest
 _SLOW = 3.0
 
@@ -171,8 +173,12 @@ def fit_stages(
     hopeless: float | None = None,
     begin: tuple[int, Fit] | None = None,
     fixed: np.ndarray | None = None,
+    rival: Fit | None = None,
 ) -> tuple[Problem, Fit]:
-    """Fit at each stage in turn, from short segments to long ones: Huber's loss, then squares at the last."""
+    """Fit at each stage in turn, from short segments to long ones: Huber's loss, then squares at the last.
+
+    The starts of a `rival` at the last stage are tried for suspicious segments, unless it is far ahead.
+    """
     known = begin
     problem, fit = None, None
     for stage in stages:
@@ -190,7 +196,7 @@ def fit_stages(
         known = (stage, fit)
     if hopeless is not None and fit.far_off(hopeless):
         return problem, fit
-    return problem, polished(data, problem, fit, stages[-1], most, fixed)
+    return problem, polished(data, problem, fit, stages[-1], most, fixed, rival=rival)
 
 
 def polished(
@@ -200,11 +206,15 @@ def polished(
     stage: int,
     most: int,
     fixed: np.ndarray | None = None,
-    guesses: tuple[np.ndarray, ...] = (),
+    rival: Fit | None = None,
     suspects: np.ndarray | None = None,
 ) -> Fit:
-    """The fit after its suspicious segments, or those given, were tried by the machine of the others."""
-    tried = [data.smoothed_starts(stage), *guesses]
+    """The fit after its suspicious segments, or those given, were tried by the machine of the others.
+
+    The starts of a `rival`, a fit of the same segments, are tried too. Where the machine of the others is far
+    behind it on these, the suspects are not what the fit lacks.
+    """
+    tried = [data.smoothed_starts(stage), *([] if rival is None else [rival.starts])]
     errors = data.smoothed_errors(stage)
     if suspects is None:
         suspects = suspicious(fit)
@@ -213,6 +223,8 @@ def polished(
     versions = [fit]
     if suspects.size <= _FEW * fit.counts.size:
         versions.append(_without(problem, fit, suspects, most, fixed))
+        if rival is not None and _behind(versions[-1], rival, suspects):
+            return fit
     best = fit
     for version in versions:
         starts, improved = rescued(problem, version, suspects, tried, errors)
@@ -221,6 +233,13 @@ def polished(
             if found.good.sum() >= best.good.sum() and found.total < best.total:
                 best = found
     return best
+
+
+def _behind(fit: Fit, rival: Fit, suspects: np.ndarray) -> bool:
+    """Whether a fit is far behind another one on all but the suspects."""
+    both = fit.good & rival.good
+    both[suspects] = False
+    return bool((fit.chi2 - rival.chi2)[both].sum() > _FAR_BEHIND + fit.decrement)
 
 
 def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:

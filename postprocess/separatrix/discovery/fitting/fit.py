@@ -305,6 +305,13 @@ def blocking(problem: Problem, values: np.ndarray, starts: np.ndarray) -> np.nda
     return np.flatnonzero((lost > promised) | trial.failed)
 
 
+def without_segments(fit: Fit, rows: np.ndarray) -> Fit:
+    """The same fit without what it says of some segments, which are no good ones."""
+    steady = fit.evaluation.steady.copy()
+    steady[rows] = False
+    return replace(fit, evaluation=replace(fit.evaluation, steady=steady))
+
+
 def again(problem: Problem, fit: Fit) -> Fit:
     """The same values and starts, evaluated with the noise as it is known now."""
     current = problem.evaluate(fit.values, fit.starts)

@@ -45,7 +45,7 @@ def halves(
         values = np.array([known[one.path, one.record] for one in kept])
         problem = Problem(model, data.prepared, data.stages[data.last], kept)
         fit = minimise(problem, values, whole.fit.starts)
-        fit = polished(data, problem, fit, data.last, 8, guesses=(whole.fit.starts,))
+        fit = polished(data, problem, fit, data.last, 8, rival=whole.fit)
         if fit.converged:
             yield part, Fitted(candidate.names, model, problem, fit, part.added, whole.tries)
 

@@ -82,11 +82,11 @@ def predict(
     free: list[Free],
     known: Known,
     misfit: float = 1.0,
-    guess: np.ndarray | None = None,
+    guess: Prediction | None = None,
 ) -> Prediction:
     """Score held-out records by a machine as far as it is known, of the given `misfit` in training.
 
-    `guess`: starts of segments that another machine found there, tried too.
+    `guess`: what another machine foretold there, whose starts, crank and clock are tried too.
     """
     shared = [i for i, one in enumerate(free) if one.record is None]
     whole = on_other_records(free, data.prepared)
@@ -99,6 +99,21 @@ def predict(
     used = known.covariance[np.ix_(shared, shared)]
     score = _scores(fit.chi2, fit.reduced.matrix, fit.reduced.gradient, used)
     return Prediction(score, fit.good, problem.segments.record, problem, fit, misfit, used)
+
+
+def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
+    """What `one` foretells better by segment, so that the sum is that of all segments together.
+
+    What a common error of the parameters costs or gains in every segment is shared out among them.
+    """
+    parts = gained(one, other)
+    seen = parts != 0
+    whole = ahead(one, other, other.misfit)
+    if not other.fit.converged:
+        # it might foretell so much better
+        whole -= min(max(0.0, whole), 0.5 * other.fit.decrement)
+    common = whole - parts.sum()
+    return parts + seen * common / max(1, np.count_nonzero(seen))
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
@@ -114,14 +129,15 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
     return np.where(one.good & other.good, parts, 0.0)
 
 
-def ahead(one: Prediction, other: Prediction) -> float:
+def ahead(one: Prediction, other: Prediction, misfit: float | None = None) -> float:
     """What `one` foretells better than `other` in all, in units of log density.
 
     Where both leave only noise, the density is that of all segments together: a parameter that is hardly
-    known errs in all of them alike, which counts once.
+    known errs in all of them alike, which counts once. The larger misfit of both chooses the measure, or one
+    that is given.
     """
     both = one.good & other.good
-    if max(one.misfit, other.misfit) > _MISFIT:
+    if (max(one.misfit, other.misfit) if misfit is None else misfit) > _MISFIT:
         return float(0.5 * (other.fit.chi2 - one.fit.chi2)[both].sum())
     return _density(one, both) - _density(other, both)
 
@@ -136,7 +152,7 @@ def _density(one: Prediction, rows: np.ndarray) -> float:
 
 
 def _fit_own(
-    data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray, guess: np.ndarray | None
+    data: Data, model, free: list[Free], values: np.ndarray, fixed: np.ndarray, guess: Prediction | None
 ) -> Fit:
     """Fit what belongs to the records; the rest is written into the machine and not differentiated by."""
     known = [(one, value) for one, value, settled in zip(free, values, fixed, strict=True) if settled]
@@ -148,16 +164,30 @@ def _fit_own(
     fit = None
     if guess is not None:
         problem = Problem(settled, data.prepared, data.stages[-1], kept)
-        fit = minimise(problem, values[own], guess, most=12, fixed=fixed[own])
+        led = _records_own(guess, kept, values[own])
+        fit = minimise(problem, led, guess.fit.starts, most=12, fixed=fixed[own])
     # a guess that leads all segments to a minimum needs no way from short ones
     if fit is None or not fit.converged or suspicious(fit).size:
         stages = list(range(len(data.stages)))
-        _, other = fit_stages(data, settled, kept, values[own], stages=stages, most=12, fixed=fixed[own])
+        problem, other = fit_stages(
+            data, settled, kept, values[own], stages=stages, most=12, fixed=fixed[own]
+        )
         if fit is None or other.good.sum() > fit.good.sum() or other.total < fit.total:
             fit = other
+    if not fit.converged:
+        more = minimise(problem, fit.values, fit.starts, fixed=fixed[own], patient=True)
+        if more.good.sum() >= fit.good.sum() and more.total < fit.total:
+            fit = more
     found = values.copy()
     found[own] = fit.values
     return replace(fit, values=found, movable=~fixed)
+
+
+def _records_own(guess: Prediction, free: list[Free], values: np.ndarray) -> np.ndarray:
+    """Values of what belongs to the records as another machine has them, those given where it has none."""
+    pairs = zip(guess.problem.free, guess.fit.values, strict=True)
+    known = {(one.path, one.record): value for one, value in pairs if one.record is not None}
+    return np.array([known.get((one.path, one.record), own) for one, own in zip(free, values, strict=True)])
 
 
 def _with(model, known: list[tuple[Free, float]]):

@@ -85,7 +85,7 @@ def refit(
     worse after its first start is not tried further. A fit `known` from another noise is carried on, and
     tried from the base of now where it is neither good nor out of the race.
     """
-    best = None
+    best, led = None, "known"
     if known is not None:
         best = carried_on(data, candidate, known)
         out = best.fit.far_off(hopeless(base)) or (rival is not None and beaten(best, rival))
@@ -97,18 +97,20 @@ def refit(
         tried = values.copy()
         tried[list(candidate.added)] = start
         if best is None and settled:
-            problem, fit = _try(data, base, candidate, "linear", tried, 8, rival.fit.total)
+            kind = "linear"
+            problem, fit = _try(data, base, candidate, kind, tried, 8, rival.fit.total)
             rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
             if beaten(rough, rival):
                 return rough
         else:
             problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
-        if not fit.far_off(hopeless(base)):
-            fit = polished(data, problem, fit, data.last, 8, guesses=(base.fit.starts,))
+        if kind == "linear" and not fit.far_off(hopeless(base)):
+            # of other kinds it was done with the last stage
+            fit = polished(data, problem, fit, data.last, 8, rival=base.fit)
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        agreed = best is not None and _agree(kind, found, best, base, rival)
+        agreed = best is not None and _agree({kind, led}, found, best, base, rival)
         if best is None or _better(found, best):
-            best = found
+            best, led = found, kind
         best.tries = tries
         if agreed:
             break
@@ -211,20 +213,21 @@ def _same_minimum(one: Fitted, other: Fitted) -> bool:
     return bool(both and abs(gain_over(one, other)[0]) < max(WORSE, _SAME * one.fit.total))
 
 
-def _agree(kind: str, one: Fitted, other: Fitted, base: Fitted, rival: Fitted | None) -> bool:
+def _agree(kinds: set[str], one: Fitted, other: Fitted, base: Fitted, rival: Fitted | None) -> bool:
     """Whether two starts of one candidate make another one needless.
 
-    They led to the same minimum, one from afar; or both are hopeless, or alike and far behind a converged
-    rival.
+    They led to the same minimum, one from afar; or both are hopeless, or alike and far behind the base or a
+    converged rival.
     """
-    if kind == "far" and _same_minimum(one, other):
+    if "far" in kinds and _same_minimum(one, other):
         return True
     if one.fit.far_off(hopeless(base)) and other.fit.far_off(hopeless(base)):
         return True
     alike = abs(one.fit.total - other.fit.total) < _ALIKE * one.fit.total
-    if not alike or rival is None or not rival.fit.converged:
-        return False
-    return all(gain_over(fitted, rival)[0] < -2 * _BEATEN for fitted in (one, other))
+    known = [base] if rival is None or not rival.fit.converged else [base, rival]
+    return alike and any(
+        all(gain_over(fitted, ahead)[0] < -2 * _BEATEN for fitted in (one, other)) for ahead in known
+    )
 
 
 def _better(one: Fitted, other: Fitted) -> bool:
@@ -263,8 +266,8 @@ def _try(
         stages = list(range(data.last + 1))
         nominal = np.array([one.value for one in candidate.free])
         values = np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
-    most, limit = min(most, 12), hopeless(base)
-    return fit_stages(data, candidate.model, candidate.free, values, stages=stages, most=most, hopeless=limit)
+    more = {"most": min(most, 12), "hopeless": hopeless(base), "rival": base.fit}
+    return fit_stages(data, candidate.model, candidate.free, values, stages=stages, **more)
 
 
 def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
@@ -273,7 +276,7 @@ def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fit
     added = list(candidate.added)
     values[added] = one.fit.values[list(one.added)]
     fit = minimise(one.problem, values, other.fit.starts, most=15)
-    fit = polished(data, one.problem, fit, data.last, 8, guesses=(one.fit.starts,))
+    fit = polished(data, one.problem, fit, data.last, 8, rival=one.fit)
     found = Fitted(one.names, one.model, one.problem, fit, one.added, one.tries + 1)
     return found if _better(found, one) else one
 

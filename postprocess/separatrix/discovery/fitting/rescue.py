@@ -12,8 +12,9 @@ from separatrix.discovery.fitting.problem import Problem
 _SUSPECT = 1.7
 _MOST_SEGMENTS = 12
 _ITERATIONS = 15
-# starts of one segment with the same number of impacts that are followed
+# starts of one segment with the same number of impacts that are followed, and how many such numbers
 _FOLLOWED = 2
+_NUMBERS = 4
 _LEAST_GAIN = 0.01
 _STRONGEST = 1e3
 # starts tried, in standard errors of the smoother
@@ -62,13 +63,16 @@ def rescued(
 
 
 def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
-    """The best tries of each segment, those with one number of impacts apart from those with another."""
+    """The best tries of each segment, those with one number of impacts apart from those with another.
+
+    Numbers of impacts whose best try is behind those of several others are left out.
+    """
     cost = _cost(evaluation)
     hits = evaluation.hits
     kept = []
     for first in range(0, cost.size, tries):
         mine = first + np.argsort(cost[first : first + tries], kind="stable")
-        for count in np.unique(hits[mine]):
+        for count in list(dict.fromkeys(hits[mine]))[:_NUMBERS]:
             kept.extend(mine[hits[mine] == count][:_FOLLOWED])
     return np.sort([one for one in kept if np.isfinite(cost[one])]).astype(int)
 

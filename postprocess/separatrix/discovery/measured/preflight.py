@@ -22,6 +22,10 @@ _UNEVEN = 1e-2
 _MOST_RATIO = 50.0
 # of the velocity over the slope of the position, beyond which its unit must be wrong
 _UNIT = 2.0
+# samples by which x may lag behind v; correlation of v and the slope of x that needs no blocks of samples to
+# be seen, and how many blocks are left at least
+_MOST_LAG = 4
+_ALIKE, _FEWEST_BLOCKS = 0.9, 400
 # error of a crank angle [rad] that is that of its digits
 _EXACT = 1e-9
 # of the scatter of a crank angle over its stated noise that is told
@@ -323,17 +327,23 @@ def check_velocity(record: Record, notes: list[str]) -> None:
     """Compare v with the slope of x: another quantity, another unit, a delay."""
     if np.ptp(record.v) == 0:
         raise SeparatrixError(f"{record.file}: 'v' is constant")
-    dt = record.interval
-    slope = np.gradient(record.x, record.t)
-    shifts = np.arange(-4, 5)
     inner = slice(8, -8)
-    overlap = [float(np.corrcoef(np.roll(record.v, shift)[inner], slope[inner])[0, 1]) for shift in shifts]
-    best = int(np.argmax(overlap))
+    width = 1
+    while True:
+        # sampled fast, x changes by less than its noise from sample to sample: means of blocks do not
+        t, x, v = (_block_means(values, width) for values in (record.t, record.x, record.v))
+        slope = np.gradient(x, t)
+        shifts = np.arange(-(_MOST_LAG // width), _MOST_LAG // width + 1)
+        overlap = [float(np.corrcoef(np.roll(v, shift)[inner], slope[inner])[0, 1]) for shift in shifts]
+        best = int(np.argmax(overlap))
+        if overlap[best] > _ALIKE or t.size < 2 * _FEWEST_BLOCKS:
+            break
+        width *= 2
     if overlap[best] < 0.5:
         raise SeparatrixError(
             f"{record.file}: 'v' is not the velocity of 'x' (correlation {overlap[best]:.2f})"
         )
-    ratio = float(np.std(record.v[inner]) / np.std(slope[inner]))
+    ratio = float(np.std(v[inner]) / np.std(slope[inner]))
     # noise of either one moves the ratio by no more than the correlation
     if not overlap[best] / _UNIT < ratio < _UNIT / overlap[best]:
         raise SeparatrixError(
@@ -341,4 +351,10 @@ def check_velocity(record: Record, notes: list[str]) -> None:
             "angle in rad/s"
         )
     if shifts[best]:
-        notes.append(f"x seems to lag {shifts[best] * dt:.3g} s behind v")
+        notes.append(f"x seems to lag {shifts[best] * width * record.interval:.3g} s behind v")
+
+
+def _block_means(values: np.ndarray, width: int) -> np.ndarray:
+    """Means of blocks of so many values; what is left at the end belongs to none."""
+    count = values.size // width
+    return values[: count * width].reshape(count, width).mean(axis=1)

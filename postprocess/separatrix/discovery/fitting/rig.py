@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small faults that every rig has and that are no missing effect: a sensor that is not quite linear, a drive
+with further harmonics.
+
+Each is known to be no larger than some 1e-3 of the signal, which is its standard deviation here; as nuisances
+with that prior they take from a residual what they may explain of it (G. E. P. Box's tentative overfitting,
+with a bound).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.motions import scaled_motion
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.problem import Evaluation, Problem
+from separatrix.discovery.fitting.refit import Fitted, common
+from separatrix.discovery.fitting.response import force_columns, sample_times
+from separatrix.discovery.fitting.screen import project
+
+# standard deviation of a fault over the signal
+_SIZE = 1e-3
+_POWERS = (2, 3)
+_HARMONICS = 6
+# standard deviations that a fault may have, and by which factors its prior is made narrower for that
+_LARGEST = 3.0
+_NARROWER, _NARROWEST = 4.0, 1e15
+
+
+def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
+    """Columns (segments, width, q) of faults of one standard deviation, along the fitted motion."""
+    state = scaled_motion(problem, fit)
+    inside = problem.segments.inside
+    columns = [_sensor(problem, fit, state["x"])]
+    if state["phase"] is not None:
+        steps = np.diff(sample_times(problem), axis=1)
+        usable = inside[:, 1:] & fit.good[:, None] & (steps > 0)
+        rates = np.diff(fit.evaluation.v, axis=1)[usable] / steps[usable]
+        # of the flights; impacts are far above
+        usual = float(np.median(np.abs(rates))) / 0.6745 if rates.size else 0.0
+        waves = [f(n * state["phase"]) for n in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
+        accelerations = _SIZE * usual * np.stack(waves, axis=2) * inside[:, :, None]
+        columns.append(force_columns(problem, fit, accelerations, 1.0))
+    return np.concatenate(columns, axis=2)
+
+
+def _sensor(problem: Problem, fit: Fit, u: np.ndarray) -> np.ndarray:
+    """What square and cube of the place add to x and v as they are measured."""
+    count, length = u.shape
+    table = np.zeros((count, fit.evaluation.residual.shape[1], len(_POWERS)))
+    swing = float(np.std(fit.evaluation.x[problem.segments.inside & fit.good[:, None]]))
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        spread = prepared.samples.spread(prepared.memory)[problem.segments.index[rows]]
+        for column, power in enumerate(_POWERS):
+            table[rows, :length, column] = _SIZE * swing * u[rows] ** power / (prepared.sigma * spread)
+    return problem.whitened(table)
+
+
+def cleaned(problem: Problem, fit: Fit) -> Fit:
+    """The fit without what faults may explain of its residuals, its parameters fitted beside them."""
+    evaluation = fit.evaluation
+    faults = fault_columns(problem, fit)
+    weights = evaluation.used * fit.good[:, None]
+    p, q = evaluation.by_parameter.shape[2], faults.shape[2]
+    columns = np.concatenate([evaluation.by_parameter, faults], axis=2)
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
+        0
+    ].total()
+    open_ = np.r_[~fit.at_bound & fit.movable, np.ones(q, bool)]
+    sizes = solve_scaled(_bounded(matrix, gradient, p, open_), gradient, open_)
+    # a step that the fit has without faults is none of theirs
+    sizes[:p] -= solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
+    residual = evaluation.residual - columns @ sizes
+    chi2 = np.where(fit.good, fit.chi2 - _change(evaluation, residual, weights), fit.chi2)
+    return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
+
+
+def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> np.ndarray:
+    """Normal equations of p parameters and of faults with their prior.
+
+    It is made narrower until no fault is larger than such faults are: what takes a larger one is none.
+    """
+    prior = 1.0
+    while True:
+        known = matrix + np.diag(np.r_[np.zeros(p), np.full(gradient.size - p, prior)])
+        if np.all(np.abs(solve_scaled(known, gradient, open_)[p:]) <= _LARGEST) or prior > _NARROWEST:
+            return known
+        prior *= _NARROWER
+
+
+def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """By how much chi^2 of each segment falls, beyond what another start does without that."""
+    found = []
+    for one in (evaluation.residual, residual):
+        # the residual as the only column: what is left of its square beside the start
+        blocks = blocks_of(evaluation.by_start, one[:, :, None], one, weights)
+        found.append(eliminate(blocks)[0].gradient[:, 0])
+    return found[0] - found[1]
+
+
+def share_beside_faults(one: Fitted, other: Fitted) -> float:
+    """Share of what one machine explains of what another leaves over that faults of a rig do not.
+
+    Linearised, the parameters of the other machine fitted beside them.
+    """
+    evaluation, both = other.fit.evaluation, common(one, other)
+    moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
+    faults = fault_columns(other.problem, other.fit)
+    p, q = evaluation.by_parameter.shape[2], faults.shape[2]
+    columns = np.concatenate([evaluation.by_parameter, faults, moved], axis=2)
+    weights = evaluation.used * both[:, None]
+    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
+        0
+    ].total()
+    open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(q, bool)]
+    alone = np.r_[:p, p + q]
+    without = _gain(*project(matrix[np.ix_(alone, alone)], gradient[alone], p, open_[:p]))
+    matrix[:-1, :-1] = _bounded(matrix[:-1, :-1], gradient[:-1], p, open_)
+    beside = _gain(*project(matrix, gradient, p + q, open_))
+    return float(np.clip(beside / without, 0.0, 1.0)) if without > 0 else 1.0
+
+
+def _gain(left: np.ndarray, score: np.ndarray) -> float:
+    size = left[0, 0]
+    return float(score[0] ** 2 / size) if size > 0 else 0.0

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small faults of a rig explain what they cause, and nothing that is larger than they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from program import CASE
+from separatrix.discovery.fitting.base import fit_base
+from separatrix.discovery.fitting.ceiling import ceiling
+from separatrix.discovery.fitting.data import gather
+from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.rig import cleaned, share_beside_faults
+from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.records import make_record
+from separatrix.library import Model
+
+pytestmark = pytest.mark.usefixtures("library")
+
+NOISE = 4e-4
+
+
+def fitted_base(drag: float, curved: float) -> tuple[Fitted, Model]:
+    """The machine of the case fitted to a record with drag and a sensor that is not quite linear."""
+    base = Model.from_text(CASE)
+    true = base.with_effect("quadratic_drag", {"coefficient": drag})
+    t = np.arange(1200) / 125
+    start = np.array([[0.6, 0.0, 0.4]])
+    paths, values = ["drive.ratio"], np.array([1.1])
+    x = true.segments(paths, values, start, np.array([0, t.size]), t, derivatives=False).x
+    u = (x - x.mean()) / x.std()
+    x = x + curved * x.std() * u**2 + NOISE * np.random.default_rng(5).standard_normal(t.size)
+    head = {"units": "s, m", "drive_ratio": 1.1, "phase": 0.4, "sensor_noise_sigma_m": NOISE}
+    prepared = [prepare(make_record("record", {"t": t, "x": x}, head), base)]
+    return fit_base(gather(prepared, 1.0, None), base, 1.0), true
+
+
+def with_drag(base: Fitted, true: Model) -> Fitted:
+    """The same with the drag that it lacks, which is known."""
+    old = base.problem
+    problem = Problem(true, old.prepared, old.segments, old.free)
+    return Fitted(("quadratic_drag",), true, problem, minimise(problem, base.fit.values, base.fit.starts), ())
+
+
+def test_a_curved_sensor_is_no_gap():
+    base, _ = fitted_base(drag=0.0, curved=2e-3)
+    gap = ceiling(base.problem, base.fit, 1.0)
+    assert base.fit.sample_chi2 > 1.2
+    assert gap.fit.sample_chi2 < 1.1
+    assert gap.p > 0.01
+    # an exact step of the quadratic model: what is told to remain is what remains
+    again = cleaned(base.problem, gap.fit)
+    assert again.total == pytest.approx(gap.fit.total, abs=0.2 * (base.fit.total - gap.fit.total))
+
+
+def test_an_effect_is_its_own_as_far_as_it_is_larger_than_faults_of_a_rig():
+    shares = []
+    for drag in (0.01, 0.05, 0.3):
+        base, true = fitted_base(drag=drag, curved=0.0)
+        shares.append(share_beside_faults(with_drag(base, true), base))
+        assert ceiling(base.problem, base.fit, 1.0).p < 1e-6 or drag < 0.05
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.8
+
+
+def test_what_is_a_fault_of_the_rig_is_no_effect():
+    base, _ = fitted_base(drag=0.0, curved=1e-3)
+    assert share_beside_faults(replace(base, fit=cleaned(base.problem, base.fit)), base) < 0.3
