@@ -10,9 +10,9 @@ import pytest
 from separatrix.discovery.decision import decide, flexible, judge, several
 from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import Judged, _together_clear, held_out_bounds, stable
+from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
-from separatrix.discovery.fitting.problem import Evaluation
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.measured.preflight import _check_velocity, prepare
+from separatrix.discovery.measured.preflight import check_velocity, prepare
 from separatrix.discovery.measured.records import Record, make_record
 from separatrix.discovery.measured.segments import padded
 from separatrix.discovery.workflow import _split
@@ -167,8 +167,8 @@ def test_a_velocity_is_recognised_where_x_moves_less_than_its_noise_from_sample_
     record = make_record("fast", {"t": t, "x": x, "v": size * v}, {"phase": 0})
     notes = []
     if accepted:
-        _check_velocity(record, notes)
+        check_velocity(record, notes)
         assert notes == []
     else:
         with pytest.raises(SeparatrixError, match="'v' is not the velocity of 'x'"):
-            _check_velocity(record, notes)
+            check_velocity(record, notes)

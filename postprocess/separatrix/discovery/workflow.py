@@ -116,7 +116,7 @@ def _record(one: Path | Record, at_rest: bool = False) -> Record:
 
 
 def _prepared(record: Record, model, rest: Record | None, options: Options) -> Prepared:
-    return prepare_force(record, model) if options.compare == "force" else prepare(record, model, rest)
+    return prepare_force(record, model, rest) if options.compare == "force" else prepare(record, model, rest)
 
 
 def _split(

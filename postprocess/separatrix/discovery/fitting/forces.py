@@ -63,14 +63,15 @@ def _unslipped(model, values: dict[str, float], motion: Driven, pieces: list[tup
     more = _value(model, values, "effect.asymmetric_friction.coulomb")
     found = np.zeros(motion.x.size)
     for first, last in pieces:
-        after = None
-        for a, b, sign in motion.strokes(first, last):
-            level = _slipping(sign, dry, more)
-            # what was before the record is not known: a long slip
-            behind = 0.0 if after is None else after - level
-            way = np.abs(motion.x[a:b] - motion.x[max(a - 1, first)])
+        # what was before the record is not known: a long slip
+        behind, level, before = 0.0, 0.0, None
+        for a, b, sign, begun in motion.strokes(first, last):
+            if before is not None:
+                behind *= np.exp(-stiffness * abs(begun - before) / max(abs(level), 1e-300))
+                behind += level - _slipping(sign, dry, more)
+            level, before = _slipping(sign, dry, more), begun
+            way = np.abs(motion.x[a:b] - begun)
             found[a:b] = behind * np.exp(-stiffness * way / max(abs(level), 1e-300))
-            after = found[b - 1] + level
     return found
 
 

@@ -12,10 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
-from separatrix.discovery.fitting.problem import Evaluation, Problem
+from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
 from separatrix.discovery.fitting.response import force_columns, sample_times
 from separatrix.discovery.fitting.screen import project
@@ -33,7 +34,7 @@ def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
     """Columns (segments, width, q) of faults of one standard deviation, along the fitted motion."""
     state = scaled_motion(problem, fit)
     inside = problem.segments.inside
-    columns = [_sensor(problem, fit, state["x"])]
+    columns = [_sensor(problem, fit)]
     if state["phase"] is not None:
         steps = np.diff(sample_times(problem), axis=1)
         usable = inside[:, 1:] & fit.good[:, None] & (steps > 0)
@@ -46,18 +47,19 @@ def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
     return np.concatenate(columns, axis=2)
 
 
-def _sensor(problem: Problem, fit: Fit, u: np.ndarray) -> np.ndarray:
-    """What square and cube of the place add to x and v as they are measured; nothing where the force is compared."""
-    count, length = u.shape
+def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
+    """What square and cube of what is compared, place or force, add to x or F as they are measured."""
+    signal = fit.evaluation.force if problem.in_force else fit.evaluation.x
+    count, length = signal.shape
     table = np.zeros((count, fit.evaluation.residual.shape[1], len(_POWERS)))
-    if problem.in_force:
-        return table
-    swing = float(np.std(fit.evaluation.x[problem.segments.inside & fit.good[:, None]]))
+    good = problem.segments.inside & fit.good[:, None]
+    swing = float(np.std(signal[good]))
+    u = (signal - np.mean(signal[good])) / swing
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        spread = prepared.samples.spread(prepared.memory)[problem.segments.index[rows]]
+        sigma = prepared.deviation(problem.segments.index[rows])
         for column, power in enumerate(_POWERS):
-            table[rows, :length, column] = _SIZE * swing * u[rows] ** power / (prepared.sigma * spread)
+            table[rows, :length, column] = _SIZE * swing * u[rows] ** power / sigma
     return problem.whitened(table)
 
 

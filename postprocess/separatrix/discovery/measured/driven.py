@@ -32,32 +32,36 @@ class Driven:
     inertia_error: np.ndarray
     # whether the direction of the motion is known
     moves: np.ndarray
+    # where the motion turned between the sample before and this one [m]; its own place where it did not
+    turned: np.ndarray
 
     def scaled(self, scale: float, rate: float) -> "Driven":
         """The same motion about its middle, `scale` times as large and `rate` times as fast."""
         middle = 0.5 * (self.x.min() + self.x.max())
-        x = middle + scale * (self.x - middle)
+        x, turned = (middle + scale * (one - middle) for one in (self.x, self.turned))
         return Driven(
             x,
             scale * rate * self.v,
             scale * rate**2 * self.a,
             scale * rate**2 * self.inertia_error,
             self.moves,
+            turned,
         )
 
-    def strokes(self, first: int, last: int) -> list[tuple[int, int, int]]:
-        """Stretches (first, last + 1) of a piece of the record without a turning point; their direction."""
-        x = self.x[first:last]
-        sign = np.sign(np.diff(x, prepend=2 * x[0] - x[1]))
-        edges = [0, *(np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist(), x.size]
-        return [(first + a, first + b, int(sign[a])) for a, b in pairwise(edges)]
+    def strokes(self, first: int, last: int) -> list[tuple[int, int, int, float]]:
+        """Stretches (first, last + 1) of a piece between turning points, direction, where they begin [m]."""
+        sign = np.where(self.v[first:last] < 0, -1, 1)
+        edges = [0, *(np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist(), sign.size]
+        return [
+            (first + a, first + b, int(sign[a]), float(self.turned[first + a])) for a, b in pairwise(edges)
+        ]
 
     def ways(self, pieces: list[tuple[int, int]]) -> np.ndarray:
         """Way since the motion turned round last [m] at each sample."""
         found = np.zeros(self.x.size)
         for piece in pieces:
-            for a, b, _ in self.strokes(*piece):
-                found[a:b] = np.abs(self.x[a:b] - self.x[max(a - 1, piece[0])])
+            for a, b, _, begun in self.strokes(*piece):
+                found[a:b] = np.abs(self.x[a:b] - begun)
         return found
 
 
@@ -83,4 +87,19 @@ def driven(
         moves[first + 1 : last] &= ~turns
         moves[first:last] &= np.cumsum(np.abs(np.diff(x[first:last], prepend=x[first]))) > _BEGUN * np.ptp(x)
     error = _TOGETHER * mass * np.sqrt(np.maximum(smoothed.covariance[:, 2, 2], 0.0))
-    return Driven(x.copy(), speed.copy(), a.copy(), error, moves)
+    turned = _turning_places(smoothed, x, speed)
+    return Driven(x.copy(), speed.copy(), a.copy(), error, moves, turned)
+
+
+def _turning_places(smoothed: Smoothed, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Where the motion turned between each sample and the one before: at once where the speed jumps."""
+    found = x.copy()
+    at = np.flatnonzero((v[1:] < 0) != (v[:-1] < 0))
+    steps = np.diff(smoothed.t)[at]
+    before, after = v[at], v[at + 1]
+    jump = np.isin(at, smoothed.impacts)
+    # two straight lines that meet, or a parabola
+    met = (x[at + 1] - after * steps - x[at]) / (before - after)
+    time = np.where(jump, np.clip(met, 0.0, steps), 0.5 * steps * before / (before - after))
+    found[at + 1] = x[at] + before * time
+    return found

@@ -18,7 +18,7 @@ MOST_SAMPLES = 40_000
 _EXACT = 5e-4
 
 
-def prepare_force(record: Record, model) -> Prepared:
+def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared:
     """Noise of force and position; refused is what is no record of a driven joint."""
     if record.force is None:
         raise SeparatrixError(f"{record.file}: no column 'force' (or 'F'), the force that is compared")
@@ -34,7 +34,7 @@ def prepare_force(record: Record, model) -> Prepared:
     if np.ptp(record.force) == 0:
         raise SeparatrixError(f"{record.file}: 'force' is constant")
     unit = units_of(model.parameters).force
-    stated = record.header.get("force_noise_sigma_n")
+    stated = record.header.get("force_noise_sigma_n") if rest is None else _at_rest(rest)
     resolution = resolution_of(record.force)
     least = max(_EXACT * float(np.std(record.force)), resolution / np.sqrt(12))
     sigma = max(stated / np.sqrt(_together(record)) if stated else white_noise(record.force), least)
@@ -48,6 +48,13 @@ def prepare_force(record: Record, model) -> Prepared:
     prepared.in_force, prepared.motion_sigma, prepared.sigma_stated = True, motion, bool(stated)
     prepared.mass = model.parameters["body.mass"].value
     return prepared
+
+
+def _at_rest(rest: Record) -> float:
+    """Scatter of the force while nothing moves, about a straight line [N]."""
+    if rest.force is None:
+        raise SeparatrixError(f"{rest.file}: no column 'force' (or 'F'), whose scatter is the noise")
+    return float(np.std(rest.force - np.polyval(np.polyfit(rest.t, rest.force, 1), rest.t)))
 
 
 def _together(record: Record) -> int:
