@@ -98,12 +98,14 @@ CASES = (
     Case("structure_beam", "drive.shaker.frequency", (1.4, 1.6), (1, 2)),
     Case("structure_capsule", "drive.inner.frequency", (0.9, 1.0), (1, 2)),
     Case("structure_impact_damper", "drive.shaker.frequency", (0.8, 1.2), (1, 2)),
+    Case("basin_pair_backlash", "drive.frequency", (10.5, 11.5), (1, 2)),
+    Case("sweep_pair_kappa", "body.friction", (0.3, 0.9), (1, 2)),
 )
 SWEEPS = ("sweep_coulomb", "sweep_viscous", "sweep_stribeck")
-# The machines of the sweeps at one value.
+# The machines of the sweeps and of other cases at one value.
 SAME_MACHINE = {
     *("basin_coulomb", "basin_coulomb_refined", "basin_ratio_stack", "basin_stribeck", "basin_viscous"),
-    "trajectory_coulomb_crank_lever_rod",
+    *("trajectory_coulomb_crank_lever_rod", "pair_backlash", "basin_pair_regimes"),
     *(
         f"trajectory_{friction}_{ratio}"
         for friction in ("coulomb", "stribeck", "viscous")
@@ -111,13 +113,9 @@ SAME_MACHINE = {
     ),
 }
 REFUSED = {
-    "pair_backlash": "body.mass",
     "pair_free": "body.mass",
     "pair_platform": "body.mass",
     "hammer": "body.mass",
-    "sweep_pair_kappa": "body.friction",
-    "basin_pair_backlash": "body.mass",
-    "basin_pair_regimes": "body.friction",
     "basin_pendulum": "body.mass",
     "measured_pendulum": "body.mass",
     "measured_platform": "body.mass",
@@ -157,10 +155,10 @@ def multiplier_misses(found: Branches) -> dict[str, float]:
         if name not in ("SN", "PD", "BP", "NS"):
             continue
         if name == "NS":
-            miss = np.abs(np.abs(found.multipliers[k]) - 1).min()
+            miss = np.nanmin(np.abs(np.abs(found.multipliers[k]) - 1))
         else:
             wanted = (-1, 1) if name == "PD" and k in last else ((-1,) if name == "PD" else (1,))
-            miss = min(np.abs(found.multipliers[k] - way).min() for way in wanted)
+            miss = min(np.nanmin(np.abs(found.multipliers[k] - way)) for way in wanted)
         worst[name] = max(worst.get(name, 0.0), float(miss))
     return worst
 

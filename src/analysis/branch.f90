@@ -10,6 +10,7 @@ module branch
     note_bifurcations
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
+  use branch_return, only: close_up, return_share
   use errors, only: error_t
   use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
   use hybrid_machine, only: event_t
@@ -18,8 +19,7 @@ module branch
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, same_sequence, &
-    scales_of_orbit
+  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, scales_of_orbit
   use search_watch, only: search_watch_t
   use soft_graze, only: is_touch
   implicit none
@@ -34,6 +34,8 @@ module branch
   integer, parameter :: long_run = 10
   !> Smallest step, as a share of the largest.
   real(wp), parameter :: smallest_step = 1e-7_wp
+  !> The parameter has not turned back by less than this share of its size.
+  real(wp), parameter :: no_turn = 1e-11_wp
   !> Nearness of a multiplier to that of a doubling at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-2_wp
 
@@ -57,7 +59,23 @@ contains
       call trace_one_way(family, plan, seed, 1, further, found%ending(2), watch)
     end if
     found%points = [[(back(i), i=size(back), 1, -1)], further(min(2, size(further) + 1):)]
+    call mark_turns(family%parameter_size, found%points)
   end subroutine trace_branch
+
+  !> Where the parameter turns something is, even if it could not be located: such a point is labelled so. Two steps each way
+  !> tell a turn from rounding.
+  pure subroutine mark_turns(parameter_size, points)
+    real(wp), intent(in) :: parameter_size
+    type(point_t), intent(inout) :: points(:)
+    real(wp) :: rises(4)
+    integer :: i, k
+    do i = 3, size(points) - 2
+      if (any(points(i - 1:i + 1)%label /= no_label)) cycle
+      rises = [(points(i + k)%orbit%parameter - points(i + k - 1)%orbit%parameter, k=-1, 2)]
+      if (minval(abs(rises)) <= no_turn*parameter_size) cycle
+      if (all(rises(:2)*rises(2) > 0) .and. all(rises(3:)*rises(2) < 0)) points(i)%label = label_not_known
+    end do
+  end subroutine mark_turns
 
   !> From the seed in the direction in which the parameter rises (`way` = 1) or falls, up to an end.
   subroutine trace_one_way(family, plan, seed, way, points, ending, watch)
@@ -70,8 +88,9 @@ contains
     class(search_watch_t), intent(inout), optional :: watch
     type(trace_t) :: trace, before
     type(error_t), allocatable :: error
+    real(wp) :: share
     logical :: ok
-    integer :: labels
+    integer :: labels, known
     allocate (points(0))
     ending = label_not_known
     trace%now%orbit = seed
@@ -84,38 +103,20 @@ contains
     ending = no_label
     do while (ending == no_label .and. size(points) < plan%most_points)
       before = trace
+      known = size(points)
       call go_on(family, plan, trace, points, ending)
       if (ending /= no_label) exit
       if (present(watch)) call watch%tell_point(size(points), trace%now%orbit%parameter)
       if (size(points) < 5) cycle
-      if (has_returned(seed, before, trace, family%parameter_size)) ending = label_closed
+      share = return_share(seed, before, trace, family%parameter_size)
+      if (.not. share > 0) cycle
+      ending = label_closed
+      call close_up(family, before, trace, share, points, known)
     end do
     if (ending == no_label) ending = label_long
     labels = size(points)
     if (points(labels)%label == no_label) points(labels)%label = ending
   end subroutine trace_one_way
-
-  !> Whether a branch of the same events has passed the orbit in which it began, maybe at another of its section points.
-  pure logical function has_returned(first, before, trace, parameter_size) result(back)
-    type(orbit_t), intent(in) :: first
-    type(trace_t), intent(in) :: before, trace
-    real(wp), intent(in) :: parameter_size
-    real(wp) :: points(size(first%y), first%periods), step(size(first%y) + 1), way(size(first%y) + 1), share
-    integer :: k
-    back = .false.
-    if (.not. same_sequence(first, trace%now%orbit) .or. .not. same_sequence(first, before%now%orbit)) return
-    points = section_points(trace%machines, first)
-    associate (now => trace%now%orbit, last => before%now%orbit, sizes => trace%machines%centre%size_of)
-      step = [(now%y - last%y)/sizes, (now%parameter - last%parameter)/parameter_size]
-      if (.not. norm2(step) > 0) return
-      do k = 1, first%periods
-        way = [(points(:, k) - last%y)/sizes, (first%parameter - last%parameter)/parameter_size]
-        share = sum(way*step)/sum(step**2)
-        back = share > 0 .and. share <= 1 .and. norm2(way - share*step) < 0.1_wp*norm2(step)
-        if (back) return
-      end do
-    end associate
-  end function has_returned
 
   !> One step of the branch: to the next point, and to what is passed on the way.
   subroutine go_on(family, plan, trace, points, ending)

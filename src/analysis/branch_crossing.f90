@@ -22,8 +22,12 @@ module branch_crossing
   !> A branch point is interpolated between so many points, this share of the step apart.
   integer, parameter :: nodes = 6
   real(wp), parameter :: apart = 0.04_wp
-  !> Where one of them cannot be computed, being too near, they are taken twice as far apart, so often.
-  integer, parameter :: most_spreads = 3
+  !> So many are tried on each side: those that are too near cannot be computed. Where the multiplier found there is not the one
+  !> looked for, they are taken so much farther apart, or nearer.
+  integer, parameter :: most_tried = 12
+  real(wp), parameter :: spreads(5) = [1.0_wp, 2.0_wp, 4.0_wp, 0.25_wp, 0.0625_wp]
+  !> A multiplier this near to that looked for is it.
+  real(wp), parameter :: near_multiplier = 1e-6_wp
   integer, parameter :: most_secants = 30
   !> A test this much smaller than at the ends of the step is near enough to its zero.
   real(wp), parameter :: near_enough = 1e-3_wp
@@ -68,7 +72,7 @@ contains
   end function circle_test
 
   !> The point of a step at which a test passes zero and another branch crosses. The equations are singular there, so that it is
-  !> interpolated between points on both sides.
+  !> interpolated between points on both sides; `ok` is false if none could be, whatever its multipliers.
   subroutine locate_branch_point(family, trace, next, test, length, there, ok)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: trace, next
@@ -76,23 +80,53 @@ contains
     real(wp), intent(in) :: length
     type(trace_t), intent(out) :: there
     logical, intent(out) :: ok
+    type(trace_t) :: candidate
+    real(wp) :: zero, miss, least
+    integer :: i
+    logical :: found
+    call near_zero(family, trace, test_value(test, trace), test_value(test, next), test, length, zero)
+    ok = .false.
+    least = huge(least)
+    do i = 1, size(spreads)
+      call interpolate(family, trace, test, zero, spreads(i)*apart*length, candidate, found)
+      if (.not. found) cycle
+      miss = minval(abs(candidate%now%orbit%multipliers - merge(-1, 1, test == test_minus)))
+      if (ok .and. .not. miss < least) cycle
+      ok = .true.
+      least = miss
+      there = candidate
+      if (least < near_multiplier) exit
+    end do
+  end subroutine locate_branch_point
+
+  !> The zero of a test about `zero` from points `distance` apart.
+  subroutine interpolate(family, trace, test, zero, distance, there, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace
+    integer, intent(in) :: test
+    real(wp), intent(in) :: zero, distance
+    type(trace_t), intent(out) :: there
+    logical, intent(out) :: ok
     type(trace_t) :: node
     type(error_t), allocatable :: error
-    real(wp) :: value(nodes), all(size(trace%now%tangent), nodes), tangents(size(trace%now%tangent), nodes), weight(nodes), zero
-    integer :: i, k, n, steps
+    real(wp) :: value(nodes), all(size(trace%now%tangent), nodes), tangents(size(trace%now%tangent), nodes), weight(nodes)
+    integer :: i, k, n, side, steps
     n = size(trace%now%tangent)
-    call near_zero(family, trace, test_value(test, trace), test_value(test, next), test, length, zero)
-    do i = 0, most_spreads - 1
-      do k = 1, nodes
-        call step_to(family, trace, zero + (k - 0.5_wp*(nodes + 1))*apart*2.0_wp**i*length, node, ok, steps)
-        if (.not. ok) exit
+    k = 0
+    do side = -1, 1, 2
+      do i = 1, most_tried
+        call step_to(family, trace, zero + side*(i - 0.5_wp)*distance, node, ok, steps)
+        if (.not. ok) cycle
+        k = k + 1
         value(k) = test_value(test, node)
         all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter]
         tangents(:, k) = node%now%tangent
+        if (k == nodes/2 .or. k == nodes) exit
       end do
-      if (ok) call weights_at_zero(value, weight, ok)
-      if (ok) exit
+      ok = k == merge(nodes/2, nodes, side < 0)
+      if (.not. ok) return
     end do
+    call weights_at_zero(value, weight, ok)
     if (.not. ok) return
     there = node
     associate (orbit => there%now%orbit, place => matmul(all, weight))
@@ -105,7 +139,7 @@ contains
       ok = .not. allocated(error)
       if (ok) call set_multipliers(there%machines, orbit)
     end associate
-  end subroutine locate_branch_point
+  end subroutine interpolate
 
   !> About where a test is zero, by the secant rule for as long as the equations can be solved.
   subroutine near_zero(family, trace, first, last, test, length, zero)

@@ -34,16 +34,18 @@ contains
     do b = 1, size(branches)
       do k = 1, 2
         if (all(branches(b)%ending(k) /= [label_pd, label_not_known])) cycle
-        times = merge(2, 1, branches(b)%ending(k) == label_pd)
         associate (last => branches(b)%points(merge(1, size(branches(b)%points), k == 1)))
-          call nearest_located(family, branches, last%orbit, times, located, found)
-          if (.not. found) cycle
-          last%orbit%parameter = located%parameter
-          last%orbit%y = located%y
-          last%orbit%multipliers = located%multipliers**times
-          if (times == 2) cycle
-          last%label = label_bp
-          branches(b)%ending(k) = label_bp
+          do times = 1, 2
+            if (times == 1 .and. branches(b)%ending(k) == label_pd) cycle
+            call nearest_located(family, branches, last%orbit, times, branches(b)%ending(k) == label_pd, located, found)
+            if (.not. found) cycle
+            last%orbit%parameter = located%parameter
+            last%orbit%y = located%y
+            last%orbit%multipliers = located%multipliers**times
+            last%label = merge(label_pd, label_bp, times == 2)
+            branches(b)%ending(k) = last%label
+            exit
+          end do
         end associate
       end do
     end do
@@ -51,18 +53,20 @@ contains
 
   !> The doubling (`times` 2) or branch point (1) that an orbit ended in, of those of half its period, or of the same, nearby, with
   !> that section point in front that is nearest to the orbit's: twins of a symmetric machine double at one value of the parameter.
-  pure subroutine nearest_located(family, branches, ended, times, located, found)
+  !> `doubles`: it is known that it is a doubling; else a multiplier +1 must tell.
+  pure subroutine nearest_located(family, branches, ended, times, doubles, located, found)
     type(family_t), intent(in) :: family
     type(branch_t), intent(in) :: branches(:)
     type(orbit_t), intent(in) :: ended
     integer, intent(in) :: times
+    logical, intent(in) :: doubles
     type(orbit_t), intent(out) :: located
     logical, intent(out) :: found
     real(wp) :: least, distance, point(size(ended%y))
     integer :: c, i, label, multiplier
     label = merge(label_pd, label_bp, times == 2)
     multiplier = merge(-1, 1, times == 2)
-    found = minval(abs(ended%multipliers - 1)) <= nearly .or. times == 2
+    found = minval(abs(ended%multipliers - 1)) <= nearly .or. doubles
     if (.not. found) return
     least = near_points
     do c = 1, size(branches)

@@ -170,10 +170,8 @@ contains
     if (.not. ok) end_point = next
     turns = changes(test_turn)
     passes = changes(test_plus)
-    if (turns .and. passes) then
-      call add(label_sn, test_turn)
-    else if (turns) then
-      call add(label_bp, test_turn)
+    if (turns) then
+      call add(merge(label_sn, label_bp, passes), test_turn)
     else if (passes) then
       call add(label_bp, test_plus)
     end if
@@ -197,7 +195,8 @@ contains
       else
         call locate(family, trace, end_point, target_t(test), distance, there, ok)
       end if
-      if (.not. ok .or. .not. is_genuine(label, there%now%orbit)) return
+      if (ok) ok = is_genuine(label, there%now%orbit)
+      if (.not. ok) return
       there%now%label = label
       points = [points, there%now]
     end subroutine add

@@ -4,18 +4,24 @@
 !> Multipliers of periodic orbits: eigenvalues of the derivative of their map, of any number of coordinates.
 module multipliers
   use constants, only: unreachable
-  use eigen, only: general_eigen
+  use eigen, only: general_eigen, modulus, solve_complex
   use kinds, only: wp
   use matrices, only: determinant_of, eigenvalues
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
   public :: multipliers_of, shifted_determinant
 
+  !> Rounding of the entries of a map's derivative, as a share of its norm; what an eigenvalue must be known to, absolutely or as a
+  !> share.
+  real(wp), parameter :: rounding = 100*epsilon(1.0_wp), known_to = 1e-6_wp
+
 contains
 
   !> Eigenvalues, largest modulus first; with imaginary parts that are none left out. `determinant`: of a matrix of two
-  !> rows, from its factors: the entries of one with a large multiplier know the small one no more.
+  !> rows, from its factors: the entries of one with a large multiplier know the small one no more. Of more rows those that rounding
+  !> of the entries hides, beside a graze, are not numbers.
   pure function multipliers_of(matrix, determinant) result(values)
     real(wp), intent(in) :: matrix(:, :)
     real(wp), intent(in), optional :: determinant
@@ -39,7 +45,34 @@ contains
       end do
       values(k + 1) = moved
     end do
+    call leave_out_hidden(matrix, values)
   end function multipliers_of
+
+  !> Makes those of the eigenvalues (largest first) that are not known no numbers: each moves, to first order, by the rounding of
+  !> the matrix times its condition |x||y|/|y'x| (Golub, Van Loan, Matrix Computations, 7.2.2), a double one by the root of that.
+  pure subroutine leave_out_hidden(matrix, values)
+    real(wp), intent(in) :: matrix(:, :)
+    complex(wp), intent(inout) :: values(:)
+    complex(wp), dimension(size(values), size(values)) :: vectors, unit, left
+    complex(wp) :: own(size(values))
+    real(wp) :: miss, scatter
+    integer :: i, k
+    logical :: ok
+    scatter = rounding*norm2(matrix)
+    if (scatter < 1e-3_wp*known_to) return
+    call general_eigen(matrix, own, vectors, ok)
+    unit = 0
+    do i = 1, size(values)
+      unit(i, i) = 1
+    end do
+    if (ok) call solve_complex(vectors, unit, left, ok)
+    do i = 2, size(values)
+      miss = sqrt(scatter)
+      k = minloc(modulus(own - values(i)), 1)
+      if (ok) miss = min(miss, scatter*norm2(modulus(vectors(:, k)))*norm2(modulus(left(k, :))))
+      if (miss > known_to*max(1.0_wp, modulus(values(i)))) values(i) = ieee_value(1.0_wp, ieee_quiet_nan)
+    end do
+  end subroutine leave_out_hidden
 
   !> det(M + shift).
   pure real(wp) function shifted_determinant(m, shift) result(determinant)

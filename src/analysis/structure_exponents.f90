@@ -8,13 +8,12 @@ module structure_exponents
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
-  use jointed_section, only: start_of_jointed
   use kinds, only: int64, wp
   use motion, only: start_state
   use motion_state, only: event_impact_lower, event_impact_upper, event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
   use structure, only: coordinates_of, mode_number, state_in, structure_t
-  use structure_family, only: advance_section, least_dimension, vary_section
+  use structure_family, only: advance_section, least_dimension, state_at_start, vary_section
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -41,7 +40,7 @@ contains
       state = start_state(machine%moving, start(1), start(2), start(3))
       call lyapunov_exponents(machines, state, transient, sections, spectrum, series)
     type is (structure_t)
-      jointed = start_of_jointed(machine%frame%moving, start(1), start(2), start(3), start(4:))
+      jointed = state_at_start(machine, start)
       call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
     end select
   end subroutine exponents_of_machine

@@ -360,7 +360,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: problem
     problem = beyond(the_case, axes, the_case%start%x0)
-    if (len(problem) > 0) call fail(error, exit_bad_case, the_case%path//': key ''start.x0'': '//problem)
+    if (len(problem) > 0) call fail(error, exit_bad_case, the_case%start%origin//': key ''start.x0'': '//problem)
   end subroutine allow_start
 
 end module case_check

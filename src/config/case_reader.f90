@@ -9,7 +9,7 @@ module case_reader
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
   use case_echo, only: echo_case
-  use case_source, only: case_source_t, enter_table, open_source, problems_of, report_unknown
+  use case_source, only: case_source_t, enter_table, open_source, origin_of, problems_of, report_unknown
   use case_type, only: case_t
   use case_values, only: any_number, at_least, between, more_than, take_choice, take_integer, take_real, take_text
   use errors, only: error_t
@@ -85,6 +85,7 @@ contains
     type(case_t), intent(inout) :: the_case
     logical :: found
     call enter_table(source, 'start', found)
+    the_case%start%origin = origin_of(source, 'start.x0')
     associate (start => the_case%start)
       associate (is_angle => position_is_angle(the_case%laws))
         call take_real(source, 'start.x0', any_number(unit_of('m', is_angle)), start%x0)

@@ -14,7 +14,7 @@ module case_source
   implicit none
   private
 
-  public :: open_source, find, list_size, know, know_all_below, enter_table, report, forgive_missing, &
+  public :: open_source, find, origin_of, list_size, know, know_all_below, enter_table, report, forgive_missing, &
     report_unknown, problems_of, description, has_problems
 
   type :: problem_t
@@ -142,7 +142,25 @@ contains
     logical, intent(in), optional :: missing, file_missing
     type(problem_t) :: new
     character(len=:), allocatable :: above, place
-    integer :: at, line
+    integer :: line
+    call place_of_key(source, path, place, line)
+    above = path
+    if (present(shown)) above = shown
+    new = problem_t(line, path, place//': key '''//above//''': '//problem)
+    if (present(missing)) new%missing = missing
+    if (present(file_missing)) new%file_missing = file_missing
+    call insert(source, new)
+  end subroutine report
+
+  !> Where the key `path`, or the table that lacks it, comes from: file and line, or the `--set` that gave it; `line` is 0 without
+  !> any, `huge` for an override.
+  pure subroutine place_of_key(source, path, place, line)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: place
+    integer, intent(out) :: line
+    character(len=:), allocatable :: above
+    integer :: at
     above = path
     do
       at = find(source, above)
@@ -151,21 +169,22 @@ contains
     end do
     place = source%name
     line = 0
-    if (at > 0) then
-      line = source%entries(at)%entry%line
-      place = place//':'//to_text(line)
-      if (allocated(source%entries(at)%override)) then
-        line = huge(line)
-        place = '--set '//source%entries(at)%override
-      end if
-    end if
-    above = path
-    if (present(shown)) above = shown
-    new = problem_t(line, path, place//': key '''//above//''': '//problem)
-    if (present(missing)) new%missing = missing
-    if (present(file_missing)) new%file_missing = file_missing
-    call insert(source, new)
-  end subroutine report
+    if (at == 0) return
+    line = source%entries(at)%entry%line
+    place = place//':'//to_text(line)
+    if (.not. allocated(source%entries(at)%override)) return
+    line = huge(line)
+    place = '--set '//source%entries(at)%override
+  end subroutine place_of_key
+
+  !> Where a key comes from, in the words of messages.
+  pure function origin_of(source, path) result(place)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: place
+    integer :: line
+    call place_of_key(source, path, place, line)
+  end function origin_of
 
   !> Takes back what is missing below a table; `lacks` tells whether anything was.
   subroutine forgive_missing(source, table, lacks)

@@ -17,6 +17,8 @@ module case_type
   !> State and crank angle at the beginning.
   type, public :: start_t
     real(wp) :: x0 = 0, v0 = 0, crank_angle = 0
+    !> Where x0 comes from, for messages: file and line, or `--set`.
+    character(len=:), allocatable :: origin
   end type start_t
 
   type, public :: run_t

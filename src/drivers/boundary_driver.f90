@@ -96,7 +96,8 @@ contains
     if (session%team%is_root()) call describe_boundary(reader, grid, planes, names, schema, error)
     call session%stop_if(error)
     call session%provenance%finish(schema)
-    if (session%team%is_root()) call write_whole(path, schema, command%force, error)
+    ! A run that was begun with --force may end after --resume.
+    if (session%team%is_root()) call write_whole(path, schema, command%force .or. kept%taken_up, error)
     call session%stop_if(error)
     call check_written(session, path)
     if (session%team%is_root()) call kept%remove(error)

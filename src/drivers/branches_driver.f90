@@ -4,7 +4,6 @@
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
-  use build_jointed, only: is_jointed
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
@@ -20,7 +19,7 @@ module branches_driver
   use hybrid_machine, only: hybrid_t
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
-  use machine_family, only: machine_of_family, starts_of_section
+  use machine_family, only: has_several, machine_of_family, starts_of_section
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use orbit_margins, only: is_impact
@@ -64,9 +63,9 @@ contains
     if (.not. allocated(error)) call set_free(command, session%the_case, search, curves, error)
     if (.not. allocated(error)) call prepare_search(search, command%searches, error)
     call session%stop_if(error)
-    if (curves%wanted .and. is_jointed(session%the_case%laws)) then
+    if (curves%wanted .and. has_several(session%the_case%laws)) then
       call fail(error, exit_bad_case, '--free: labels are followed over two parameters for machines of one body')
-    else if (command%contacts .and. is_jointed(session%the_case%laws)) then
+    else if (command%contacts .and. has_several(session%the_case%laws)) then
       call fail(error, exit_bad_case, '--contacts: homoclinic contacts are looked for in machines of one body')
     else
       call set_starts(session%the_case, search, error)
@@ -300,7 +299,8 @@ contains
     character(len=:), allocatable :: text
     text = to_text(real(z, wp), 9)
     if (abs(z) > endless) text = 'infinite'
-    if (abs(z) > endless) return
+    if (.not. abs(z) <= huge(1.0_wp) .and. .not. abs(z) > endless) text = 'not known'
+    if (.not. abs(z) <= endless) return
     if (abs(aimag(z)) > 0) text = text//merge('+', '-', aimag(z) > 0)//to_text(abs(aimag(z)), 9)//'i'
   end function complex_text
 

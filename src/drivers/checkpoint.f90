@@ -9,7 +9,7 @@ module checkpoint
   use errors, only: error_t, fail
   use files, only: file_exists, remove_file
   use kinds, only: int64, int8, wp
-  use output_check, only: working_path
+  use output_check, only: check_result, working_path
   use session, only: session_t
   use status, only: exit_cannot_create, exit_other_case
   use stop_check, only: check_stop
@@ -27,6 +27,8 @@ module checkpoint
     character(len=:), allocatable :: doing
     !> Parts that were taken from the file.
     integer :: recalled = 0
+    !> The working file of an earlier run was taken up: it was allowed to replace a result that was there. On rank 0.
+    logical :: taken_up = .false.
     character(len=:), allocatable, private :: path
     type(byte_file_t), private :: file
     integer(int64), private :: place = 0
@@ -41,10 +43,10 @@ module checkpoint
 contains
 
   !> Opens the working file of the result `path`: with --resume the one that is there, else a new one. `identity` decides the
-  !> work. Code 76 if the file is of another one. Collective.
+  !> work. Code 76 if the file is of another one, 73 if it is damaged from its beginning and the result is there. Collective.
   subroutine open_checkpoint(self, session, path, identity, doing, error)
     class(checkpoint_t), intent(inout) :: self
-    class(session_t), intent(in) :: session
+    class(session_t), intent(inout) :: session
     character(len=*), intent(in) :: path, identity, doing
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: first(2)
@@ -56,11 +58,16 @@ contains
       if (.not. allocated(error)) call self%file%open(self%path, .true., error)
       if (self%reading .and. .not. allocated(error)) then
         call read_words(self%file, 0_int64, first, self%reading)
-        if (self%reading .and. any(first /= [mark, crc32_text(identity, 0_int64)])) then
+        if (first(1) /= mark) self%reading = .false.
+        if (.not. self%reading) then
+          call session%journal%line('damaged', "'"//self%path//"' is damaged from its beginning: nothing of it is used")
+          call check_result(path, .false., error)
+        else if (first(2) /= crc32_text(identity, 0_int64)) then
           call fail(error, exit_other_case, "'"//self%path//"' belongs to another map, other options or another version; "// &
                     '--force begins again')
         end if
       end if
+      self%taken_up = self%reading
       first = [mark, crc32_text(identity, 0_int64)]
       if (.not. allocated(error) .and. .not. self%reading) call self%file%write(transfer(first, [0_int8]), 0_int64, error)
       self%place = head
@@ -71,14 +78,20 @@ contains
   !> The values of the next part if the file has them. Collective.
   subroutine recall(self, session, values, found)
     class(checkpoint_t), intent(inout) :: self
-    class(session_t), intent(in) :: session
+    class(session_t), intent(inout) :: session
     real(wp), allocatable, intent(out) :: values(:)
     logical, intent(out) :: found
     real(wp), allocatable :: own(:)
     logical :: sound
+    integer(int64) :: bytes_on_disk
     allocate (own(0))
     sound = .false.
-    if (self%reading) call read_part(self, own, sound)
+    if (self%reading) then
+      call read_part(self, own, sound)
+      inquire (file=self%path, size=bytes_on_disk)
+      if (.not. sound .and. bytes_on_disk > self%place) call session%journal%line('damaged', "'"//self%path// &
+        "' is damaged behind "//to_text(self%recalled)//' sound parts: what follows is computed again')
+    end if
     self%reading = sound
     found = session%team%any(self%reading)
     if (.not. found) return

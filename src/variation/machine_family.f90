@@ -11,7 +11,6 @@ module machine_family
   use hybrid_machine, only: event_t, hybrid_t
   use jointed_log, only: watched_state
   use jointed_motion, only: start_jointed
-  use jointed_section, only: start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use law_table, only: law_choice_t
@@ -19,16 +18,18 @@ module machine_family
   use motion_state, only: log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
   use pair, only: is_pair
+  use pair_as_structure, only: pair_of_structure
+  use pair_flight, only: body_state
   use structure, only: coordinates_of, structure_t
   use strobe, only: start_strobe, strobe_t
-  use structure_family, only: advance_section, fly_structure, map_of_structure, start_of_structure, structure_neighbourhood, &
-    structure_of_family
+  use structure_family, only: advance_section, fly_structure, map_of_structure, start_of_structure, state_at_start, &
+    structure_neighbourhood, structure_of_family
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, section_sizes, &
-    nearest_copy, within_stops, watched_rows, starts_of_section, strobe_of_section
+  public :: has_several, machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, &
+    section_sizes, nearest_copy, within_stops, watched_rows, starts_of_section, strobe_of_section
 
 contains
 
@@ -97,7 +98,7 @@ contains
       point = [state%x, state%v]
       call events_of_body(machine, before, log, state, .true., events, mode)
     type is (structure_t)
-      jointed = start_of_jointed(machine%frame%moving, start(1), start(2), start(3), start(4:))
+      jointed = state_at_start(machine, start)
       ok = .not. any(jointed%q /= jointed%q)
       if (.not. ok) return
       allocate (events(8))
@@ -120,7 +121,15 @@ contains
     select type (machine)
     type is (structure_t)
       call start_of_structure(machine, point, strobe%jointed, ok)
-      if (ok) strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      if (.not. ok) return
+      if (allocated(moving%pair)) then
+        associate (n => machine%frame%moving%machine%n)
+          strobe%pair = pair_of_structure(moving%pair, strobe%jointed%q(:n), strobe%jointed%v(:n))
+        end associate
+        strobe%state = body_state(strobe%pair)
+      else
+        strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      end if
     class default
       strobe = start_strobe(moving, [point, 0.0_wp])
     end select

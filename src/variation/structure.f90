@@ -11,6 +11,7 @@ module structure
   use jointed_state, only: free_force, joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
+  use pair, only: pair_t
   use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
   use structure_impact, only: carried_by, strike_with_slopes
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -21,6 +22,8 @@ module structure
 
   type, extends(hybrid_t), public :: structure_t
     type(frame_t) :: frame
+    !> The two bodies that it stands for, if it does (module `pair_as_structure`).
+    type(pair_t), allocatable :: pair
   contains
     procedure :: rests => structure_rests
     procedure :: fly => fly_structure

@@ -10,8 +10,9 @@ module structure_family
   use guarded_march, only: most_equations
   use guards, only: leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
   use hybrid_machine, only: event_t, most_states
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
-  use jointed_motion, only: advance_jointed_period, advance_to_turn, jointed_motion_t, start_jointed
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, most_joints
+  use jointed_motion, only: advance_jointed_period, advance_to_turn, jointed_motion_t, prepare_jointed, start_jointed
+  use jointed_section, only: start_of_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
@@ -19,6 +20,7 @@ module structure_family
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point, &
     flight_adaptive, reset_tally, state_t, tally_t
+  use pair_as_structure, only: start_as_structure, structure_of_pair
   use status, only: exit_bad_case
   use structure, only: coordinates_of, count_joints, mode_number, phases_in, settle, state_in, structure_of, structure_t
   use transition_list, only: transition_t, transitions_t
@@ -28,7 +30,7 @@ module structure_family
   private
 
   public :: structure_of_family, structure_neighbourhood, fly_structure, map_of_structure, why_not_varied, vary_section, &
-    start_of_structure, advance_section, least_dimension
+    start_of_structure, state_at_start, advance_section, least_dimension
 
   !> A section point as near as this, in natural sizes, to what a joint holds is held.
   real(wp), parameter :: held_within = 1e-10_wp
@@ -69,29 +71,42 @@ contains
     type(law_choice_t), allocatable :: laws(:)
     character(len=:), allocatable :: why
     type(motion_t) :: moving
+    type(jointed_t) :: machine
     real(wp) :: sizes(2)
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
-    if (.not. allocated(moving%jointed)) then
-      call fail(error, exit_bad_case, 'body.law: variations are known of one body with a drive and of structures, not of two '// &
-                'bodies in their own form')
-      return
+    if (allocated(moving%pair)) then
+      call structure_of_pair(moving%pair%machine, machine, error)
+      if (allocated(error)) return
+      allocate (moving%jointed)
+      call prepare_jointed(machine, family%options, moving%jointed)
     end if
     why = why_not_varied(moving%jointed)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, 'body: the variations of this structure are not known: '//why)
       return
     end if
-    associate (machine => moving%jointed%machine)
-      sizes(1) = merge(machine%length_scale, 1.0_wp, machine%length_scale > 0)
-      sizes(2) = sizes(1)*machine%frequency
+    associate (scales => moving%jointed%machine)
+      sizes(1) = merge(scales%length_scale, 1.0_wp, scales%length_scale > 0)
+      sizes(2) = sizes(1)*scales%frequency
     end associate
     if (family%sizes(1) > 0) sizes = family%sizes
     structure = structure_of(moving%jointed, sizes)
+    if (allocated(moving%pair)) structure%pair = moving%pair%machine
   end subroutine structure_of_family
+
+  !> The state at a start as `start_strobe` has it.
+  pure type(jointed_state_t) function state_at_start(structure, start) result(state)
+    type(structure_t), intent(in) :: structure
+    real(wp), intent(in) :: start(:)
+    real(wp), allocatable :: own(:)
+    own = start
+    if (allocated(structure%pair)) own = start_as_structure(structure%pair, start)
+    state = start_of_jointed(structure%frame%moving, own(1), own(2), own(3), own(4:))
+  end function state_at_start
 
   !> The structure and its neighbours in the parameter.
   pure subroutine structure_neighbourhood(family, value, machines, error)

@@ -136,6 +136,7 @@ def test_a_stopped_run_goes_on_to_the_same_curves_with_any_ranks(run, coulomb, c
     ended = run("boundary", coulomb, "-o", out, "--resume")
     assert ended.returncode == 0, ended.stderr
     assert "2 parts of the work were done before" in ended.stdout
+    assert "is damaged behind 2 sound parts: what follows is computed again" in ended.stdout
     assert same_content(out, curves)
     assert [path.name for path in tmp_path.iterdir()] == ["stopped.h5"]
 
@@ -289,6 +290,23 @@ def test_what_is_no_sound_map_is_refused(run, coulomb, curves, tmp_path, how, co
     assert ended.returncode == code, ended.stderr
     assert said in ended.stderr
     assert not (tmp_path / "out.h5").exists()
+
+
+def test_a_run_begun_with_force_ends_after_resume(run, coulomb, curves, tmp_path):
+    out = tmp_path / "there.h5"
+    part = out.with_name("there.h5.part")
+    out.write_bytes(b"an older result")
+    assert run("boundary", coulomb, "-o", out, "--force", "--time-limit", 1e-3).returncode == 75
+    sound = part.read_bytes()
+    # without a working file to go on with nothing allows to replace what is there
+    part.write_bytes(b"damaged" + sound[7:])
+    ended = run("boundary", coulomb, "-o", out, "--resume")
+    assert ended.returncode == 73 and "exists" in ended.stderr
+    assert "is damaged from its beginning" in ended.stdout and "boundary points" not in ended.stdout
+    assert out.read_bytes() == b"an older result"
+    part.write_bytes(sound)
+    assert run("boundary", coulomb, "-o", out, "--resume").returncode == 0
+    assert same_content(out, curves) and not part.exists()
 
 
 def test_nothing_is_replaced_without_force(run, coulomb, curves):

@@ -237,7 +237,16 @@ def test_both_arms_that_break_the_symmetry_end_in_the_branch_point(separatrix, t
         labels = decode_flags(result["label"]).values
         at = labels == "BP"
         values, branch = result["parameter"].values[at], result["branch"].values[at]
-        assert np.unique(branch).size == 3 and np.ptp(values) == 0
+        assert np.ptp(values) < 1e-11
+        # the symmetric branch, and both arms: two branches that end there, or one that passes
+        symmetric = [
+            result["symmetric"].values[result["branch"].values == one].mean() > 0.5 for one in branch
+        ]
+        assert sum(symmetric) == 1
+        words = set()
+        for number in set(branch) - {branch[symmetric.index(True)]}:
+            words |= set(decode_words(result["event_word"][result["branch"].values == number]).values)
+        assert words == {"L..R.", "RL..R.", "L.L.R."}
         assert np.abs(result["multiplier_real"].values[at, 0] - 1).max() < 1e-8
         # Newton's method on the map over half a period, which an independent integrator flew
         assert 0.82089345 < values[0] < 0.82092812
@@ -332,3 +341,37 @@ def test_a_signal_ends_it(separatrix: Path, source_dir: Path, tmp_path: Path) ->
     process.terminate()
     assert process.wait(10) == -signal.SIGTERM
     assert list(tmp_path.iterdir()) == []
+
+
+# soft stops: beside two of its branch points lies a graze, and several of its branches close
+SOFT_STOPS = BETWEEN_STOPS.replace(
+    '"newton", restitution = 0.6', '"kelvin_voigt", stiffness = 800, damping = 2'
+)
+
+
+def test_every_turn_has_one_label(separatrix: Path, tmp_path: Path):
+    """The parameter turns in folds and branch points, each once on a branch, its mirror image aside."""
+    case, out = tmp_path / "case.toml", tmp_path / "out.h5"
+    case.write_text(SOFT_STOPS)
+    words = ("--parameter", "drive.ratio", "--from", "0.7", "--to", "0.95", "--searches", "4", "-o", out)
+    ended = subprocess.run(
+        [separatrix, "branches", case, *words], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 0, ended.stderr
+    turns = 0
+    with open_result(out) as result:
+        numbers, parameter = result["branch"].values, result["parameter"].values
+        labels, speeds = decode_flags(result["label"]).values, result["v"].values
+        for number in np.unique(numbers):
+            chosen = numbers == number
+            rises, label = np.diff(parameter[chosen]), labels[chosen]
+            for k in np.flatnonzero((rises[:-1] * rises[1:] < 0) & (abs(rises[1:]) > 1e-11)):
+                turns += 1
+                assert set(label[k : k + 3]) & {"SN", "BP", "GR-fold", "not_known"}
+            places = [
+                (name, round(at, 9), round(speed, 5))
+                for name, at, speed in zip(label, parameter[chosen], speeds[chosen], strict=True)
+                if name in {"SN", "PD"}
+            ]
+            assert len(places) == len(set(places))
+    assert turns > 5

@@ -93,6 +93,49 @@ def test_a_graze_that_is_met_from_the_side_of_the_impact_has_its_name(follow, tm
     assert grazes == pytest.approx([0.8506164517288], abs=1e-11)
 
 
+def test_multipliers_that_a_graze_hides_are_not_numbers(follow, tmp_path: Path):
+    """Mirror images of one motion graze at one place: what is told of their multipliers is the same."""
+    case = tmp_path / "three.toml"
+    case.write_text(BETWEEN_STOPS)
+    points, _ = follow(case, "drive.d.frequency", 2.2, 2.3, "--searches", "2")
+    grazes = [point for point in points if point["label"].startswith("GR") and point["word"] in {"L.", "R."}]
+    told = [point["multipliers"][2::2] for point in grazes if abs(point["multipliers"][0]) > 1e7]
+    assert len(told) >= 2
+    assert all(value is None for values in told for value in values)
+
+
+BETWEEN_STOPS = """
+[body.a]
+mass = 1
+[body.b]
+mass = 1
+[spring.s]
+between = ["a"]
+stiffness = 20
+damping = 0.4
+[spring.t]
+between = ["a", "b"]
+stiffness = 15
+damping = 0.3
+[friction.f]
+between = ["b"]
+force = 0.1
+[contact.c]
+between = ["a"]
+law = "newton"
+restitution = 0.6
+upper = 0.3
+lower = -0.3
+[drive.d]
+law = "force"
+body = "b"
+amplitude = 1.5
+frequency = 2.5
+[watch]
+body = "a"
+"""
+
+
 def test_a_soft_stop(follow, source_dir: Path, tmp_path: Path):
     """The branch passes the graze both ways, which is where the amplitude without the stop is the gap."""
     text = (source_dir / "examples" / "structure_two_masses.toml").read_text()

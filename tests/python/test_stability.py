@@ -67,6 +67,12 @@ def test_what_makes_no_sense_is_refused(run):
     assert "--output belongs to" in ended.stderr
 
 
+def test_a_start_beyond_a_barrier_names_where_it_comes_from(run):
+    ended = run("--set", "contact.upper=0.0", "--set", "start.x0=0.5")
+    assert ended.returncode == 65
+    assert "--set start.x0=0.5: key 'start.x0': found x0 = 0.5 m, allowed at most the barrier" in ended.stderr
+
+
 def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp_path: Path):
     """Chaos beside a cycle at a soft wall, chaos at a rigid one with its exact sum; cycles are left out."""
 
