@@ -20,7 +20,7 @@ _DIVERGING = "PuOr"
 
 
 def where_lines(details: h5py.File) -> Figure | None:
-    """The missing force over time, drive phase, position, velocity, low speed and time since an impact; at impacts."""
+    """The missing force over time, phase, position, velocity, low speed, time since an impact; at impacts."""
     names = [name for name in details["where"] if "velocity_edges" not in details["where"][name]]
     order = (
         "drive phase",
