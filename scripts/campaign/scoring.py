@@ -39,6 +39,7 @@ DEPENDS_ON = {
 
 SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
 PLANE, PHASE, IMPACT = "position and velocity", "drive phase", "time since the last impact"
+IMPACT_SPEED = "impact speed"
 FAMILIES = {
     "friction over speed": {"viscous", "coulomb", "quadratic_drag", "stribeck", "friction_curve"},
     "friction over place": {"position_dependent_friction", "friction_place_curve"},
@@ -60,8 +61,8 @@ REGIONS = {
     "dahl": {REVERSAL, PLANE},
     "position_dependent_friction": {PLANE},
     "cubic_spring": {PLACE, PLANE},
-    "restitution_slope": {IMPACT},
-    "compliant_contact": {IMPACT},
+    "restitution_slope": {IMPACT, IMPACT_SPEED},
+    "compliant_contact": {IMPACT, IMPACT_SPEED},
     "second_barrier": {PLACE, PLANE},
     "drive_ripple": {PHASE},
 }

@@ -294,3 +294,22 @@ def test_each_of_several_effects_is_held_against_its_family(monkeypatch):
     assert tried == [("quadratic_drag", "cubic_spring")]
     known = [whole, named("cubic_spring", "quadratic_drag")]
     assert list(several._swapped(bench, first, whole, known)) == []
+
+
+@pytest.mark.parametrize(("decrement", "foretells", "outcome"), [
+    (100.0, False, "none"),
+    (100.0, True, "named"),
+    (0.0, False, "ambiguous"),
+])  # fmt: skip
+def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record(
+    monkeypatch, decrement, foretells, outcome
+):
+    """As a contact that is as stiff as a rigid one, from where the base left a wrong minimum."""
+    monkeypatch.setattr(decide, "_gap_of_base", lambda *_: ([], False))
+    base = fitted("", np.full(COUNT, 60.0))
+    base.fit.decrement = decrement
+    best = judged(np.full(COUNT, 5.0), np.zeros(COUNT))
+    best.gates = {"hold-out": foretells, "admissible": True, "converged": True}
+    decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
+    bench = SimpleNamespace(options=replace(OPTIONS, adequate_chi2=2.0))
+    assert decide._conclude(bench, decision, best, []).outcome == outcome

@@ -14,18 +14,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from separatrix.discovery.fitting.motions import after_impacts, scaled_motion
+from separatrix.discovery.fitting.motions import after_impacts, impacts_at, scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.response import force_columns
+from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.options import Options
 from separatrix.discovery.wording import Units, units_of
 
+IMPACT_SPEED = "impact speed"
+_IMPACT_BINS, _FEWEST_IMPACTS = 4, 3
 _LEVEL = 0.01
 _BLOCK = 2
 # share of what the best map explains from which on another tells as much
-_NEARLY = 0.8
+_NEARLY = 0.9
 
 
 @dataclass
@@ -65,6 +67,11 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     maps = [one for one in maps if one is not None]
     tables = [member for _, _, _, _, member in maps]
     columns = force_columns(problem, fit, np.concatenate(tables, axis=2), mass)
+    impacts = _impacts(problem, fit, units)
+    if impacts is not None:
+        maps.append(impacts)
+        tables.append(impacts[4])
+        columns = np.concatenate([columns, kick_columns(problem, fit, impacts[4])], axis=2)
     force, error = _forces(fitted, columns, options)
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
     flags &= _telling(fitted, columns, [member.shape[2] for member in tables])
@@ -72,7 +79,8 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     for name, unit, edges, other, member in maps:
         part = slice(first, first + member.shape[2])
         first = part.stop
-        found.append(Map(name, unit, units.force, edges, other, force[part], error[part], flags[part]))
+        of = units.velocity if name == IMPACT_SPEED else units.force
+        found.append(Map(name, unit, of, edges, other, force[part], error[part], flags[part]))
     return found
 
 
@@ -110,6 +118,21 @@ def _plane(x: np.ndarray, v: np.ndarray, inside: np.ndarray, count: int, units: 
         return None
     member = (one[4][:, :, :, None] * other[4][:, :, None, :]).reshape(*x.shape, -1)
     return "position and velocity", f"{units.position}, {units.velocity}", one[2], other[2], member
+
+
+def _impacts(problem, fit, units: Units) -> tuple | None:
+    """Bins of the speed before an impact, in which the speed after it is changed."""
+    before, at = impacts_at(problem, fit)
+    at = at * fit.good[:, None]
+    hit = at != 0
+    if hit.sum() < _FEWEST_IMPACTS * _IMPACT_BINS:
+        return None
+    edges = np.unique(np.quantile(before[hit], np.linspace(0, 1, _IMPACT_BINS + 1)))
+    if edges.size < 3:
+        return None
+    place = np.clip(np.searchsorted(edges, before, side="right") - 1, 0, edges.size - 2)
+    member = (place[:, :, None] == np.arange(edges.size - 1)) * at[:, :, None]
+    return IMPACT_SPEED, units.velocity, edges, None, member
 
 
 def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +174,7 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
 
 
 def _telling(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
-    """Bins of the maps of which all bins together explain nearly as much as those of any other.
+    """Bins of the simplest of the maps whose bins together explain nearly as much as those of any other.
 
     Where a motion repeats itself, the place, the speed and the phase of a missing force go together.
     """
@@ -168,7 +191,9 @@ def _telling(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarra
         part = slice(first, last)
         step = solve_scaled(left[part, part], score[part], np.ones(last - first, bool))
         gains.append(float(score[part] @ step) - (last - first))
-    return np.repeat(np.array(gains) >= _NEARLY * max(gains), sizes)
+    near = np.array(gains) >= _NEARLY * max(gains)
+    simplest = min(size for size, one in zip(sizes, near, strict=True) if one)
+    return np.repeat(near & (np.array(sizes) == simplest), sizes)
 
 
 def benjamini_hochberg(p: np.ndarray, level: float) -> np.ndarray:
@@ -194,11 +219,16 @@ def sentences(maps: list[Map]) -> list[dict]:
                     "force": float(one.force[place]),
                     "error": float(one.error[place]),
                     "unit": one.force_unit,
-                    "text": f"a force of {one.force[place]:.3g} +- {one.error[place]:.2g} "
+                    "text": f"a {quantity_of(one.name)} of {one.force[place]:.3g} +- {one.error[place]:.2g} "
                     f"{one.force_unit} is missing {region['text']}",
                 }
             )
     return found
+
+
+def quantity_of(name: str) -> str:
+    """What a map says is missing."""
+    return "speed after impacts" if name == IMPACT_SPEED else "force"
 
 
 def _region(one: Map, place: int) -> dict:

@@ -13,13 +13,14 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from separatrix import style
+from separatrix.discovery.decision.where import IMPACT_SPEED, quantity_of
 from separatrix.discovery.report.figures import BEFORE, LINE, MEASURED
 
 _DIVERGING = "PuOr"
 
 
 def where_lines(details: h5py.File) -> Figure | None:
-    """The missing force over time, drive phase, position, velocity, low speed and time since an impact."""
+    """The missing force over time, phase, position, velocity, low speed, time since an impact; at impacts."""
     names = [name for name in details["where"] if "velocity_edges" not in details["where"][name]]
     order = (
         "drive phase",
@@ -27,6 +28,7 @@ def where_lines(details: h5py.File) -> Figure | None:
         "velocity",
         "low speed",
         "time since the last impact",
+        IMPACT_SPEED,
     )
     names.sort(key=lambda name: order.index(name) if name in order else -1)
     if not names:
@@ -42,8 +44,9 @@ def where_lines(details: h5py.File) -> Figure | None:
         unit = details["where"][name].attrs["unit"]
         ax.set_xlabel(f"{name} ({unit})")
         ax.set_title(f"{letter})", loc="left")
-    for ax, name in zip(axes[::3], names[::3], strict=False):
-        ax.set_ylabel(f"missing force ({details['where'][name].attrs['force_unit']})")
+    for place, (ax, name) in enumerate(zip(axes, names, strict=False)):
+        if place % 3 == 0 or name == IMPACT_SPEED:
+            ax.set_ylabel(f"missing {quantity_of(name)} ({details['where'][name].attrs['force_unit']})")
     handles = [
         Line2D([], [], linestyle="", marker="o", color=BEFORE, markersize=3.5, label="flagged"),
         Line2D(
