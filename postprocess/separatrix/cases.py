@@ -40,15 +40,24 @@ class Case:
     Two cases are equal if they describe the same machine and the same work, however they were written.
     """
 
-    def __init__(self, text: str, name: str | Path, settings: Iterable[str] = ()) -> None:
-        """Check a text with settings "key.path=value" on top; CaseError says all that is wrong."""
+    def __init__(
+        self, text: str, name: str | Path, settings: Iterable[str] = (), directory: Path | None = None
+    ) -> None:
+        """Check a text with settings "key.path=value" on top; CaseError says all that is wrong.
+
+        `name` stands for the file in messages. Files that the case names are looked for in `directory`, or
+        in that of `name`, wherever the process goes afterwards.
+        """
         self._text = text
         self._name = str(name)
         self._settings = tuple(settings)
+        self._directory = (directory or Path(name).parent).absolute()
+        path = self._directory / Path(name).name
         try:
-            self._model = Model.from_settings(text, self._name, self._settings)
+            self._model = Model.from_settings(text, path, self._settings)
         except CaseError as error:
-            raise CaseError(_in_python(str(error), self._settings), error.code) from None
+            message = str(error).replace(str(path), self._name)
+            raise CaseError(_in_python(message, self._settings), error.code) from None
 
     @classmethod
     def from_text(cls, text: str, directory: str | Path = ".") -> Self:
@@ -72,7 +81,7 @@ class Case:
         """
         new = {**(changes or {}), **{key.replace("__", "."): value for key, value in more.items()}}
         settings = [f"{key}={toml(value)}" for key, value in new.items()]
-        return type(self)(self._text, self._name, self._settings + tuple(settings))
+        return type(self)(self._text, self._name, self._settings + tuple(settings), self._directory)
 
     @property
     def name(self) -> str:
@@ -82,7 +91,7 @@ class Case:
     @property
     def directory(self) -> Path:
         """Where files that the case names are looked for."""
-        return Path(self._name).parent
+        return self._directory
 
     @property
     def title(self) -> str:
@@ -114,14 +123,26 @@ class Case:
         return self._model.to_text({})
 
     def save(self, path: str | Path) -> Path:
-        """Write the case as a file: as it was read, or resolved if values were put on top."""
+        """Write the case as a file: as it was read, or resolved if values were put on top.
+
+        It is resolved, too, where the text would not say the same: it names files that are in another folder.
+        """
         path = Path(path)
-        path.write_text(self.to_toml() if self._settings else self._text)
+        path.write_text(self._text if not self._settings and self._reads_at(path) else self.to_toml())
         return path
+
+    def _reads_at(self, path: Path) -> bool:
+        """Whether the text says the same in another place."""
+        try:
+            return type(self)(self._text, path) == self
+        except CaseError:
+            return False
 
     def on_command_line(self, folder: Path) -> list[str]:
         """Return how to name this case to the program; what has to be a file is written into `folder`."""
         source = Path(self._name)
+        if source.parent.absolute() != self._directory:
+            source = self._directory / source.name
         short = all(len(setting.encode()) < _LONGEST_SETTING for setting in self._settings)
         if short and len(self._settings) < 100 and _holds(source, self._text):
             return [str(source), *(part for setting in self._settings for part in ("--set", setting))]

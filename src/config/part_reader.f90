@@ -9,7 +9,7 @@ module part_reader
   use case_values, only: take_real, take_reals, take_text
   use drive_record, only: read_record
   use kinds, only: wp
-  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
+  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, list_of, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, set_value, value_of
   use structure_reader, only: read_structure
   use suggest, only: nearest_word
@@ -97,7 +97,7 @@ contains
       call append_block(bodies%left_out, left_out)
     end do
     bodies%names = [bodies%names, pack(structures%label, index(structures%name, 'point:') == 1)]
-    call check_columns(source, bodies%names)
+    call check_columns(source, bodies%names, structures)
     call read_watch(source, bodies, watched)
     do i = 1, size(kinds_of_parts)
       names = names_of(source, trim(kinds_of_parts(i)))
@@ -129,18 +129,59 @@ contains
     end do
   end subroutine check_names
 
-  !> Columns of results are named after the places, with _ for a point.
-  subroutine check_columns(source, names)
+  !> Columns of results are named after the places, and after the coordinates of structures, with _ for a dot.
+  subroutine check_columns(source, names, structures)
     type(case_source_t), intent(inout) :: source
     character(len=label_length), intent(in) :: names(:)
+    type(law_choice_t), intent(in) :: structures(:)
     integer :: i, k
     do i = 1, size(names)
       do k = 1, i - 1
-        if (replace_all(trim(names(i)), '.', '_') /= replace_all(trim(names(k)), '.', '_')) cycle
+        if (column_of(names(i)) /= column_of(names(k))) cycle
         call report(source, 'structure.'//names(i)(:index(names(i), '.') - 1), 'found the point "'//trim(names(i))// &
                     '" and a "'//trim(names(k))//'", allowed names that differ in more than a dot')
       end do
     end do
+    do i = 1, size(structures)
+      if (index(structures(i)%name, 'structure:') /= 1) cycle
+      do k = 1, size(list_of(structures(i), 'x0'))
+        call check_coordinate(column_of(trim(structures(i)%label)//'.'//to_text(k)), trim(structures(i)%label), k)
+      end do
+    end do
+
+  contains
+
+    pure function column_of(name) result(column)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: column
+      column = replace_all(trim(name), '.', '_')
+    end function column_of
+
+    !> No place has the column of coordinate number `number` of a structure.
+    subroutine check_coordinate(column, structure, number)
+      character(len=*), intent(in) :: column, structure
+      integer, intent(in) :: number
+      integer :: place, dot
+      do place = 1, size(names)
+        if (column_of(names(place)) /= column) cycle
+        dot = index(names(place), '.')
+        if (dot == 0) then
+          call report(source, 'body.'//trim(names(place)), 'found a body'//also(structure, number))
+        else
+          call report(source, 'structure.'//names(place)(:dot - 1)//'.point.'//trim(names(place)(dot + 1:)), &
+                      'found a point'//also(structure, number))
+        end if
+      end do
+    end subroutine check_coordinate
+
+    pure function also(structure, number) result(text)
+      character(len=*), intent(in) :: structure
+      integer, intent(in) :: number
+      character(len=:), allocatable :: text
+      text = ' whose columns in results are those of coordinate '//to_text(number)//' of [structure.'//structure// &
+             '], allowed another name'
+    end function also
+
   end subroutine check_columns
 
   !> The body or point that the start and the results refer to: the first, unless [watch] names another.

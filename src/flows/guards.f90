@@ -59,7 +59,7 @@ contains
           if (phase == 0) then
             call put(list, count_guards, joint_guard_t(j, slides_up, constant=level, force=1.0_wp, held=held))
             call put(list, count_guards, joint_guard_t(j, slides_down, constant=level, force=-1.0_wp, held=held))
-          else
+          else if (.not. flow%still(j)) then
             call put(list, count_guards, joint_guard_t(j, slide_ends, speed=d, from_zero=changed))
           end if
         case (joint_elastic)

@@ -4,7 +4,8 @@
 !> One flight of a linear mode: to the first guard that falls, or to a time.
 module linear_flight
   use flight_path, only: begin_path, guard_row, path_at, path_t, series_step, terms
-  use guard_search, only: find_first, prepare_search, search_t
+  use guard_functions, only: prepare_search, search_t
+  use guard_search, only: find_first
   use guards, only: guards_of, joint_guard_t, most_guards
   use jointed, only: jointed_t
   use jointed_state, only: jointed_state_t

@@ -207,7 +207,7 @@ contains
     type(jointed_state_t), intent(in) :: state
     real(wp), intent(in) :: y(:)
     real(wp), intent(out) :: scale(:)
-    real(wp) :: slope(size(y)), length, mass, force, p, u
+    real(wp) :: slope(size(y)), z(2*machine%n + 2 + 2*system%harmonics), length, mass, force, p, u
     integer :: k, n
     n = machine%n
     slope = system%slope(0.0_wp, y)
@@ -216,15 +216,17 @@ contains
     scale(:n) = max(length, abs(state%q(:n)))
     scale(n + 1:) = length*machine%frequency
     length = huge(length)
+    z = unknowns(system, 0.0_wp, y)
     do k = 1, system%count_joints
       if (system%joints(k)%kind /= joint_soft) cycle
-      ! How deep a body of the contact's mass goes at its speed, or rests under its force.
+      ! How deep a body of the contact's mass goes at its speed, rests under its force, or is held.
       associate (law => system%joints(k)%contact, row => system%joints(k)%row)
         mass = 1/sum(row*matmul(machine%mobility, row))
         u = abs(sum(row*y(n + 1:)))
         force = mass*abs(sum(row*slope(n + 1:)))
-        p = max(depth(law, mass*u**2, 1.0_wp), depth(law, force, 0.0_wp), tiny(p))
-        if (.not. p < length) cycle
+        p = max(depth(law, mass*u**2, 1.0_wp), depth(law, force, 0.0_wp), &
+                abs(sum(system%place(:, k)*z) - stop_of(system%joints(k), system%phase(k))))
+        if (.not. p < length .or. .not. p > tiny(p)) cycle
         length = p
         scale(:n) = p
         scale(n + 1:) = max(u, sqrt(law%stiffness/mass*exponential((law%exponent + 1)*logarithm(p))))

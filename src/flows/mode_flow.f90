@@ -11,46 +11,15 @@ module mode_flow
   use jointed_state, only: is_held
   use kinds, only: wp
   use matrices, only: solve
+  use mode_flow_type, only: mode_flow_t
+  use mode_matrix, only: set_matrix
   implicit none
   private
 
-  public :: build_flow, harmonics_of
+  public :: build_flow, harmonics_of, mode_flow_t
 
   !> Modes nearer to each other than this share are left to the series; stiffness and damping below this share are none.
   real(wp), parameter :: worst_condition = 1e5_wp, none_at_all = 1e-12_wp, nearest_resonance = 1e-5_wp
-
-  type, public :: mode_flow_t
-    integer :: key = -1
-    logical :: modal = .false.
-    !> Joints that are constraints, and those of them that do not depend on the others.
-    integer, allocatable :: held(:), independent(:)
-    !> Structure with the springs of the joints.
-    real(wp), allocatable :: stiffness(:, :), damping(:, :)
-    !> Where unit coordinates of the independent constraints move the structure, statically in the metric of the masses.
-    real(wp), allocatable :: carried(:, :)
-    !> Forces of the constraints per force on the coordinates, and per acceleration of their surfaces.
-    real(wp), allocatable :: reaction(:, :), hold(:, :)
-    !> Free directions (columns, orthonormal in the metric of the masses): flexible, damped rigid, rigid.
-    real(wp), allocatable :: basis(:, :)
-    integer :: flexible = 0, damped = 0, rigid = 0
-    !> Natural frequencies of the flexible ones [rad/s].
-    real(wp), allocatable :: frequency(:)
-    !> Exponents, shapes in the coordinates (of a conjugate pair one, twofold), and rows that give their amplitudes
-    !> from basis coordinates times frequency and their speeds.
-    complex(wp), allocatable :: exponent(:), shape(:, :), left(:, :)
-    real(wp), allocatable :: size_of_exponent(:)
-    !> Amplitude of the damped rigid coordinates per amplitude of the exponentials.
-    complex(wp), allocatable :: drift(:, :)
-    !> Periodic response of the coordinates to the harmonics.
-    complex(wp), allocatable :: response(:, :)
-    !> Shapes and responses along the rows of the joints, and of the forces of the constraints.
-    complex(wp), allocatable :: joint_shape(:, :), joint_response(:, :), force_shape(:, :), force_response(:, :)
-    !> Matrix of the coordinates, their speeds, 1, the time, cosines and sines; bound on its rate [1/s].
-    real(wp), allocatable :: matrix(:, :)
-    real(wp) :: rate = 0
-    !> Rows of the joint coordinates, their speeds, and the forces of the constraints over the same unknowns.
-    real(wp), allocatable :: place_row(:, :), speed_row(:, :), force_row(:, :)
-  end type mode_flow_t
 
 contains
 
@@ -111,7 +80,7 @@ contains
     type(mode_flow_t), intent(inout) :: flow
     real(wp), allocatable :: w(:, :), g(:, :), column(:), unit(:), answer(:)
     real(wp) :: left
-    integer :: i, k, m
+    integer :: i, j, k, m
     logical :: ok
     m = size(flow%held)
     allocate (w(machine%n, m))
@@ -154,7 +123,27 @@ contains
       call solve(g, column, flow%hold(:, i), ok)
     end do
     flow%reaction = matmul(flow%hold, matmul(transpose(w), machine%mobility))
+    flow%still = [(keeps_still(machine, flow, j), j=1, size(machine%joints))]
   end subroutine set_constraints
+
+  !> Whether the speed of joint `j` is constant in this mode: nothing is left of its row by the constraints.
+  pure logical function keeps_still(machine, flow, j)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    integer, intent(in) :: j
+    real(wp) :: alone(machine%n), left(machine%n)
+    integer :: i
+    keeps_still = .not. allocated(machine%joints(j)%offset%harmonic)
+    alone = matmul(machine%mobility, machine%joints(j)%row)
+    left = alone
+    do i = 1, size(flow%independent)
+      associate (joint => machine%joints(flow%held(flow%independent(i))))
+        keeps_still = keeps_still .and. .not. allocated(joint%offset%harmonic)
+        left = left - flow%carried(:, i)*sum(joint%row*alone)
+      end associate
+    end do
+    keeps_still = keeps_still .and. sum(machine%joints(j)%row*left) <= 1e-10_wp*sum(machine%joints(j)%row*alone)
+  end function keeps_still
 
   !> Harmonics of the forces on the coordinates, those of springs on moving surfaces included, and of the surfaces of the
   !> constraints.
@@ -388,98 +377,5 @@ contains
                                   - iw**2*matmul(flow%hold, surface(:, m))
     end do
   end subroutine set_rows
-
-  !> The matrix of the motion with everything that drives it. Constant and linear parts of the forces belong to the flight:
-  !> their columns are left to it.
-  pure subroutine set_matrix(machine, flow, forcing, surface)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(inout) :: flow
-    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
-    real(wp), allocatable :: push(:, :), power(:, :)
-    complex(wp), allocatable :: driven(:)
-    real(wp) :: size_of_matrix, size_of_power, w
-    integer :: n, m, i, harmonics, c
-    n = machine%n
-    harmonics = size(forcing, 2)
-    allocate (flow%matrix(2*n + 2 + 2*harmonics, 2*n + 2 + 2*harmonics), source=0.0_wp)
-    push = held_mobility(machine, flow)
-    do i = 1, n
-      flow%matrix(i, n + i) = 1
-    end do
-    flow%matrix(n + 1:2*n, :n) = -matmul(push, flow%stiffness)
-    flow%matrix(n + 1:2*n, n + 1:2*n) = -matmul(push, flow%damping)
-    flow%matrix(2*n + 2, 2*n + 1) = 1
-    do m = 1, harmonics
-      c = 2*n + 1 + 2*m
-      w = m*machine%frequency
-      driven = matmul(push, forcing(:, m)) + w**2*matmul(flow%carried, surface(flow%independent, m))
-      flow%matrix(n + 1:2*n, c) = real(driven)
-      flow%matrix(n + 1:2*n, c + 1) = -aimag(driven)
-      flow%matrix(c, c + 1) = -w
-      flow%matrix(c + 1, c) = w
-    end do
-    size_of_matrix = maxval(sum(abs(flow%matrix), dim=1))
-    power = flow%matrix/size_of_matrix
-    do i = 1, 4
-      power = matmul(power, power)
-    end do
-    size_of_power = maxval(sum(abs(power), dim=1))
-    do i = 1, 4
-      size_of_power = sqrt(size_of_power)
-    end do
-    flow%rate = max(size_of_matrix*size_of_power, machine%frequency)
-    call set_matrix_rows(machine, flow, forcing, surface)
-  end subroutine set_matrix
-
-  !> Joint coordinates, speeds and forces of constraints as rows over the unknowns of the matrix; their constant and linear
-  !> parts are left to the flight.
-  pure subroutine set_matrix_rows(machine, flow, forcing, surface)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(inout) :: flow
-    complex(wp), intent(in) :: forcing(:, :), surface(:, :)
-    complex(wp), allocatable :: driven(:)
-    complex(wp) :: amplitude
-    real(wp) :: w
-    integer :: n, m, j, c, unknowns
-    n = machine%n
-    unknowns = size(flow%matrix, 1)
-    allocate (flow%place_row(unknowns, size(machine%joints)), flow%speed_row(unknowns, size(machine%joints)), &
-              flow%force_row(unknowns, size(flow%held)), source=0.0_wp)
-    do j = 1, size(machine%joints)
-      flow%place_row(:n, j) = machine%joints(j)%row
-      flow%speed_row(n + 1:2*n, j) = machine%joints(j)%row
-    end do
-    flow%force_row(:n, :) = transpose(matmul(flow%reaction, flow%stiffness))
-    flow%force_row(n + 1:2*n, :) = transpose(matmul(flow%reaction, flow%damping))
-    do m = 1, size(forcing, 2)
-      c = 2*n + 1 + 2*m
-      w = m*machine%frequency
-      do j = 1, size(machine%joints)
-        amplitude = offset_of(machine%joints(j), m)
-        flow%place_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
-        amplitude = amplitude*cmplx(0.0_wp, w, wp)
-        flow%speed_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
-      end do
-      driven = -matmul(flow%reaction, forcing(:, m)) + w**2*matmul(flow%hold, surface(:, m))
-      flow%force_row(c, :) = real(driven)
-      flow%force_row(c + 1, :) = -aimag(driven)
-    end do
-  end subroutine set_matrix_rows
-
-  !> Accelerations per force on the coordinates, with the constraints held.
-  pure function held_mobility(machine, flow) result(push)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    real(wp) :: push(machine%n, machine%n)
-    integer :: i, k
-    push = machine%mobility
-    do i = 1, size(flow%independent)
-      associate (row => machine%joints(flow%held(flow%independent(i)))%row)
-        do k = 1, machine%n
-          push(:, k) = push(:, k) - flow%carried(:, i)*sum(row*machine%mobility(:, k))
-        end do
-      end associate
-    end do
-  end function held_mobility
 
 end module mode_flow

@@ -144,7 +144,7 @@ inline void strike(const structure_machine &m, const size &z, int j, mask at, ma
 template <class size>
 inline mask take_events(const structure_machine &m, const size &z, mask due, structure_group &g) {
   vec q[most_coordinates], v[most_coordinates], phase[most_joints], time = g.s.time, left = g.s.left,
-                                                                    speed = {};
+                                                                    burst = g.s.burst, speed = {};
   structure_bases b;
   mask rare = {}, struck = {}, stuck = {}, changed = {};
   for (int i = 0; i < z.coordinates; i++) {
@@ -158,6 +158,7 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
   put(g.s.time, due, g.s.start + g.s.span);
   put(g.s.left, due, 0);
   put(g.s.rising, due, 0);
+  put(g.s.burst, due & (g.s.span >= m.burst_gap), 0);
   for (int i = 0; i < z.coordinates; i++)
     rare = rare | (due & ~(magnitude(g.s.q[i]) < m.domain));
   for (int j = 0; j < z.joints; j++) {
@@ -170,9 +171,10 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
       stuck = stuck | now;
     } else {
       // The scalar code counts impacts that follow each other so fast.
-      rare = rare | (at & (g.s.span < m.burst_gap));
+      rare = rare | (at & (g.s.span < m.shortest));
       strike(m, z, j, at, rare, g);
       put(speed, at, magnitude(g.s.end_f1[j]));
+      put(g.s.burst, at, g.s.burst + 1.0);
       struck = struck | at;
     }
   }
@@ -187,6 +189,7 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
       put(g.s.phase[j], rare, phase[j]);
     put(g.s.time, rare, time);
     put(g.s.left, rare, left);
+    put(g.s.burst, rare, burst);
   }
   put(g.c.flights, changed & ~rare, g.c.flights + 1.0);
   put(g.s.sticks, stuck & ~rare, g.s.sticks + 1.0);
@@ -244,6 +247,7 @@ inline void take_stops(const structure_machine &m, const size &z, mask there, bo
   put(g.c.flights, there, g.c.flights + 1.0);
   put(g.s.time, there, pick(section, vec{}, g.c.until));
   put(g.s.left, there, 0);
+  put(g.s.burst, there, 0);
   put(g.s.start, section, g.s.start - m.period);
   put(g.c.elapsed, passing, g.c.elapsed + m.period);
   put(g.c.captor, passing, captor);

@@ -103,6 +103,7 @@ contains
     batch%time(lane) = state%time
     batch%left(lane) = 0
     batch%rising(lane) = 0
+    batch%burst(lane) = state%burst
     do j = 1, size(moving%machine%joints)
       batch%phase(lane, j) = state%phase(j)
       if (state%left(j) == 0) cycle
@@ -128,6 +129,7 @@ contains
       state%left(j) = 0
       if (nint(abs(batch%left(lane))) == j) state%left(j) = nint(sign(1.0_wp, batch%left(lane)))
     end do
+    state%burst = nint(batch%burst(lane))
   end subroutine structure_lane_state
 
   !> Moves what lanes count of structures beyond that of one body to a tally.

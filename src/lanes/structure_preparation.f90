@@ -28,7 +28,7 @@ module structure_preparation
   real(wp), parameter :: coarse = 3.0_wp, stretches(panel_lengths) = [4.0_wp, 2.5_wp, 1.6_wp, 1.0_wp]
   !> Shares of the sizes of forces and lengths within which a choice is left to the event loop.
   real(wp), parameter :: rounding = 1e-12_wp
-  !> Longest end of a chatter that is completed, and shortest flight between impacts that are no burst, in periods; as in
+  !> Longest end of a chatter that is completed, and shortest flight that ends a burst of impacts, in periods; as in
   !> `jointed_transition` and `jointed_motion`.
   real(wp), parameter :: longest_chatter = 1e-2_wp, burst_gap = 1e-6_wp
 
@@ -55,7 +55,8 @@ contains
       m%slowest = machine%negligible_speed
       m%chatter_share = moving%chatter_share
       m%chatter_time = longest_chatter*machine%period
-      m%burst_gap = 10*burst_gap*machine%period
+      m%burst_gap = burst_gap*machine%period
+      m%shortest = 10*m%burst_gap
       do j = 1, size(machine%joints)
         call set_joint(machine, j, m%joint(j))
       end do

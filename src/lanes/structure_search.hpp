@@ -15,6 +15,9 @@ namespace {
 
 enum { most_panels = 256, most_polishings = 8, most_tries = 24, most_newtons = 3 };
 
+// A step over which the slope changes by no more than this share is off by that to the power seven.
+const double straight = 1.0 / 64;
+
 // Is w > 0 strictly between two times `span` apart? Zero at an end is allowed, and a zero rate there.
 // `error`: bound on the sixth derivative times span^6/14400, the share of the middle coefficient. `halves`:
 // of both halves.
@@ -264,12 +267,14 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
     put(low, w > 0.0, s);
     high = pick(w > 0.0, high, s);
     vec step = -w * (w1 * w1 - 0.5 * w * w2) / (w1 * (w1 * w1 - w * w2) + (1.0 / 6) * w * w * c.w3);
-    // Where the step is short Taylor's polynomial is the function: its zero.
+    // Where the step is short Taylor's polynomial is the function: its zero, by one step of Newton's method
+    // where the slope hardly changes on the way.
+    mask near = (magnitude(step) <= m.close) & (magnitude(step * w2) <= -straight * w1);
     vec zero = zero_nearby(z, p.target, c, far, step);
-    step = pick(magnitude(step) <= m.close, zero, step);
+    step = pick(near, zero, step);
     vec next = s + step;
     mask guided = (w1 < 0.0) & (next >= low) & (next <= high) & (next > p.t);
-    mask close = asked & guided & (magnitude(step) <= m.close) & (magnitude(w) <= -2 * m.close * w1);
+    mask close = asked & guided & near & (magnitude(step) <= m.close) & (magnitude(w) <= -2 * m.close * w1);
     if (any(close)) {
       for (int k = 0; k < z.terms; k++) {
         vec re = b.re[k], im = b.im[k];

@@ -43,7 +43,7 @@ module structure_types
     real(c_double) :: coordinates = 0, joints = 0, waves = 0, drive_frequency = 0, period = 0, domain = 0, close = 0
     real(c_double), dimension(panel_lengths) :: panel = 0, steepest = 0
     real(c_double), dimension(lane_waves, panel_lengths) :: step_cosine = 0, step_sine = 0
-    real(c_double) :: slowest = 0, chatter_share = 0, chatter_time = 0, burst_gap = 0
+    real(c_double) :: slowest = 0, chatter_share = 0, chatter_time = 0, burst_gap = 0, shortest = 0
     type(structure_joint_t) :: joint(lane_joints)
     type(structure_mode_t) :: mode(lane_structure_modes)
   end type structure_machine_t
@@ -56,7 +56,7 @@ module structure_types
   !> Mirrors `structure_batch` of structure_types.hpp.
   type, bind(c), public :: structure_batch_t
     real(c_double), dimension(structure_lane_count, lane_coordinates) :: q = 0, v = 0
-    real(c_double), dimension(structure_lane_count) :: time = 0, left = 0, rising = 0
+    real(c_double), dimension(structure_lane_count) :: time = 0, left = 0, rising = 0, burst = 0
     real(c_double), dimension(structure_lane_count, lane_joints) :: phase = 0
     real(c_double) :: start(structure_lane_count) = 0
     real(c_double), dimension(structure_lane_count, lane_terms) :: re = 0, im = 0

@@ -81,8 +81,9 @@ struct structure_machine {
   // Share of the change of a gap's acceleration up to which its chatter is completed, and the longest end of
   // a chatter [s].
   double chatter_share, chatter_time;
-  // Impacts after a flight shorter than this [s] are left to the scalar code.
-  double burst_gap;
+  // A flight of this length [s] ends a burst of impacts; impacts after one shorter than `shortest` are left
+  // to the scalar code.
+  double burst_gap, shortest;
   structure_joint joint[most_joints];
   structure_mode mode[most_structure_modes];
 };
@@ -90,8 +91,9 @@ struct structure_machine {
 // One member per quantity: T is an array over lanes, or the part of it that is in a register.
 template <class T> struct structure_fields {
   // The state that the scalar code would go on from; `left`: number of the joint whose guard has just been
-  // zero there, with the sign of its side, 0 = none; `rising`: that of the joint that has just given way.
-  T q[most_coordinates], v[most_coordinates], time, left, rising;
+  // zero there, with the sign of its side, 0 = none; `rising`: that of the joint that has just given way;
+  // `burst`: impacts in a row with next to no time between them.
+  T q[most_coordinates], v[most_coordinates], time, left, rising, burst;
   // Friction: direction of the slide, 0 = sticks. Of contacts 0.
   T phase[most_joints];
   // The flight: start [s after the section], amplitudes, coordinates of the joints held.

@@ -12,6 +12,7 @@ module assembly
     name_length, wave_t
   use jointed_state, only: is_curved
   use kinds, only: wp
+  use matrices, only: solve
   use status, only: exit_bad_case
   implicit none
   private
@@ -182,7 +183,8 @@ contains
     type(jointed_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: squares(:), shapes(:, :)
-    integer :: k
+    integer :: i, k
+    logical :: found
     if (.not. allocated(machine%start_shape)) then
       allocate (machine%start_shape(machine%n, 2), source=0.0_wp)
       machine%start_shape(machine%watched, :) = 1
@@ -199,7 +201,12 @@ contains
     if (allocated(error)) return
     allocate (squares(machine%n), shapes(machine%n, machine%n))
     call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
-    machine%mobility = matmul(shapes, transpose(shapes))
+    ! Not from the modes, but for rounding the same: what an impulse does not reach has an exact zero.
+    machine%mobility = machine%mass
+    do k = 1, machine%n
+      call solve(machine%mass, [(merge(1.0_wp, 0.0_wp, i == k), i=1, machine%n)], machine%mobility(:, k), found)
+    end do
+    machine%mobility = (machine%mobility + transpose(machine%mobility))/2
     machine%driven = machine%frequency > 0
     machine%period = 1
     if (machine%driven) then

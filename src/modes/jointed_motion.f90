@@ -81,8 +81,8 @@ contains
   end subroutine start_jointed
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
-  !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains;
-  !> then a burst, and what stalls, is counted from the call.
+  !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains,
+  !> and goes on with a burst; what stalls is counted from the call.
   pure subroutine advance_jointed(moving, state, time_end, tally, reason, log, transitions, one_event)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
@@ -97,12 +97,12 @@ contains
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
     real(wp) :: before
-    integer :: count_guards, stalls, holds, burst, key
+    integer :: count_guards, stalls, holds, key
     logical :: fallen(most_guards), ok, turned
     reason = 0
     stalls = 0
     holds = 0
-    burst = 0
+    if (.not. present(one_event)) state%burst = 0
     state%at_section = .false.
     watch%extremes = [tally%x_min, tally%x_max]
     watch%top_speed = tally%v_max
@@ -126,12 +126,12 @@ contains
         if (reason /= 0) exit
         if (state%time > before) state%left = 0
         stalls = merge(0, stalls + 1, state%time > before)
-        burst = merge(burst, 0, state%time - before < burst_gap*machine%period)
+        if (.not. state%time - before < burst_gap*machine%period) state%burst = 0
         turned = any(fallen .and. list%meaning == turns_round)
         fallen = fallen .and. list%meaning /= turns_round
         if (any(fallen)) then
           start = state
-          call transition(moving, state, list, fallen, stalls >= most_stalls, burst, tally, ok)
+          call transition(moving, state, list, fallen, stalls >= most_stalls, tally, ok)
           if (present(log) .and. ok) call log_transition(moving, start, state, list, fallen, log)
           if (present(transitions)) call keep(start, state, list, fallen, stalls >= most_stalls, transitions)
           if (.not. ok) reason = reason_step_failed

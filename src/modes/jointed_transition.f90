@@ -61,90 +61,39 @@ contains
   end subroutine settle
 
   !> What the guards that have fallen bring about. `stalled`: what cannot be decided is held for an instant.
-  pure subroutine transition(moving, state, list, fallen, stalled, burst, tally, ok)
+  pure subroutine transition(moving, state, list, fallen, stalled, tally, ok)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:), stalled
-    integer, intent(inout) :: burst
     type(tally_t), intent(inout) :: tally
     logical, intent(out) :: ok
     complex(wp) :: turning(moving%harmonics)
     type(jointed_state_t) :: start
-    integer :: touching(most_joints), hit(most_joints), g, j
+    integer :: touching(most_joints), hit(most_joints), j
     logical :: at_rest(most_joints), plastic
-    real(wp) :: s, u, speed(most_joints), lost
+    real(wp) :: speed(most_joints), lost
     associate (machine => moving%machine)
       turning = turning_at(machine%frequency, state%time, moving%harmonics)
       start = state
       at_rest = .false.
       touching = 0
       hit = 0
-      do g = 1, size(list)
-        if (.not. fallen(g)) cycle
-        j = list(g)%joint
-        select case (list(g)%meaning)
-        case (slide_ends)
-          if (machine%joints(j)%kind == joint_elastic) then
-            call stop_slider(machine, j, state, turning)
-            call append_word(tally, word_stick)
-            tally%sticks = tally%sticks + 1
-          else
-            at_rest(j) = .true.
-          end if
-        case (slides_up, slides_down)
-          if (machine%joints(j)%kind == joint_elastic) then
-            state%phase(j) = merge(1, -1, list(g)%meaning == slides_up)
-            ! The speed of the slide starts at zero where the spring has just been let go at rest, else it is what it is.
-            call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-            state%left(j) = merge(1, 0, abs(u) <= rounding_of_speed(machine, j, state))
-          end if
-        case (meets_upper, meets_lower)
-          touching(j) = merge(1, -1, list(g)%meaning == meets_upper)
-          if (machine%joints(j)%kind == joint_soft) then
-            call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-            state%phase(j) = touching(j)
-            state%left(j) = touching(j)
-            state%touch_speed(j) = abs(u)
-            call count_impact(tally, touching(j), abs(u))
-            touching(j) = 0
-          else
-            hit(j) = touching(j)
-          end if
-        case (lets_go)
-          touching(j) = state%phase(j)
-        case (leaves)
-          state%left(j) = sign(1, state%phase(j))
-          state%phase(j) = 0
-        case (force_ends)
-          state%phase(j) = 2*state%phase(j)
-          state%left(j) = sign(1, state%phase(j))
-        case (force_returns)
-          state%phase(j) = state%phase(j)/2
-          state%left(j) = sign(1, state%phase(j))
-        end select
-      end do
+      call change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
       do j = 1, size(machine%joints)
         if (machine%joints(j)%kind == joint_contact .and. state%phase(j) /= 0) touching(j) = state%phase(j)
       end do
       ok = .true.
       if (any(hit /= 0)) then
-        burst = burst + 1
-        plastic = burst > long_burst
+        state%burst = state%burst + 1
+        plastic = state%burst > long_burst
         if (plastic) call add_near(moving, state, turning, touching)
         call strike(machine, state, turning, touching, plastic, speed, lost, ok)
         do j = 1, size(machine%joints)
           if (hit(j) /= 0) call count_impact(tally, hit(j), abs(speed(j)))
         end do
       end if
-      do j = 1, size(machine%joints)
-        if (machine%joints(j)%kind /= joint_friction) cycle
-        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        if (start%phase(j) == 0) at_rest(j) = .not. any(hit /= 0) .or. &
-          abs(u) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, start)
-        if (abs(u) <= rounding_of_speed(machine, j, state)) at_rest(j) = .true.
-        if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
-      end do
+      call judge_friction(machine, start, turning, any(hit /= 0), state, at_rest)
       if (stalled) then
         call hold(moving, state, turning, at_rest, touching)
         return
@@ -159,6 +108,88 @@ contains
       end do
     end associate
   end subroutine transition
+
+  !> What each fallen guard says of its own joint: its phase, or that it is at rest, touches, is hit.
+  pure subroutine change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
+    type(jointed_t), intent(in) :: machine
+    complex(wp), intent(in) :: turning(:)
+    type(joint_guard_t), intent(in) :: list(:)
+    logical, intent(in) :: fallen(:)
+    type(jointed_state_t), intent(inout) :: state
+    type(tally_t), intent(inout) :: tally
+    logical, intent(inout) :: at_rest(:)
+    integer, intent(inout) :: touching(:), hit(:)
+    real(wp) :: s, u
+    integer :: g, j
+    do g = 1, size(list)
+      if (.not. fallen(g)) cycle
+      j = list(g)%joint
+      select case (list(g)%meaning)
+      case (slide_ends)
+        if (machine%joints(j)%kind == joint_elastic) then
+          call stop_slider(machine, j, state, turning)
+          call append_word(tally, word_stick)
+          tally%sticks = tally%sticks + 1
+        else
+          at_rest(j) = .true.
+        end if
+      case (slides_up, slides_down)
+        if (machine%joints(j)%kind == joint_elastic) then
+          state%phase(j) = merge(1, -1, list(g)%meaning == slides_up)
+          ! The speed of the slide starts at zero where the spring has just been let go at rest, else it is what it is.
+          call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+          state%left(j) = merge(1, 0, abs(u) <= rounding_of_speed(machine, j, state))
+        end if
+      case (meets_upper, meets_lower)
+        touching(j) = merge(1, -1, list(g)%meaning == meets_upper)
+        if (machine%joints(j)%kind == joint_soft) then
+          call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+          state%phase(j) = touching(j)
+          state%left(j) = touching(j)
+          state%touch_speed(j) = abs(u)
+          call count_impact(tally, touching(j), abs(u))
+          touching(j) = 0
+        else
+          hit(j) = touching(j)
+        end if
+      case (lets_go)
+        touching(j) = state%phase(j)
+      case (leaves)
+        state%left(j) = sign(1, state%phase(j))
+        state%phase(j) = 0
+      case (force_ends)
+        state%phase(j) = 2*state%phase(j)
+        state%left(j) = sign(1, state%phase(j))
+      case (force_returns)
+        state%phase(j) = state%phase(j)/2
+        state%left(j) = sign(1, state%phase(j))
+      end select
+    end do
+  end subroutine change_phases
+
+  !> Which friction joints are at rest, and the directions of the others. One that stuck in the state `before` is at rest unless
+  !> an impact has set it in motion: what its speed was then is rounding.
+  pure subroutine judge_friction(machine, before, turning, struck, state, at_rest)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before
+    complex(wp), intent(in) :: turning(:)
+    logical, intent(in) :: struck
+    type(jointed_state_t), intent(inout) :: state
+    logical, intent(inout) :: at_rest(:)
+    real(wp) :: s, u, last
+    integer :: j
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind /= joint_friction) cycle
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      if (before%phase(j) == 0) then
+        call joint_motion(machine, j, before%q, before%v, before%time, turning, s, last)
+        at_rest(j) = .not. struck .or. &
+          abs(u - last) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, before)
+      end if
+      if (abs(u) <= rounding_of_speed(machine, j, state)) at_rest(j) = .true.
+      if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
+    end do
+  end subroutine judge_friction
 
   !> The slider of elastic friction stops: its spring holds what friction was.
   pure subroutine stop_slider(machine, j, state, turning)

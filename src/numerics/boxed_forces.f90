@@ -9,10 +9,12 @@ module boxed_forces
   implicit none
   private
 
-  public :: solve_boxed
+  public :: solve_boxed, depends_on
 
   !> Constraints that depend on each other to this relative amount share their force evenly.
   real(wp), parameter :: dependent = 1e-10_wp
+  !> Each takes the half of the digits off the error that sharing evenly brings.
+  integer, parameter :: refinements = 2
 
 contains
 
@@ -42,8 +44,8 @@ contains
       if (side(i) > 0 .and. upper(i) >= huge(1.0_wp)) side(i) = 0
     end do
     do tries = 1, 50*(n + 1)**2
-      call forces_for(h, c, lower, upper, fixed, side, r)
-      y = matmul(h, r) + c
+      call forces_for(g, h, merge(refinements, 0, shared), c, lower, upper, fixed, side, r)
+      y = matmul(g, r) + c
       k = 0
       do i = 1, n
         if (fixed(i)) cycle
@@ -54,7 +56,7 @@ contains
             side(i) = sign(1, k)
             exit
           end if
-        else if (side(i)*y(i) > merge(max(tolerance, sqrt(epsilon(1.0_wp))*abs(r(i))*g(i, i)*2), tolerance, shared)) then
+        else if (side(i)*y(i) > tolerance) then
           k = i
           side(i) = 0
           exit
@@ -67,6 +69,24 @@ contains
       end if
     end do
   end subroutine solve_boxed
+
+  !> Whether constraint `i` cannot move where those of `held` do not.
+  pure logical function depends_on(g, i, held)
+    real(wp), intent(in) :: g(:, :)
+    integer, intent(in) :: i
+    logical, intent(in) :: held(:)
+    real(wp) :: m(size(g, 1), size(g, 1))
+    integer :: k, j
+    m = g
+    do k = 1, size(g, 1)
+      if (.not. held(k) .or. k == i .or. m(k, k) <= dependent*g(k, k)) cycle
+      do j = 1, size(g, 1)
+        if (j /= k) m(:, j) = m(:, j) - m(:, k)*(m(k, j)/m(k, k))
+      end do
+      m(:, k) = 0
+    end do
+    depends_on = m(i, i) <= dependent*g(i, i)
+  end function depends_on
 
   !> Whether a positive semidefinite matrix has dependent rows.
   pure logical function is_singular(g)
@@ -86,14 +106,15 @@ contains
     end do
   end function is_singular
 
-  !> Forces with those at a limit as given.
-  pure subroutine forces_for(h, c, lower, upper, fixed, side, r)
-    real(wp), intent(in) :: h(:, :), c(:), lower(:), upper(:)
+  !> Forces with those at a limit as given: of `g` by the regular matrix `h` near it, refined `refinements` times.
+  pure subroutine forces_for(g, h, refinements, c, lower, upper, fixed, side, r)
+    real(wp), intent(in) :: g(:, :), h(:, :), c(:), lower(:), upper(:)
+    integer, intent(in) :: refinements
     logical, intent(in) :: fixed(:)
     integer, intent(in) :: side(:)
     real(wp), intent(out) :: r(:)
     real(wp) :: m(size(c), size(c)), b(size(c)), factor
-    integer :: list(size(c)), i, k, count_free
+    integer :: list(size(c)), i, k, count_free, round
     r = 0
     count_free = 0
     do i = 1, size(c)
@@ -106,21 +127,23 @@ contains
       end if
     end do
     if (count_free == 0) return
-    associate (free => list(:count_free))
-      m(:count_free, :count_free) = h(free, free)
-      b(:count_free) = -c(free) - matmul(h(free, :), r)
-      do k = 1, count_free
-        do i = k + 1, count_free
-          factor = m(i, k)/m(k, k)
-          m(i, k:count_free) = m(i, k:count_free) - factor*m(k, k:count_free)
-          b(i) = b(i) - factor*b(k)
+    do round = 0, refinements
+      associate (free => list(:count_free))
+        m(:count_free, :count_free) = h(free, free)
+        b(:count_free) = -c(free) - matmul(g(free, :), r)
+        do k = 1, count_free
+          do i = k + 1, count_free
+            factor = m(i, k)/m(k, k)
+            m(i, k:count_free) = m(i, k:count_free) - factor*m(k, k:count_free)
+            b(i) = b(i) - factor*b(k)
+          end do
         end do
-      end do
-      do k = count_free, 1, -1
-        b(k) = (b(k) - sum(m(k, k + 1:count_free)*b(k + 1:count_free)))/m(k, k)
-      end do
-      r(free) = b(:count_free)
-    end associate
+        do k = count_free, 1, -1
+          b(k) = (b(k) - sum(m(k, k + 1:count_free)*b(k + 1:count_free)))/m(k, k)
+        end do
+        r(free) = r(free) + b(:count_free)
+      end associate
+    end do
   end subroutine forces_for
 
 end module boxed_forces

@@ -14,10 +14,10 @@ from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
 from separatrix.discovery.fitting.base import measure_noise
+from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import blocking, minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, gauss_newton_step
-from separatrix.discovery.fitting.problem import Evaluation
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.measured.signals import white_noise
@@ -143,7 +143,7 @@ def test_what_was_not_tested_is_in_the_order_of_the_catalogue(monkeypatch):
     monkeypatch.setattr(rounds, "screen", lambda *_: None)
     monkeypatch.setattr(rounds, "choose", lambda *_: [])
     bench = rounds.Bench(None, None, None, Options(candidates=tuple(reversed(names))))
-    problem = SimpleNamespace(free=[])
+    problem = SimpleNamespace(free=[], in_force=False)
     base = SimpleNamespace(names=(), model=SimpleNamespace(parameters={}), problem=problem, fit=fits)
     found = rounds.run_round(bench, base, None, 0, 1)
     assert list(found.absent) == names
@@ -342,7 +342,10 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         monkeypatch.setattr(rounds, step, lambda *_: None)
     fits = SimpleNamespace(values=[], reduced_chi2=1.0, like_noise=lambda _: False)
     base = SimpleNamespace(
-        names=(), model=SimpleNamespace(parameters={}), problem=SimpleNamespace(free=[]), fit=fits
+        names=(),
+        model=SimpleNamespace(parameters={}),
+        problem=SimpleNamespace(free=[], in_force=False),
+        fit=fits,
     )
     bench = rounds.Bench(None, None, None, Options(candidates=("dahl", "viscous")))
     monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous"])

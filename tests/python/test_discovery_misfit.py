@@ -16,7 +16,7 @@ from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 
 SAMPLES, SEGMENTS = 50, 20
-BODY = SimpleNamespace(model=SimpleNamespace(parameters={"restoring.stiffness"}))
+BODY = SimpleNamespace(model=SimpleNamespace(parameters={"restoring.stiffness"}), in_force=False)
 
 
 def data(sigma: float, scatter: float) -> SimpleNamespace:
@@ -25,7 +25,9 @@ def data(sigma: float, scatter: float) -> SimpleNamespace:
     noise = np.random.default_rng(4).standard_normal((2, t.size))
     prepared = [
         SimpleNamespace(
-            record=SimpleNamespace(name=name, x=np.sin(9 * t) + scatter * one),
+            record=SimpleNamespace(name=name),
+            signal=np.sin(9 * t) + scatter * one,
+            in_force=False,
             sigma=sigma,
             sigma_stated=True,
             resolution=0.0,
@@ -41,6 +43,7 @@ def fit(first: float, second: float) -> SimpleNamespace:
     size = np.repeat([first, second], SEGMENTS)
     return SimpleNamespace(
         chi2=size * (SAMPLES - 2),
+        unknowns=2,
         counts=np.full(2 * SEGMENTS, SAMPLES),
         good=np.ones(2 * SEGMENTS, bool),
         reduced_chi2=0.5 * (first + second),

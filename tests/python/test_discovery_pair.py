@@ -48,6 +48,15 @@ def test_two_bodies_are_refused_with_the_way_out(source_dir: Path, tmp_path: Pat
 
 
 @pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("case", ["structure_two_masses.toml", "structure_beam.toml"])
+def test_structures_are_refused_before_any_record_is_read(
+    case: str, source_dir: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(SeparatrixError, match=f"{case}: body.law: found several bodies or a structure"):
+        discover(source_dir / "examples" / case, [tmp_path / "unread.csv"])
+
+
+@pytest.mark.usefixtures("library")
 def test_the_friction_of_the_interface_is_found(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
     first, second, held_out = (
         record(separatrix, source_dir, tmp_path, frequency, speed)

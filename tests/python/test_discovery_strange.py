@@ -31,6 +31,7 @@ def base(chi2: float = 1.0, **found: float) -> SimpleNamespace:
         chi2=np.full(20, chi2 * 123),
         counts=np.full(20, 125),
         good=np.ones(20, bool),
+        unknowns=2,
     )
     parameters = {path: SimpleNamespace(value=value, unit=unit) for path, (value, unit) in CASE.items()}
     free = [Free(paths[name], value) for name, value in found.items()]

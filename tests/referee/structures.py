@@ -155,6 +155,8 @@ class Structure:
                 pressed[i] = 1
             elif kind == "leave":
                 pressed[i] = 0
+            elif kind == "open":
+                closed[i] = OPEN
             elif kind == "stop":
                 row = self.rows[i]
                 y[n:] -= (

@@ -54,6 +54,7 @@ def discover(
     rest: str | Path | None = None,
     out: str | Path | None = None,
     effects: str | Sequence[str] | None = None,
+    compare: str = "motion",
     partial: bool = False,
     quick: bool = False,
     seed: int = 1,
@@ -71,6 +72,8 @@ def discover(
         Folder of the results: verdict, extended case, details, report. Without one nothing is written.
     effects
         Only these effects of the catalogue.
+    compare
+        What of the records: "motion", or "force" that drives a joint along its known motion.
     partial
         Name effects that help though more is missing.
     quick
@@ -88,6 +91,7 @@ def discover(
     with Progress(progress) as told:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,
+            compare=_compared(compare),
             progress=lambda stage, done: told("steps", round(1000 * done), 1000),
         )  # fmt: skip
         if out is not None:
@@ -107,6 +111,12 @@ def _write(out: Path, case: Case, verdict: dict, findings: object, options: Opti
         write_results(draft, verdict, findings)
         write_report(draft, base, options)
     return {name: out / name for name in FILES if (out / name).exists()}
+
+
+def _compared(what: str) -> str:
+    if what not in ("motion", "force"):
+        raise SeparatrixError(f"compare: found '{what}', allowed 'motion' and 'force'", USAGE)
+    return what
 
 
 def _paths(given: str | Path | Sequence[str | Path]) -> list[Path]:

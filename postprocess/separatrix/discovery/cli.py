@@ -78,6 +78,7 @@ def _run(chosen: argparse.Namespace) -> None:
         seed=chosen.seed,
         quick=chosen.quick,
         partial=chosen.partial,
+        compare=chosen.compare,
         segment_periods=chosen.segment_periods,
         segment_seconds=chosen.segment_seconds,
         candidates=chosen.effects and tuple(chosen.effects),
@@ -183,6 +184,12 @@ def _parser() -> Parser:
         "--partial",
         action="store_true",
         help="name effects that help on every record though more is missing: real machines",
+    )
+    parser.add_argument(
+        "--compare",
+        choices=("motion", "force"),
+        default="motion",
+        help="compare the motion, or the force that drives a joint along its known motion [motion]",
     )
     parser.add_argument("--rest", metavar="FILE", type=Path, help="record at rest, for the noise")
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")

@@ -20,6 +20,8 @@ class Options:
     segment_periods: float = 1.0
     segment_seconds: float | None = None
     most_effects: int = 3
+    # what of the records is compared: the motion, or the force that a known motion takes
+    compare: str = "motion"
     # name effects that help though a gap remains that none closes
     partial: bool = False
     # None = the whole catalogue

@@ -174,6 +174,7 @@ def write_details(path: Path, findings: Findings) -> None:
     with h5py.File(path, "w") as file:
         units = units_of(findings.base.model.parameters)
         file.attrs["position_unit"], file.attrs["velocity_unit"] = units.position, units.velocity
+        file.attrs["force_unit"], file.attrs["compared"] = units.force, bench.options.compare
         for one in findings.maps:
             group = file.create_group(f"where/{one.name}")
             group.attrs["unit"], group.attrs["force_unit"] = one.unit, one.force_unit
@@ -196,6 +197,8 @@ def write_details(path: Path, findings: Findings) -> None:
                 group.attrs["sigma"] = prepared.sigma
                 group.attrs["held_out"] = data is bench.held_out
                 group["t"], group["x"] = prepared.record.t, prepared.record.x
+                if prepared.in_force:
+                    group["force"] = prepared.record.force
                 group["smoothed"] = smoothed.state
                 group["smoothed_error"] = np.sqrt(np.einsum("kii->ki", smoothed.covariance))
                 group["impacts"] = impact_table(smoothed)
@@ -219,6 +222,8 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             group["t"] = (times[rows] + first[:, None])[inside]
             group["segment"] = np.broadcast_to(np.arange(rows.size)[:, None], inside.shape)[inside]
             group["x"], group["v"] = fit.evaluation.x[rows][inside], fit.evaluation.v[rows][inside]
+            if problem.in_force:
+                group["force"] = fit.evaluation.force[rows][inside]
             length = inside.shape[1]
             group["residual"] = fit.evaluation.residual[rows, :length][inside]
             group["good"] = fit.good[rows]

@@ -18,7 +18,8 @@ from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base,
 from separatrix.discovery.fitting.data import fit_stages, gather, scales_of
 from separatrix.discovery.fitting.machine import on_other_records, with_values
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.measured.preflight import prepare
+from separatrix.discovery.measured.in_force import prepare_force
+from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import Record, read_record, unique_names
 from separatrix.discovery.options import Options
 from separatrix.errors import USAGE, SeparatrixError
@@ -29,6 +30,11 @@ _END, _END_PERIODS = 0.3, 2.05
 _TWO_BODIES = (
     'body.law: found two bodies, allowed for a base machine "point_mass", which the driven body is in the '
     "coordinate of the driving one under a measured force (docs/discovery-guide.md, Base machines)"
+)
+
+_STRUCTURE = (
+    'body.law: found several bodies or a structure, allowed for a base machine "point_mass": effects belong '
+    "to one body, and segments of others are not flown yet (docs/discovery-guide.md, Base machines)"
 )
 
 
@@ -56,11 +62,11 @@ def investigate(
     model = _model(base)
     read = [[_record(one) for one in group] for group in (records, hold_out)]
     still = None if rest is None else _record(rest, at_rest=True)
-    training, held_out, chosen = _split(*read, model, still)
+    training, held_out, chosen = _split(*read, model, still, options)
     _all_different([*training, *held_out])
     unique_names([*training, *held_out])
     options.progress("reading and smoothing the records", 0.0)
-    prepared = [[prepare(one, model, still) for one in group] for group in (training, held_out)]
+    prepared = [[_prepared(one, model, still, options) for one in group] for group in (training, held_out)]
     data = gather(prepared[0], options.segment_periods, options.segment_seconds)
     foretold = gather(prepared[1], options.segment_periods, options.segment_seconds) if held_out else None
     scales = scales_of(data, model)
@@ -98,8 +104,10 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
 def _model(base: object):
     named = isinstance(base, str | Path)
     model = Model.read(base) if named else base
-    if "body.driven_mass" in model.parameters:
-        raise SeparatrixError(f"{base}: {_TWO_BODIES}" if named else _TWO_BODIES)
+    refused = {"body.driven_mass": _TWO_BODIES, "body.in_sequence": _STRUCTURE}
+    for path, why in refused.items():
+        if path in model.parameters:
+            raise SeparatrixError(f"{base}: {why}" if named else why)
     return model
 
 
@@ -107,8 +115,16 @@ def _record(one: Path | Record, at_rest: bool = False) -> Record:
     return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
+def _prepared(record: Record, model, rest: Record | None, options: Options) -> Prepared:
+    return prepare_force(record, model) if options.compare == "force" else prepare(record, model, rest)
+
+
 def _split(
-    records: list[Record], hold_out: list[Record], model, rest: Record | None = None
+    records: list[Record],
+    hold_out: list[Record],
+    model,
+    rest: Record | None = None,
+    options: Options | None = None,
 ) -> tuple[list[Record], list[Record], str]:
     """Training and held-out records; by default the last record, or the end of the only one."""
     if hold_out:
@@ -119,7 +135,7 @@ def _split(
         raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
     at = int((1 - _END) * whole.t.size)
-    period = prepare(whole, model, rest).period_samples
+    period = _prepared(whole, model, rest, options or Options()).period_samples
     if period is not None:
         # the end needs some periods too
         latest = whole.t[-1] - _END_PERIODS * period * whole.interval

@@ -58,7 +58,12 @@ def _law(bench: Bench, decision: Decision, character: Character) -> Judged | str
 
 
 def _elsewhere(character: Character) -> str:
-    """Where a hidden state is known to be that of a body of its own, and which."""
+    """Where a hidden state is known to be that of a body or a spring of its own, and which."""
+    if "way since it turned" in character.hypothesis.depends_on:
+        return (
+            "; friction with a spring or a play in series has such a memory: elastic_coulomb of a structure "
+            "(docs/case-file.md)"
+        )
     if character.size is None or "(z - x)" not in character.hypothesis.formula:
         return ""
     stiffness = character.size[0]

@@ -17,7 +17,8 @@ from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 
-_USABLE = 1e-6
+# least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
+_USABLE, _EXACT = 1e-6, 1e-11
 # of the distance of the values of a constant that are tried, towards the best
 _HALVINGS = 3
 # factor of the lowest value of a constant below which a hidden state is none
@@ -135,8 +136,17 @@ def _gain(training: Motion, hypothesis: Hypothesis, constant: float) -> float:
     columns = _columns(hypothesis, training, constant)
     matrix, gradient = _normal(training, columns)
     p = training.fit.evaluation.by_parameter.shape[2]
-    open_ = np.concatenate([~training.fit.at_bound, np.ones(matrix.shape[0] - p, bool)])
-    return _solved(matrix, gradient, open_)[1]
+    open_ = np.concatenate([_movable(training), np.ones(matrix.shape[0] - p, bool)])
+    return _solved(training, matrix, gradient, open_)[1]
+
+
+def _movable(motion: Motion) -> np.ndarray:
+    """Parameters that may move beside a hypothesis.
+
+    A bound that the machine ran into without it holds them, but where the force is compared: that is so
+    nearly linear in them that they may come back from anywhere.
+    """
+    return ~motion.fit.at_bound | motion.problem.in_force
 
 
 def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant: float) -> Character:
@@ -145,9 +155,9 @@ def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant
     count = columns[0][0].shape[2]
     fit, p = training.fit, training.fit.evaluation.by_parameter.shape[2]
     matrix, gradient = _normal(training, columns[0])
-    open_ = np.concatenate([~fit.at_bound, np.ones(matrix.shape[0] - p, bool)])
-    _, before, first = _solved(matrix[:p, :p], gradient[:p], open_[:p])
-    values, after, rank = _solved(matrix, gradient, open_)
+    open_ = np.concatenate([_movable(training), np.ones(matrix.shape[0] - p, bool)])
+    _, before, first = _solved(training, matrix[:p, :p], gradient[:p], open_[:p])
+    values, after, rank = _solved(training, matrix, gradient, open_)
     gain, rank = after - before, rank - first
     excess, excess_held = max(fit.excess, 1.0), max(held_out.fit.excess, 1.0)
     foretold = _foretold(training, held_out, columns[1], values, count)
@@ -178,11 +188,13 @@ def _normal(motion: Motion, columns: tuple[np.ndarray, np.ndarray]) -> tuple[np.
     return eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0].total()
 
 
-def _solved(matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray) -> tuple[np.ndarray, float, int]:
+def _solved(
+    motion: Motion, matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray
+) -> tuple[np.ndarray, float, int]:
     """Solution (0 where closed), the decrease of chi^2, and the rank."""
     scaled, size = _scaled(matrix[np.ix_(open_, open_)])
     values, vectors = np.linalg.eigh(scaled)
-    usable = values > _USABLE
+    usable = values > (_EXACT if motion.problem.in_force else _USABLE)
     parts = vectors[:, usable].T @ (gradient[open_] / size)
     found = np.zeros(open_.size)
     found[open_] = vectors[:, usable] @ (parts / values[usable]) / size
@@ -210,10 +222,10 @@ def _foretold(
     told = np.concatenate([values[known], values[first : first + count]])
     movable = np.array([*own, *range(p + count, matrix.shape[0])], int)
     open_ = np.ones(movable.size, bool)
-    _, before, rank_before = _solved(matrix[np.ix_(own, own)], gradient[own], open_[: len(own)])
+    _, before, rank_before = _solved(held_out, matrix[np.ix_(own, own)], gradient[own], open_[: len(own)])
     fall = 2 * told @ gradient[fixed] - told @ matrix[np.ix_(fixed, fixed)] @ told
     left = gradient[movable] - matrix[np.ix_(movable, fixed)] @ told
-    _, after, rank = _solved(matrix[np.ix_(movable, movable)], left, open_)
+    _, after, rank = _solved(held_out, matrix[np.ix_(movable, movable)], left, open_)
     return float(fall + after - before) - (rank - rank_before)
 
 

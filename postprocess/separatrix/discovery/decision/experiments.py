@@ -7,16 +7,21 @@ period. What the starts of these and the parameters can imitate, the parameters 
 of their errors, is projected out; the rest over the noise is d', the size in standard errors.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.errors import SeparatrixError
 
 _RATIOS = np.linspace(0.6, 1.5, 13)
 # of the drive, or without one of the start
 _SCALES = (0.6, 1.0, 1.6)
+# of the motion of a joint: amplitude, and how many times as fast; step of a derivative over a parameter
+_AMPLITUDES, _RATES = (0.25, 0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 2.0, 4.0)
+_STEP = 1e-5
 # periods before the motion is looked at, periods that are compared, samples in each
 _SETTLING, _PERIODS, _STEPS = 12, 12, 40
 
@@ -28,9 +33,17 @@ class Experiment:
     drive_ratio: float | None
     scale: float
     d_prime: float
+    # of a joint that is driven along the motion of the first record: how many times as fast
+    rate: float | None = None
 
     def text(self, one: str, other: str) -> str:
         """In words."""
+        if self.rate is not None:
+            return (
+                f"a record along the motion of the first one with {self.scale:g} times the amplitude, "
+                f"{self.rate:g} times as fast: {one} and {other} would differ by {self.d_prime:.3g} standard "
+                "errors"
+            )
         what = "a record of a free motion from" if self.drive_ratio is None else "a record at"
         where = f"{self.scale:g} times the start of the first one"
         if self.drive_ratio is not None:
@@ -41,6 +54,8 @@ class Experiment:
 def experiments(one: Fitted, other: Fitted) -> list[Experiment]:
     """What the rig allows, the most telling first; none where the force on the body must be known."""
     first = one.problem.prepared[0]
+    if first.in_force:
+        return _along_other_motions(one, other)
     if first.record.force is not None:
         return []
     ratios = [None] if first.frequency is None else [float(ratio) for ratio in _RATIOS]
@@ -127,16 +142,7 @@ def _directions(
         if row.any():
             rows.append(row)
             places.append(place)
-    covariance = one.covariance[np.ix_(places, places)]
-    known = np.flatnonzero(np.diag(covariance) > 0)
-    # parameters differ by many orders of magnitude in SI units
-    size = np.sqrt(np.diag(covariance)[known])
-    units = np.outer(size, size)
-    prior = np.zeros_like(covariance)
-    prior[np.ix_(known, known)] = (
-        np.linalg.pinv(covariance[np.ix_(known, known)] / units, hermitian=True) / units
-    )
-    return paths, np.array(rows), prior
+    return paths, np.array(rows), _prior(one, places)
 
 
 def _left(apart: np.ndarray, slopes: np.ndarray, count: int, seen: float, prior: np.ndarray) -> float:
@@ -153,3 +159,60 @@ def _left(apart: np.ndarray, slopes: np.ndarray, count: int, seen: float, prior:
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     step = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-11, hermitian=True) @ (gradient / size)
     return float(np.sqrt(max(0.0, square - step @ (gradient / size))))
+
+
+def _prior(one: Fitted, places: list[int]) -> np.ndarray:
+    """What the records know of some free parameters: the inverse of their covariance."""
+    covariance = one.covariance[np.ix_(places, places)]
+    known = np.flatnonzero(np.diag(covariance) > 0)
+    # parameters differ by many orders of magnitude in SI units
+    size = np.sqrt(np.diag(covariance)[known])
+    units = np.outer(size, size)
+    prior = np.zeros_like(covariance)
+    prior[np.ix_(known, known)] = (
+        np.linalg.pinv(covariance[np.ix_(known, known)] / units, hermitian=True) / units
+    )
+    return prior
+
+
+def _along_other_motions(one: Fitted, other: Fitted) -> list[Experiment]:
+    """Records of a driven joint along the motion of the first one, larger or smaller, faster or slower."""
+    found = [
+        Experiment(None, scale, _apart_in_force(one, other, scale, rate), rate)
+        for scale in _AMPLITUDES
+        for rate in _RATES
+    ]
+    return sorted(found, key=lambda experiment: -experiment.d_prime)
+
+
+def _apart_in_force(one: Fitted, other: Fitted, scale: float, rate: float) -> float:
+    """Size in standard errors of what tells the forces of two machines apart along a motion."""
+    first = one.problem.prepared[0]
+    motion, measured, pieces = first.driven.scaled(scale, rate), first.record.force, first.record.pieces
+    places = [i for i, free in enumerate(one.problem.free) if free.record is None]
+
+    def force(fitted: Fitted, values: np.ndarray) -> np.ndarray:
+        machine = fitted.problem.machine_values(0, values)
+        return force_needed(fitted.model, machine, motion, measured, pieces) / first.sigma
+
+    try:
+        base = force(one, one.fit.values)
+        apart = force(other, other.fit.values) - base
+        slopes = [(force(one, moved) - base) / step for moved, step in _moved(one, places)]
+    except SeparatrixError:
+        # no such machine there
+        return 0.0
+    columns = np.column_stack(slopes)
+    matrix, gradient = _prior(one, places) + columns.T @ columns, columns.T @ apart
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    step = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-11, hermitian=True) @ (gradient / size)
+    return float(np.sqrt(max(0.0, apart @ apart - step @ (gradient / size))))
+
+
+def _moved(one: Fitted, places: list[int]) -> Iterator[tuple[np.ndarray, float]]:
+    """Values of the machine with one parameter after the other moved by a step."""
+    for place in places:
+        free, values = one.problem.free[place], one.fit.values.copy()
+        step = _STEP * free.size * (1 if values[place] + _STEP * free.size <= free.upper else -1)
+        values[place] += step
+        yield values, step

@@ -41,6 +41,8 @@ _BEGINNINGS = 4
 # steps of a natural period in which a hidden state is integrated
 _STEPS = 100
 _FEWEST_IMPACTS, _FEWEST_AFTER = 4, 100
+# shortest way after turning that is looked at, over the longest, and where its function may bend
+_SHORTEST_WAY, _WAY_KNOTS = 2e-3, 12
 
 Columns = np.ndarray | None
 
@@ -113,6 +115,8 @@ def hypotheses(training: Motion) -> Iterator[Hypothesis]:
     yield from _smooth(training)
     yield from _times(training)
     yield from _memories(training)
+    if training.problem.in_force:
+        yield _after_turning(training)
     if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= _FEWEST_IMPACTS:
         yield from _at_impacts(training)
 
@@ -191,6 +195,26 @@ def _memories(training: Motion) -> Iterator[Hypothesis]:
             (f"damping ratio zeta near {zeta:g} and a frequency w", "rad/s"),
             values=training.natural * np.geomspace(*_ATTACHED, 2 * _GRID),
         )  # fmt: skip
+
+
+def _after_turning(training: Motion) -> Hypothesis:
+    """Friction that builds up over a way once the motion has turned: of a spring or a play in series."""
+    longest = float(_ways(training)[training.good].max())
+    inner = longest * np.append(0.0, np.geomspace(_SHORTEST_WAY, 1.0, _WAY_KNOTS))
+    knots = np.concatenate([[0.0] * 3, inner, [longest] * 3])
+    return _function(
+        ("direction of motion", "way since it turned"),
+        lambda m: np.sign(m.v)[:, :, None] * splines(_ways(m), knots, m.good),
+    )
+
+
+def _ways(m: Motion) -> np.ndarray:
+    """Way since the known motion of a record turned round last [m], at the samples."""
+    found = np.zeros(m.x.shape)
+    for number, prepared in enumerate(m.problem.prepared):
+        rows = np.flatnonzero(m.problem.segments.record == number)
+        found[rows] = prepared.driven.ways(prepared.record.pieces)[m.problem.segments.index[rows]]
+    return found
 
 
 def _at_impacts(training: Motion) -> Iterator[Hypothesis]:

@@ -32,7 +32,7 @@ def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
     for number in range(len(data.prepared)):
         rows = (record == number) & fit.good
         squares, more = fit.condensed(rows)
-        freedom = int(fit.counts[rows].sum() - 2 * rows.sum() + more)
+        freedom = int(fit.counts[rows].sum() - fit.unknowns * rows.sum() + more)
         if freedom > 0:
             found[number] = (float((fit.chi2[rows].sum() + squares) / freedom), freedom)
     return found
@@ -65,7 +65,8 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
     something leaves more than noise.
     """
     notes = []
-    unit = units_of(problem.model.parameters).position
+    units = units_of(problem.model.parameters)
+    unit = units.force if problem.in_force else units.position
     factors, _ = noise_of(problem, fit, 0, mass)
     found = record_chi2(data, fit)
     for number, one in enumerate(data.prepared):
@@ -74,7 +75,7 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
         if not one.sigma_stated:
             notes += _more_than_white(one, unit)
             continue
-        scatter = min(one.sigma * factors.get(number, 1.0), white_noise(one.record.x))
+        scatter = min(one.sigma * factors.get(number, 1.0), white_noise(one.signal))
         if scatter > _DISAGREEMENT * one.sigma:
             notes.append(f"{_stated(one, unit)} scatter by {scatter:.3g} {unit}")
         size, freedom = found[number]
@@ -88,12 +89,13 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
 
 def _more_than_white(one: Prepared, unit: str) -> list[str]:
     """Noise that was measured as far larger than the samples scatter: coloured, or what the machine lacks."""
-    white = white_noise(one.record.x)
+    white = white_noise(one.signal)
+    key = "force_noise_sigma_n" if one.in_force else "sensor_noise_sigma_m"
     if one.sigma < _LARGER * white / np.sqrt(white_share(one.memory)) or one.resolution**2 > 3 * one.sigma**2:
         return []
     return [
         f"{one.record.name}: noise of {one.sigma:.3g} {unit} is taken, neighbouring samples scatter by "
-        f"{white:.3g} {unit}: either the noise is coloured, or it hides a gap; sensor_noise_sigma_m states it"
+        f"{white:.3g} {unit}: either the noise is coloured, or it hides a gap; {key} states it"
     ]
 
 

@@ -16,6 +16,7 @@ from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, 
 from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
+from separatrix.library import effects
 
 _CERTAIN_REFITS = 5
 _RELATED = 0.7
@@ -143,6 +144,9 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
         if name in base.names or (options.candidates and name not in options.candidates):
             continue
         if any(path.startswith(f"effect.{name}.") for path in base.model.parameters):
+            continue
+        if base.problem.in_force and effects()[name].acts != "flight":
+            absent[name] = "it does nothing to the force along a known motion"
             continue
         made = candidate(base.model, free, base.names, name, bench.scales)
         if isinstance(made, str):

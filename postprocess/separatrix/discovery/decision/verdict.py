@@ -51,6 +51,7 @@ def verdict_of(findings: Findings) -> dict:
     rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
     return {
         "outcome": decision.outcome,
+        "compared": bench.options.compare,
         "complete": decision.complete,
         "effects": named,
         "added": list(final.names) if decision.added else [],

@@ -24,7 +24,7 @@ _SAME_SENSOR = 1.5
 def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can say something about; sets noise and memory of the records."""
     force = any(one.record.force is not None for one in data.prepared)
-    free = base_parameters(model, force) + drive_nuisances(model, data.prepared)
+    free = base_parameters(model, force, data.prepared[0].in_force) + drive_nuisances(model, data.prepared)
     free += sensor_zeros(free, len(data.prepared))
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
@@ -118,11 +118,11 @@ def limit_noise(source: Data, target: Data) -> bool:
 
     Where the base machine lacks an effect it hides in the noise of records too short to measure it again.
     """
-    shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.record.x)) > 0]
+    shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.signal)) > 0]
     coloured = max([1.0, *shares])
     limited = False
     for one in target.prepared:
-        sensor = max(coloured * white_noise(one.record.x), one.resolution / np.sqrt(12))
+        sensor = max(coloured * white_noise(one.signal), one.resolution / np.sqrt(12))
         if not one.sigma_stated and one.sigma > _SAME_SENSOR * sensor > 0:
             one.sigma, limited = sensor, True
     return limited

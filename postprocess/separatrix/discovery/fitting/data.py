@@ -13,6 +13,7 @@ from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.rescue import rescued, suspicious
 from separatrix.discovery.measured.condense import condense, stride
+from separatrix.discovery.measured.driven import driven
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
 from separatrix.discovery.measured.smoother import Smoothed, smooth
@@ -111,6 +112,8 @@ def _natural_samples(one: Prepared) -> float:
 def _smoothed(one: Prepared, swing: float) -> Smoothed:
     """Smooth a record; one sampled far faster than it moves is seen at fewer samples, and condensed."""
     record = one.record
+    if one.in_force:
+        return _known_motion(one, swing)
     period = min(one.period_samples or np.inf, _natural_samples(one), swing)
     every = stride(period, record.t.size)
     if every == 1:
@@ -123,6 +126,14 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
         f"smooth are condensed to {one.samples.t.size} values that say as much"
     )
     return seen
+
+
+def _known_motion(one: Prepared, swing: float) -> Smoothed:
+    """Smooth a record whose force is compared, and keep its motion."""
+    record = one.record
+    found = smooth(record.t, record.x, one.motion_sigma, swing)
+    one.driven = driven(found, record.v, one.velocity_sigma, one.mass, record.pieces)
+    return found
 
 
 def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.ndarray, float]:

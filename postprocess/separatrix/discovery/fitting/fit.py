@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.normal_equations import (
     Blocks,
     Reduced,
@@ -13,7 +14,7 @@ from separatrix.discovery.fitting.normal_equations import (
     eliminate,
     gauss_newton_step,
 )
-from separatrix.discovery.fitting.problem import Evaluation, Problem
+from separatrix.discovery.fitting.problem import Problem
 
 _HUBER = 1.5
 _TOLERANCE = 0.02
@@ -61,6 +62,8 @@ class Fit:
     exhausted: bool = False
     # what condensed stretches leave over, and its degrees of freedom
     left_over: tuple[np.ndarray, np.ndarray] | None = None
+    # of each segment: its start, or none where the motion is known
+    unknowns: int = 2
 
     @property
     def converged(self) -> bool:
@@ -86,7 +89,8 @@ class Fit:
     def freedom(self) -> int:
         """Residuals less unknowns, over the good segments."""
         good = self.good
-        return int(self.counts[good].sum() - 2 * good.sum() - (~self.at_bound).sum())
+        starts = self.unknowns * good.sum()
+        return int(self.counts[good].sum() - starts - (~self.at_bound).sum())
 
     @property
     def reduced_chi2(self) -> float:
@@ -319,7 +323,7 @@ def _finished(problem, values, starts, current, movable, iterations) -> Fit:
     chi2 = np.sum(current.used * current.residual**2, axis=1)
     counts = current.used.sum(axis=1)
     found = Fit(values, starts, current, reduced, chi2, counts, decrement, iterations, at_bound, movable)
-    return replace(found, left_over=problem.left_over())
+    return replace(found, left_over=problem.left_over(), unknowns=current.unknowns)
 
 
 def _open(

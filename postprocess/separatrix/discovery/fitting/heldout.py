@@ -60,7 +60,8 @@ class Prediction:
     def _freedom(self) -> int:
         good = self.good
         own = len(self.problem.free) - self.covariance.shape[0]
-        return int(self.fit.counts[good].sum() - 2 * good.sum() - own)
+        starts = self.fit.unknowns * good.sum()
+        return int(self.fit.counts[good].sum() - starts - own)
 
 
 @dataclass

@@ -23,6 +23,8 @@ _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
 _UNBOUNDED = 1e100
+# by which the mass may differ from that of the case where the force is compared
+_MASS_FACTOR = 5.0
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,12 @@ class Free:
         return self.path.startswith("nuisance:")
 
 
-def base_parameters(model, measured_force: bool) -> list[Free]:
-    """The parameters of the base machine that a record can say something about."""
+def base_parameters(model, measured_force: bool, in_force: bool = False) -> list[Free]:
+    """The parameters of the base machine that a record can say something about.
+
+    Where the force is compared (`in_force`) the mass stays near that of the case, of which a slow joint says
+    little.
+    """
     free = []
     for path, parameter in model.parameters.items():
         if not _is_fitted(path, measured_force) or _is_tied(path, model):
@@ -78,6 +84,8 @@ def base_parameters(model, measured_force: bool) -> list[Free]:
         lower, upper = bounds_of(parameter)
         if path.endswith(_NEVER_ZERO):
             lower = max(lower, 1e-3 * value)
+        if in_force and path == "body.mass":
+            lower, upper = value / _MASS_FACTOR, value * _MASS_FACTOR
         free.append(Free(path, value, lower, upper, abs(value) or 1.0, varies=path == SENSOR_BIAS))
     return free
 

@@ -22,7 +22,11 @@ from separatrix.discovery.measured.condense import Samples, expected_left
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
 _PIECES = 4
+# samples of a piece of a measured force, and powers of time that are taken from it
+_SHORT, _POWERS = 16, 3
 _LEAST = 0.04
+# memory of a force beyond which it is that of the joint and not of the sensor
+_MOST = 0.8
 _SURE = 3.5
 _OUTLIER = 2.5
 
@@ -41,7 +45,10 @@ class _Left:
 
 def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dict[int, float], float]:
     """Factor on the assumed standard deviation by record, and the correlation of neighbours in all."""
-    left = _joined([_of_segments(problem, fit, channel, mass), *_of_stretches(problem, channel)])
+    if problem.in_force:
+        left = _of_short_pieces(problem, fit)
+    else:
+        left = _joined([_of_segments(problem, fit, channel, mass), *_of_stretches(problem, channel)])
     if left.record.size < 4:
         return {}, 0.0
     # each record in its own size
@@ -52,7 +59,7 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dic
     ratio = left.products.sum(axis=1) / left.powers.sum(axis=1)
     seen = float(np.sum(left.product / size) / np.sum(left.power / size))
     memory = float(np.interp(seen, ratio, _MEMORIES))
-    if memory < max(_LEAST, _SURE / np.sqrt(left.freedom.sum())):
+    if memory < max(_LEAST, _SURE / np.sqrt(left.freedom.sum())) or (problem.in_force and memory > _MOST):
         memory = 0.0
     factors = {}
     for number in np.unique(left.record):
@@ -120,15 +127,36 @@ def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left
     cleaned = residual * segments.inside[rows]
     cleaned = cleaned - np.einsum("klq,kq->kl", basis, np.einsum("klq,kl->kq", basis, cleaned))
     freedom = counts[rows] - np.sum(basis**2, axis=(1, 2))
+    return _without_outliers(segments.record[rows], cleaned, freedom, basis, counts[rows])
+
+
+def _of_short_pieces(problem: Problem, fit: Fit) -> _Left:
+    """What short pieces of measured forces leave over once a parabola in time is taken from each.
+
+    A force shows every bend of a law at once: what a wrong machine leaves in some of them is put aside.
+    """
+    length = problem.segments.inside.shape[1] // _SHORT * _SHORT
+    pieces = fit.evaluation.residual[:, :length].reshape(-1, _SHORT)
+    used = fit.evaluation.used[:, :length].reshape(-1, _SHORT).all(axis=1)
+    record = np.repeat(problem.segments.record, length // _SHORT)[used]
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, _SHORT), _POWERS))[0]
+    cleaned = pieces[used] - pieces[used] @ basis @ basis.T
+    count = np.full(record.size, _SHORT)
+    whole = np.broadcast_to(basis, (record.size, *basis.shape))
+    return _without_outliers(record, cleaned, (count - _POWERS).astype(float), whole, count)
+
+
+def _without_outliers(
+    record: np.ndarray, cleaned: np.ndarray, freedom: np.ndarray, basis: np.ndarray, counts: np.ndarray
+) -> _Left:
+    """Powers of what is left, but of those stretches that the model misses altogether."""
     power = np.sum(cleaned**2, axis=1)
-    record = segments.record[rows]
-    kept = np.zeros(rows.size, bool)
+    share = power / freedom
+    kept = np.zeros(record.size, bool)
     for number in np.unique(record):
-        # robust against single segments that the model misses altogether
-        share = power / freedom
         kept |= (record == number) & (share < _OUTLIER * np.median(share[record == number]))
     product = np.sum(cleaned[:, 1:] * cleaned[:, :-1], axis=1)
-    expected = _expected(basis[kept], counts[rows][kept])
+    expected = _expected(basis[kept], counts[kept])
     return _Left(record[kept], power[kept], product[kept], freedom[kept], *expected)
 
 

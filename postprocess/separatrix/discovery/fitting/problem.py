@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The short-segment likelihood: residuals of all segments and their derivatives, from the simulator."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from separatrix.discovery.fitting.evaluation import Evaluation
+from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared, even_interval
 from separatrix.discovery.measured.segments import Segments, padded
@@ -16,6 +16,8 @@ from separatrix.errors import SeparatrixError
 _TOLERANCE = 1e-8
 _NOISE_SHARE = 0.01
 _ROUNDING = 1e-14
+# of the size of a parameter, by which the force that a known motion takes is differentiated
+_STEP = 1e-5
 
 
 def flight_tolerance(prepared: Prepared) -> float:
@@ -25,32 +27,6 @@ def flight_tolerance(prepared: Prepared) -> float:
     if allowed >= _TOLERANCE * farthest:
         return _TOLERANCE
     return float(max(_ROUNDING, allowed / farthest))
-
-
-@dataclass
-class Evaluation:
-    """Residuals over their noise (segments, channels*length, then nuisances that were measured), derivatives
-    by start (…, 2) and parameters (…, p).
-
-    `used` is 0 where a segment has no sample; `failed` is true where the simulator gave one up (its rows are
-    0); `steady` is false where the sequence of impacts would change under a small step, so that the
-    derivatives mean nothing.
-    """
-
-    residual: np.ndarray
-    used: np.ndarray
-    failed: np.ndarray
-    steady: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    # per record rows of segment (of that record), time, speed before, speed after, side
-    impacts: list[np.ndarray | None]
-    # number of impacts of each segment
-    hits: np.ndarray
-    by_start: np.ndarray | None = None
-    by_parameter: np.ndarray | None = None
-    # derivatives of x and v by the start, without noise: what a force does later follows from them
-    transition: np.ndarray | None = None
 
 
 class Problem:
@@ -63,6 +39,7 @@ class Problem:
         self.segments = segments
         self.free = free
         self.amplitudes = drive_amplitudes(model)
+        self.in_force = prepared[0].in_force
         self._parts = [self._part(number) for number in range(len(prepared))]
 
     def of_segments(self, rows: np.ndarray) -> "Problem":
@@ -96,7 +73,7 @@ class Problem:
     @property
     def channels(self) -> int:
         """How many of x and v are compared."""
-        return 2 if any(part["v"] is not None for part in self._parts) else 1
+        return 2 if not self.in_force and any(part["v"] is not None for part in self._parts) else 1
 
     def _known_nuisances(self) -> list[tuple[int, float, np.ndarray]]:
         """Places and errors of nuisances that were measured, and the segments that share what this says.
@@ -136,7 +113,7 @@ class Problem:
             "x": fitted.x[samples],
             "v": None if fitted.v is None else fitted.v[samples],
             "samples": samples,
-            "force": _force_argument(record, fitted.place[first]),
+            "force": None if self.in_force else _force_argument(record, fitted.place[first]),
             "tolerance": flight_tolerance(self.prepared[number]),
         }
 
@@ -161,6 +138,8 @@ class Problem:
             impacts=[None] * len(self._parts),
             hits=np.zeros(count, int),
         )
+        if self.in_force:
+            out.unknowns, out.force = 0, np.zeros(shape)
         if derivatives:
             out.by_start = np.zeros((count, width, 2))
             out.by_parameter = np.zeros((count, width, len(self.free)))
@@ -168,7 +147,12 @@ class Problem:
         for number, part in enumerate(self._parts):
             if part["rows"].size:
                 try:
-                    self._evaluate_record(number, part, values, starts, (derivatives, by_start_alone), out)
+                    if self.in_force:
+                        self._compare_force(number, part, values, derivatives, out)
+                    else:
+                        self._evaluate_record(
+                            number, part, values, starts, (derivatives, by_start_alone), out
+                        )
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
@@ -196,6 +180,8 @@ class Problem:
                 continue
             rows = np.flatnonzero(self.segments.record == number)
             linked = prepared.samples.linked[self.segments.index[rows]][:, 1:]
+            if self.in_force:
+                linked &= prepared.driven.moves[self.segments.index[rows]][:, :-1]
             linked = linked.reshape(linked.shape + (1,) * (table.ndim - 2))
             for first in range(0, self.channels * length, length):
                 part = table[rows, first : first + length]
@@ -258,6 +244,31 @@ class Problem:
                 out.by_parameter[rows, columns] = np.nan_to_num(
                     _padded(by_parameter / sigma[:, None], inside)
                 )
+
+    def _compare_force(
+        self, number: int, part: dict, values: np.ndarray, derivatives: bool, out: Evaluation
+    ) -> None:
+        """Residuals of the force of a record, whose motion is known."""
+        prepared, rows, inside, at = self.prepared[number], part["rows"], part["inside"], part["samples"]
+        motion, record, length = prepared.driven, prepared.record, inside.shape[1]
+
+        def needed(chosen: np.ndarray) -> np.ndarray:
+            machine = self.machine_values(number, chosen)
+            return force_needed(self.model, machine, motion, record.force, record.pieces)[at]
+
+        force, sigma, used = needed(values), prepared.deviation(at), motion.moves[at]
+        for table, at_samples in ((out.x, motion.x[at]), (out.v, motion.v[at]), (out.force, force)):
+            table[rows] = _padded(at_samples, inside)
+        out.used[rows, :length] = _padded(used.astype(float), inside)
+        out.residual[rows, :length] = _padded(used * (record.force[at] - force) / sigma, inside)
+        if derivatives:
+            slopes = np.zeros((at.size, values.size))
+            for j, one in enumerate(self.free):
+                # nearly linear; derivatives of so short a flight are not exact for all effects
+                step = _STEP * one.size * (1 if values[j] + _STEP * one.size <= one.upper else -1)
+                moved = values + step * (np.arange(values.size) == j)
+                slopes[:, j] = (needed(moved) - force) / (step * sigma)
+            out.by_parameter[rows, :length] = _padded(slopes, inside)
 
     def _simulate(
         self,

@@ -4,8 +4,9 @@
 
 import numpy as np
 
+from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.problem import Evaluation, Problem
+from separatrix.discovery.fitting.problem import Problem
 
 # reduced chi^2 of a segment, over that of the median one, that looks like a wrong minimum
 _SUSPECT = 1.7

@@ -15,7 +15,12 @@ _LOST = 1e-9
 
 
 def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
-    """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples."""
+    """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples.
+
+    Where the force is compared, what acts on the body in its direction is less to be measured.
+    """
+    if problem.in_force:
+        return _of_forces(problem, fit, forces)
     back, alive = _back(problem, fit)
     carried = back[:, :, :, None] * forces[:, :, None, :] / mass
     steps = np.diff(sample_times(problem), axis=1)[:, :, None, None]
@@ -26,8 +31,21 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
 
 def kick_columns(problem: Problem, fit: Fit, kicks: np.ndarray) -> np.ndarray:
     """Columns of sudden changes of velocity (segments, length, q) [m/s] at the samples."""
+    if problem.in_force:
+        return np.zeros_like(kicks)
     back, alive = _back(problem, fit)
     return _as_columns(problem, fit, np.cumsum(back[:, :, :, None] * kicks[:, :, None, :], axis=1), alive)
+
+
+def _of_forces(problem: Problem, fit: Fit, forces: np.ndarray) -> np.ndarray:
+    """Forces over the noise of a measured force."""
+    columns = np.zeros((*fit.evaluation.residual.shape, forces.shape[2]))
+    length = forces.shape[1]
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        sigma = prepared.deviation(problem.segments.index[rows])[:, :, None]
+        columns[rows, :length] = -forces[rows] / sigma
+    return problem.whitened(columns * (fit.evaluation.used > 0)[:, :, None])
 
 
 def _back(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:

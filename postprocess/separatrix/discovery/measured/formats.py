@@ -18,6 +18,7 @@ from scipy.io import loadmat
 from separatrix.discovery.measured.tables import (
     CHANNELS,
     KEYS,
+    SAME,
     Table,
     check_length,
     read_csv,
@@ -131,6 +132,7 @@ def _of_arrays(path: Path, found: dict[str, object]) -> Table:
             found = {name: only[name].item() for name in only.dtype.names}
         elif isinstance(only, dict):
             found = only
+    found = {SAME.get(name, name): value for name, value in found.items()}
     missing = [name for name in ("t", "x") if name not in found]
     if missing:
         has = ", ".join(sorted(found)) or "nothing"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS
+from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, SAME
 from separatrix.errors import SeparatrixError
 
 _TURN = 2 * np.pi
@@ -27,6 +27,7 @@ _OF_KEYS = {
     "sensor_resolution_m": _LENGTH | _ANGLE,
     "sensor_noise_sigma_m_s": _SPEED,
     "phi_noise_sigma_rad": _ANGLE,
+    "force_noise_sigma_n": _FORCE,
     "drive_frequency_rad_s": _RATE,
     "phase": _ANGLE,
     "sensor_delay_s": _TIME,
@@ -53,6 +54,7 @@ _NO_LESS_THAN_0 = (
     "sensor_noise_sigma_m_s",
     "sensor_resolution_m",
     "phi_noise_sigma_rad",
+    "force_noise_sigma_n",
 )
 
 
@@ -142,10 +144,10 @@ def _units(path: Path, text: str, columns: dict[str, np.ndarray]) -> dict[str, s
 
 def _entry(entry: str) -> tuple[str, str]:
     """Name of a column ('' if there is none) and unit, from `mm`, `x mm`, `x: mm`, `x = mm`, `x [mm]`."""
-    for name in ("t", "x", *CHANNELS):
+    for name in ("t", "x", *CHANNELS, *SAME):
         said = re.fullmatch(rf"{name}\s*(?:[:=]\s*|\s+|(?=[\[(]))[\[(]?\s*(.*?)\s*[\])]?", entry)
         if said:
-            return name, said.group(1)
+            return SAME.get(name, name), said.group(1)
     return "", entry.strip("[]() ")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
 from separatrix.discovery.measured.condense import Samples, whole
+from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.discovery.wording import units_of
@@ -54,11 +55,32 @@ class Prepared:
     notes: list[str] = field(default_factory=list)
     # what is fitted: all samples, or fewer rows that say as much
     samples: Samples | None = None
+    # whether the force is compared: sigma and resolution are its own, the motion is known
+    in_force: bool = False
+    driven: Driven | None = None
+    # noise of the positions of such a record
+    motion_sigma: float = 0.0
+    # of the case [kg]
+    mass: float = 0.0
 
     def __post_init__(self) -> None:
         """Fit every sample, unless something else is said."""
         if self.samples is None:
             self.samples = whole(self.record)
+
+    @property
+    def signal(self) -> np.ndarray:
+        """What is compared: position, or force."""
+        return self.record.force if self.in_force else self.record.x
+
+    def deviation(self, rows: np.ndarray) -> np.ndarray:
+        """Standard deviation of the noise of what is compared at some rows.
+
+        That of a force has the error of mass times acceleration in it.
+        """
+        if self.in_force:
+            return np.hypot(self.sigma, self.driven.inertia_error)[rows]
+        return self.sigma * self.samples.spread(self.memory)[rows]
 
     @property
     def period_samples(self) -> float | None:
@@ -72,7 +94,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     """Measure what the header does not say, and refuse what cannot be a record of this machine."""
     notes = list(record.warnings)
     if record.v is not None:
-        _check_velocity(record, notes)
+        check_velocity(record, notes)
     record = _with_its_force(record, model, notes)
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     unit = units_of(model.parameters).position
@@ -90,7 +112,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     prepared = Prepared(
         record,
         sigma,
-        _velocity_noise(record),
+        velocity_noise(record),
         resolution,
         notes=notes,
         origin=record.header.get("phase_origin_s", float(record.t[0])),
@@ -123,7 +145,8 @@ def _noise(record: Record, rest: Record | None, resolution: float, unit: str, no
     return sigma
 
 
-def _velocity_noise(record: Record) -> float:
+def velocity_noise(record: Record) -> float:
+    """Standard deviation of the noise of the measured velocity, stated or found; infinite without one."""
     if record.v is None:
         return np.inf
     stated = record.header.get("sensor_noise_sigma_m_s")
@@ -236,7 +259,10 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
             )
         return record
     if not wanted:
-        notes.append("the machine has no measured force: column 'force' is not used")
+        notes.append(
+            "the machine has no measured force: column 'force' is not used (that of a joint which is driven "
+            'along its motion is compared with --compare force and drive.law = "measured_force")'
+        )
         return replace(record, force=None)
     usual = None
     for first, last in record.pieces:
@@ -293,7 +319,7 @@ def _is_soft(model) -> bool:
     return "contact.stiffness" in model.parameters
 
 
-def _check_velocity(record: Record, notes: list[str]) -> None:
+def check_velocity(record: Record, notes: list[str]) -> None:
     """Compare v with the slope of x: another quantity, another unit, a delay."""
     if np.ptp(record.v) == 0:
         raise SeparatrixError(f"{record.file}: 'v' is constant")

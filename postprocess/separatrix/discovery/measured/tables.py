@@ -15,6 +15,8 @@ from separatrix.trial import try_first
 
 CHANNELS = ("x", "v", "force", "phi")
 """Columns that are used, next to `t`."""
+SAME = {"F": "force"}
+"""Other names of columns."""
 NUMBERS = {
     "sampling_rate_hz",
     "sensor_noise_sigma_m",
@@ -28,6 +30,7 @@ NUMBERS = {
     "v0_m_s",
     "phase",
     "phi_noise_sigma_rad",
+    "force_noise_sigma_n",
 }
 """Header keys with one number."""
 MOST_SAMPLES = 10_000_000
@@ -169,7 +172,8 @@ def _has_t_and_x(text: str, separator: str) -> bool:
 def _named(text: str) -> tuple[str, str]:
     """Name of a column and its unit, '' where there is none, from `x`, `x [mm]` or `x (mm)`."""
     found = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", text.strip())
-    return (found.group(1), found.group(2)) if found else (text.strip(), "")
+    name, unit = (found.group(1), found.group(2)) if found else (text.strip(), "")
+    return SAME.get(name, name), unit
 
 
 def _units_of_names(header: dict[str, str], text: str, separator: str, used: list[str]) -> None:

@@ -114,7 +114,8 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         by_key["held-out"],
         "overlay",
         figures.held_out(details),
-        "A held-out record where the base machine misses it most, three segments: a) position, b) "
+        "A held-out record where the base machine misses it most, three segments: a) position, or "
+        "the force where it is compared, b) "
         "residuals in standard "
         "deviations of the noise; grey: 95 % of noise.",
     )

@@ -310,7 +310,8 @@ def held_out(details: h5py.File) -> Figure | None:
     window = np.abs(segment - worst) <= 1
     times = before["t"][:][window]
     record = details["records"][name]
-    t, x = record["t"][:], record["x"][:]
+    compared = "force" if details.attrs.get("compared", "") == "force" else "x"
+    t, x = record["t"][:], record[compared][:]
     inside = (t >= times.min()) & (t <= times.max())
     figure = style.new_figure(style.DOUBLE_COLUMN, 88.0)
     figure.set_layout_engine("constrained")
@@ -330,7 +331,7 @@ def held_out(details: h5py.File) -> Figure | None:
         along = part["t"][:][near]
         number = part["segment"][:][near]
         breaks = np.flatnonzero(np.diff(number)) + 1
-        shown = [np.insert(column[:][near], breaks, np.nan) for column in (part["x"], part["residual"])]
+        shown = [np.insert(column[:][near], breaks, np.nan) for column in (part[compared], part["residual"])]
         along = np.insert(along, breaks, np.nan)
         handles += top.plot(along, shown[0], color=colour, linestyle=dash, label=label)
         bottom.plot(along, shown[1], linestyle="", marker=".", markersize=2, markeredgewidth=0, color=colour)
@@ -340,7 +341,10 @@ def held_out(details: h5py.File) -> Figure | None:
         _symlog(bottom, "y", 5, largest)
     bottom.set_ylabel("residual / noise")
     bottom.set_xlabel("time (s)")
-    top.set_ylabel(f"position $x$ ({details.attrs['position_unit']})")
+    if compared == "force":
+        top.set_ylabel(f"force ({details.attrs['force_unit']})")
+    else:
+        top.set_ylabel(f"position $x$ ({details.attrs['position_unit']})")
     for letter, ax in zip("ab", (top, bottom), strict=True):
         ax.set_title(f"{letter})", loc="left")
     figure.legend(handles=handles, loc="outside upper center", ncols=3)

@@ -18,6 +18,14 @@ GATES = {
 }
 
 
+_HOW = {
+    "motion": "The records are cut into short segments. The start of each segment and all uncertain numbers "
+    "of the base machine are fitted, so that neither chaos nor a wrong parameter counts as missing physics.",
+    "force": "The force that drives the body along its measured motion is compared. All uncertain numbers of "
+    "the base machine are fitted, so that no wrong parameter counts as missing physics.",
+}
+
+
 def sections(verdict: dict) -> list[Section]:
     """All sections, without figures."""
     return [
@@ -127,7 +135,7 @@ def _compared(verdict: dict) -> Section:
         ]
         for one in verdict["records"]
     ]
-    unit = verdict["units"]["position"]
+    unit = verdict["units"]["force" if verdict.get("compared", "motion") == "force" else "position"]
     table = Table(
         [
             "record",
@@ -144,9 +152,7 @@ def _compared(verdict: dict) -> Section:
         "compared",
         "What was compared",
         [
-            "The records are cut into short segments. The start of each segment and all uncertain numbers "
-            "of the base "
-            "machine are fitted, so that neither chaos nor a wrong parameter counts as missing physics.",
+            _HOW[verdict.get("compared", "motion")],
             table,
             f"Held out: {verdict['held_out_chosen']}. Random choices follow from seed {verdict['seed']}; "
             f"separatrix {verdict['version']}, {number(verdict['runtime_s'], 3)} s.",

@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The force that a known motion takes: mass times acceleration less the forces of the machine along it.
+
+The forces of the machine are those of the simulator: of a flight from each sample, so short that nothing
+changes on it, under the measured force, so that the body is not stopped. Only friction with a memory needs
+the whole path: its state follows from Dahl's equation, which has a closed form between turning points.
+"""
+
+import numpy as np
+
+from separatrix.discovery.measured.driven import Driven
+from separatrix.errors import SeparatrixError
+
+# time of a flight [s], and the share of the time in which the usual force would stop the body
+_INSTANT, _SHARE = 1e-7, 1e-2
+_TOLERANCE = 1e-12
+_DAHL = "effect.dahl.stiffness"
+_OVER_PLACE = ("effect.position_dependent_friction.", "effect.friction_place_curve.")
+
+
+def force_needed(
+    model, values: dict[str, float], motion: Driven, measured: np.ndarray, pieces: list[tuple[int, int]]
+) -> np.ndarray:
+    """The force [N] that the machine with these values takes at the samples of a record; 0 at rest."""
+    acceleration = _accelerations(model, values, motion, measured)
+    force = _value(model, values, "body.mass") * (motion.a - acceleration) + measured
+    if _DAHL in model.parameters:
+        share = _share_of_place(model, values, motion, measured)
+        force = force + share * _unslipped(model, values, motion, pieces)
+    return np.where(motion.moves, force, 0.0)
+
+
+def _accelerations(model, values: dict[str, float], motion: Driven, measured: np.ndarray) -> np.ndarray:
+    """Accelerations under the measured force at all samples, 0 where the body does not move."""
+    rows = np.flatnonzero(motion.moves)
+    mass = _value(model, values, "body.mass")
+    usual = (np.ptp(measured) + mass * np.max(np.abs(motion.a), initial=0.0)) / mass
+    time = np.minimum(_INSTANT, _SHARE * np.abs(motion.v[rows]) / max(usual, 1e-300))
+    start = np.column_stack([motion.x[rows], motion.v[rows], np.zeros(rows.size)])
+    series = np.append(measured, measured[-1])
+    flown = model.segments(
+        list(values), np.array(list(values.values())), start, 2 * np.arange(rows.size + 1),
+        np.column_stack([np.zeros(rows.size), time]).ravel(), force=(rows.astype(float), 1.0, series),
+        derivatives=False, tolerance=_TOLERANCE,
+    )  # fmt: skip
+    if np.any(flown.reason != 0):
+        raise SeparatrixError("a place or speed of the record that the machine cannot have")
+    found = np.zeros(motion.v.size)
+    found[rows] = (flown.v[1::2] - motion.v[rows]) / time
+    return found
+
+
+def _unslipped(model, values: dict[str, float], motion: Driven, pieces: list[tuple[int, int]]) -> np.ndarray:
+    """State of Dahl's friction less that after a long slip in the direction of the motion [N]."""
+    stiffness = _value(model, values, _DAHL)
+    dry = _value(model, values, "effect.coulomb.force")
+    dry += (
+        _value(model, values, "friction.kinetic_coefficient")
+        * _value(model, values, "body.mass")
+        * _value(model, values, "body.gravity")
+    )
+    more = _value(model, values, "effect.asymmetric_friction.coulomb")
+    found = np.zeros(motion.x.size)
+    for first, last in pieces:
+        after = None
+        for a, b, sign in motion.strokes(first, last):
+            level = _slipping(sign, dry, more)
+            # what was before the record is not known: a long slip
+            behind = 0.0 if after is None else after - level
+            way = np.abs(motion.x[a:b] - motion.x[max(a - 1, first)])
+            found[a:b] = behind * np.exp(-stiffness * way / max(abs(level), 1e-300))
+            after = found[b - 1] + level
+    return found
+
+
+def _slipping(sign: int, dry: float, more: float) -> float:
+    """State of Dahl's friction after a long slip in a direction [N]."""
+    return sign * max(dry + sign * more, 0.0)
+
+
+def _share_of_place(model, values: dict[str, float], motion: Driven, measured: np.ndarray) -> np.ndarray:
+    """By how much friction is larger or smaller at each place than the law says."""
+    if not any(path.startswith(_OVER_PLACE) for path in model.parameters):
+        return np.ones(motion.x.size)
+    path = "friction.kinetic_coefficient"
+    more = {**values, path: _value(model, values, path) + 1.0}
+    changed = _accelerations(model, more, motion, measured) - _accelerations(model, values, motion, measured)
+    return np.abs(changed) / _value(model, values, "body.gravity")
+
+
+def _value(model, values: dict[str, float], path: str) -> float:
+    """Value of a parameter; 0 of one that the machine lacks."""
+    if path in values:
+        return values[path]
+    return float(model.parameters[path].value) if path in model.parameters else 0.0

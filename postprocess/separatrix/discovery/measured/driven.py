@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The known motion of a record whose force is compared: speed and acceleration, and where they mean a force.
+
+At rest friction is whatever holds the body, and where the speed is not known from zero neither is its
+direction: such samples are not compared.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from separatrix.discovery.measured.smoother import Smoothed
+
+# standard errors of the speed within which a body may be at rest; share of the usual speed where errors are 0
+_SLOW, _REST = 3.0, 1e-4
+# errors of neighbouring accelerations go together: they count as so many times larger
+_TOGETHER = 2.0
+# way at the beginning, over that of the whole record, on which friction may remember what was before
+_BEGUN = 0.1
+
+
+@dataclass
+class Driven:
+    """The motion at the samples of a record."""
+
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    # of mass times acceleration [N]
+    inertia_error: np.ndarray
+    # whether the direction of the motion is known
+    moves: np.ndarray
+
+    def scaled(self, scale: float, rate: float) -> "Driven":
+        """The same motion about its middle, `scale` times as large and `rate` times as fast."""
+        middle = 0.5 * (self.x.min() + self.x.max())
+        x = middle + scale * (self.x - middle)
+        return Driven(
+            x,
+            scale * rate * self.v,
+            scale * rate**2 * self.a,
+            scale * rate**2 * self.inertia_error,
+            self.moves,
+        )
+
+    def strokes(self, first: int, last: int) -> list[tuple[int, int, int]]:
+        """Stretches (first, last + 1) of a piece of the record without a turning point; their direction."""
+        x = self.x[first:last]
+        sign = np.sign(np.diff(x, prepend=2 * x[0] - x[1]))
+        edges = [0, *(np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist(), x.size]
+        return [(first + a, first + b, int(sign[a])) for a, b in pairwise(edges)]
+
+    def ways(self, pieces: list[tuple[int, int]]) -> np.ndarray:
+        """Way since the motion turned round last [m] at each sample."""
+        found = np.zeros(self.x.size)
+        for piece in pieces:
+            for a, b, _ in self.strokes(*piece):
+                found[a:b] = np.abs(self.x[a:b] - self.x[max(a - 1, piece[0])])
+        return found
+
+
+def driven(
+    smoothed: Smoothed,
+    v: np.ndarray | None,
+    velocity_sigma: float,
+    mass: float,
+    pieces: list[tuple[int, int]],
+) -> Driven:
+    """The motion as smoothed; with a measured speed `v` of noise `velocity_sigma`, their weighted mean."""
+    x, speed, a = smoothed.state.T
+    variance = np.maximum(smoothed.covariance[:, 1, 1], 0.0)
+    if v is not None:
+        share = variance / (variance + velocity_sigma**2)
+        speed = (1 - share) * speed + share * v
+        variance = (1 - share) * variance
+    least = np.maximum(_SLOW * np.sqrt(variance), _REST * np.sqrt(np.mean(speed**2)))
+    moves = np.abs(speed) > least
+    for first, last in pieces:
+        turns = speed[first : last - 1] * speed[first + 1 : last] <= 0
+        moves[first : last - 1] &= ~turns
+        moves[first + 1 : last] &= ~turns
+        moves[first:last] &= np.cumsum(np.abs(np.diff(x[first:last], prepend=x[first]))) > _BEGUN * np.ptp(x)
+    error = _TOGETHER * mass * np.sqrt(np.maximum(smoothed.covariance[:, 2, 2], 0.0))
+    return Driven(x.copy(), speed.copy(), a.copy(), error, moves)

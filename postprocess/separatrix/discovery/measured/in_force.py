@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records of a known motion whose force is compared: a joint driven along x(t), as friction is tested."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from separatrix.discovery.measured.preflight import Prepared, check_velocity, velocity_noise
+from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
+from separatrix.discovery.wording import units_of
+from separatrix.errors import SeparatrixError
+
+MOST_SAMPLES = 40_000
+"""Samples of such a record that are compared; of a longer one means of neighbours are."""
+# least noise of a force over its scatter: no sensor of force is better
+_EXACT = 5e-4
+
+
+def prepare_force(record: Record, model) -> Prepared:
+    """Noise of force and position; refused is what is no record of a driven joint."""
+    if record.force is None:
+        raise SeparatrixError(f"{record.file}: no column 'force' (or 'F'), the force that is compared")
+    if 'law = "measured_force"' not in model.to_text({}):
+        raise SeparatrixError(
+            f'drive.law: allowed with --compare force "measured_force": the force that {record.file} has is '
+            "all that drives the body; foot, crank and other drives are not known there"
+        )
+    notes = list(record.warnings)
+    if record.v is not None:
+        check_velocity(record, notes)
+    record = _thinned(record, notes)
+    if np.ptp(record.force) == 0:
+        raise SeparatrixError(f"{record.file}: 'force' is constant")
+    unit = units_of(model.parameters).force
+    stated = record.header.get("force_noise_sigma_n")
+    resolution = resolution_of(record.force)
+    least = max(_EXACT * float(np.std(record.force)), resolution / np.sqrt(12))
+    sigma = max(stated / np.sqrt(_together(record)) if stated else white_noise(record.force), least)
+    if not stated:
+        notes.append(f"noise of the force {sigma:.3g} {unit}, from fourth differences")
+    of_x = max(white_noise(record.x), resolution_of(record.x) / np.sqrt(12))
+    motion = max(record.header.get("sensor_noise_sigma_m") or of_x, QUIET * float(np.std(record.x)))
+    prepared = Prepared(
+        record, sigma, velocity_noise(record), resolution, notes=notes, origin=float(record.t[0])
+    )
+    prepared.in_force, prepared.motion_sigma, prepared.sigma_stated = True, motion, bool(stated)
+    prepared.mass = model.parameters["body.mass"].value
+    return prepared
+
+
+def _together(record: Record) -> int:
+    """Samples of which each row of a record is the mean."""
+    return int(record.header.get("rows_together", 1))
+
+
+def _thinned(record: Record, notes: list[str]) -> Record:
+    """Means of neighbours where there are far more samples than a law of the joint needs."""
+    count = -(-record.t.size // MOST_SAMPLES)
+    if count == 1:
+        return record
+    rows, pieces = [], []
+    for first, last in record.pieces:
+        begun = sum(len(one) for one in rows)
+        rows.append(np.arange(first, last - count + 1, count))
+        pieces.append((begun, begun + len(rows[-1])))
+    at = np.concatenate(rows)[:, None] + np.arange(count)
+    columns = {
+        name: None if getattr(record, name) is None else getattr(record, name)[at].mean(axis=1)
+        for name in ("t", "x", "v", "force")
+    }
+    notes.append(f"{record.t.size} samples: means of {count} neighbours are compared")
+    header = {**record.header, "rows_together": float(count)}
+    return replace(record, **columns, phi=None, pieces=pieces, header=header)

@@ -1,0 +1,229 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The convex problem that a choice of modes puts: forces of the joints in question within their limits, each with no
+!> acceleration along its joint unless it is at a limit. Derivatives of it settle ties.
+module mode_question
+  use boxed_forces, only: depends_on, solve_boxed
+  use jointed, only: joint_contact, joint_friction, jointed_t, most_joints
+  use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: ask, set_mobility, drift_of, sizes, second_rate, solve, is_tied, narrow, keep_loaded
+
+  !> What the choice is made of: the joints in question, their rows, and the drift of the free structure along them.
+  type, public :: question_t
+    integer :: count = 0
+    integer :: joint(most_joints) = 0
+    real(wp), dimension(most_joints) :: lower = 0, upper = 0
+    !> Not in question any more: no force is sought.
+    logical :: fixed(most_joints) = .false.
+    real(wp) :: g(most_joints, most_joints) = 0
+    real(wp) :: tolerance = 0
+  end type question_t
+
+contains
+
+  pure subroutine ask(question, j, lower, upper)
+    type(question_t), intent(inout) :: question
+    integer, intent(in) :: j
+    real(wp), intent(in) :: lower, upper
+    question%count = question%count + 1
+    question%joint(question%count) = j
+    question%lower(question%count) = lower
+    question%upper(question%count) = upper
+  end subroutine ask
+
+  !> W' M^-1 W.
+  pure subroutine set_mobility(machine, question)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(inout) :: question
+    integer :: i, k
+    do i = 1, question%count
+      do k = 1, question%count
+        question%g(k, i) = sum(machine%joints(question%joint(k))%row &
+                               *matmul(machine%mobility, machine%joints(question%joint(i))%row))
+      end do
+    end do
+  end subroutine set_mobility
+
+  !> Derivative number `order` of the joint coordinates in question without the forces sought: that of the free structure
+  !> under `force` (or its rates), and that of the surfaces.
+  pure subroutine drift_of(machine, question, state, turning, order, force, drift)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(in) :: question
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    integer, intent(in) :: order
+    real(wp), intent(in) :: force(:)
+    real(wp), intent(out) :: drift(:)
+    real(wp) :: a(machine%n)
+    integer :: i
+    a = matmul(machine%mobility, force)
+    drift = 0
+    do i = 1, question%count
+      drift(i) = sum(machine%joints(question%joint(i))%row*a) &
+                 + surface(machine, question%joint(i), state, turning, order)
+    end do
+  end subroutine drift_of
+
+  !> Derivative number `order` >= 2 of the given part of a joint coordinate.
+  pure real(wp) function surface(machine, j, state, turning, order)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j, order
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    integer :: m
+    surface = 0
+    associate (offset => machine%joints(j)%offset)
+      if (.not. allocated(offset%harmonic)) return
+      do m = 1, size(offset%harmonic)
+        surface = surface + real(offset%harmonic(m)*turning(m)*cmplx(0.0_wp, m*machine%frequency, wp)**order)
+      end do
+    end associate
+    if (state%time /= state%time) surface = 0
+  end function surface
+
+  !> Sizes of what the accelerations in question are sums of, for their rounding.
+  pure function sizes(machine, question, state, turning, force) result(size_of_y)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(in) :: question
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(in) :: force(:)
+    real(wp) :: size_of_y(most_joints), parts(machine%n), s, u, r, by_place, by_speed
+    integer :: i, n
+    n = machine%n
+    parts = abs(force) + abs(machine%load) + matmul(abs(machine%damping), abs(state%v(:n))) &
+            + matmul(abs(machine%stiffness), abs(state%q(:n)))
+    do i = 1, size(turning)
+      if (i <= size(machine%force, 2)) parts = parts + abs(real(machine%force(:, i)))*abs(real(turning(i))) &
+                                                     + abs(aimag(machine%force(:, i)))*abs(aimag(turning(i)))
+    end do
+    do i = 1, size(machine%joints)
+      if (machine%joints(i)%kind == joint_friction) parts = parts &
+        + abs(machine%joints(i)%row)*machine%joints(i)%friction%break_away
+      ! The force of a stiff joint is the small difference of large ones.
+      call joint_motion(machine, i, state%q, state%v, state%time, turning, s, u)
+      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, r, by_place, by_speed)
+      associate (row => abs(machine%joints(i)%row))
+        parts = parts + row*(abs(by_place)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
+      end associate
+    end do
+    size_of_y = 0
+    do i = 1, question%count
+      size_of_y(i) = sum(abs(machine%joints(question%joint(i))%row)*matmul(abs(machine%mobility), parts))
+    end do
+  end function sizes
+
+  !> Second rates of the forces, the laws taken as linear.
+  pure subroutine second_rate(machine, state, turning, a, jerk, rate)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(in) :: a(:), jerk(:)
+    real(wp), intent(out) :: rate(:)
+    real(wp) :: s, u, r, by_place, by_speed
+    integer :: m, j
+    rate = -matmul(machine%damping, jerk) - matmul(machine%stiffness, a)
+    do m = 1, size(machine%force, 2)
+      rate = rate - (m*machine%frequency)**2*real(machine%force(:, m)*turning(m))
+    end do
+    do j = 1, size(machine%joints)
+      associate (joint => machine%joints(j))
+        if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
+        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r, by_place, by_speed)
+        rate = rate + (by_place*(sum(joint%row*a) + surface(machine, j, state, turning, 2)) &
+                       + by_speed*(sum(joint%row*jerk) + surface(machine, j, state, turning, 3)))*joint%row
+      end associate
+    end do
+  end subroutine second_rate
+
+  pure subroutine solve(question, drift, tolerance, side, r, y, ok)
+    type(question_t), intent(in) :: question
+    real(wp), intent(in) :: drift(:), tolerance
+    integer, intent(inout) :: side(:)
+    real(wp), intent(out) :: r(:), y(:)
+    logical, intent(out) :: ok
+    integer :: n
+    n = question%count
+    call solve_boxed(question%g(:n, :n), drift(:n), question%lower(:n), question%upper(:n), question%fixed(:n), tolerance, &
+                     side(:n), r(:n), y(:n), ok)
+  end subroutine solve
+
+  !> Whether a force is at its limit while the joint has no acceleration.
+  pure logical function is_tied(question, r, y, side, tolerance)
+    type(question_t), intent(in) :: question
+    real(wp), intent(in) :: r(:), y(:), tolerance(:)
+    integer, intent(in) :: side(:)
+    integer :: i
+    is_tied = .false.
+    do i = 1, question%count
+      if (tied_at(question, i, r, y, side, tolerance(i)) /= 0) is_tied = .true.
+    end do
+  end function is_tied
+
+  !> Friction at its level that joints which hold keep from moving is no tie: it slides at no speed, and they bear what comes.
+  pure subroutine keep_loaded(machine, question, y, side, tolerance)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(inout) :: question
+    real(wp), intent(in) :: y(:), tolerance(:)
+    integer, intent(in) :: side(:)
+    integer :: i
+    associate (n => question%count)
+      do i = 1, n
+        if (side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
+        if (machine%joints(question%joint(i))%kind /= joint_friction) cycle
+        question%fixed(i) = depends_on(question%g(:n, :n), i, side(:n) == 0)
+      end do
+    end associate
+  end subroutine keep_loaded
+
+  !> The limit at which joint number `i` in question is tied, 0 if it is not.
+  pure integer function tied_at(question, i, r, y, side, tolerance) result(limit)
+    type(question_t), intent(in) :: question
+    integer, intent(in) :: i, side(:)
+    real(wp), intent(in) :: r(:), y(:), tolerance
+    real(wp) :: mobility
+    limit = 0
+    if (question%fixed(i)) return
+    mobility = question%g(i, i)
+    if (side(i) == 0) then
+      if (abs(question%upper(i)) < huge(1.0_wp)) then
+        if ((question%upper(i) - r(i))*mobility <= tolerance) limit = 1
+      end if
+      if (abs(question%lower(i)) < huge(1.0_wp)) then
+        if ((r(i) - question%lower(i))*mobility <= tolerance) limit = -1
+      end if
+    else if (abs(y(i)) <= tolerance) then
+      limit = side(i)
+    end if
+  end function tied_at
+
+  !> Limits of the rates of the forces: none for what holds, nothing for what slides or is open, one for what is tied.
+  pure subroutine narrow(question, r, y, side, tolerance)
+    type(question_t), intent(inout) :: question
+    real(wp), intent(in) :: r(:), y(:), tolerance(:)
+    integer, intent(in) :: side(:)
+    integer :: i, limit
+    do i = 1, question%count
+      limit = tied_at(question, i, r, y, side, tolerance(i))
+      if (limit > 0) then
+        question%lower(i) = -huge(1.0_wp)
+        question%upper(i) = 0
+      else if (limit < 0) then
+        question%lower(i) = 0
+        question%upper(i) = huge(1.0_wp)
+      else if (side(i) == 0) then
+        question%lower(i) = -huge(1.0_wp)
+        question%upper(i) = huge(1.0_wp)
+      else
+        question%fixed(i) = .true.
+      end if
+    end do
+  end subroutine narrow
+
+end module mode_question
