@@ -141,7 +141,7 @@ def test_events_are_those_of_the_referee(separatrix, name, tmp_path):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_machines_that_nobody_chose(separatrix, seed, tmp_path):
-    """Bodies, springs, friction and stops drawn at random: the referee meets the same events, none of them many times."""
+    """Drawn at random: the referee meets the same events, and no time has many of them."""
     events, lost, of_one_time = random_structures.compared(seed, str(separatrix), tmp_path)
     assert events > 0
     assert not lost
