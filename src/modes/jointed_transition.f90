@@ -32,14 +32,16 @@ contains
     end associate
   end function rounding_of_speed
 
-  !> Rigid contacts in `touching` that do not open stay closed if the forces say so; joints at rest stick or slide.
-  pure subroutine settle(moving, state, turning, at_rest, touching, ok)
+  !> Rigid contacts in `touching` that do not open stay closed if the forces say so; joints at rest stick or slide. `at_level`: a
+  !> guard says that their force has come to its limit.
+  pure subroutine settle(moving, state, turning, at_rest, touching, ok, at_level)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:)
     logical, intent(out) :: ok
+    logical, intent(in), optional :: at_level(:)
     integer :: slow(most_joints), j
     real(wp) :: s, u
     associate (machine => moving%machine)
@@ -51,7 +53,7 @@ contains
         state%left(j) = touching(j)
         if (abs(u) <= machine%negligible_speed + rounding_of_speed(machine, j, state)) slow(j) = touching(j)
       end do
-      call choose_mode(machine, state, turning, at_rest, slow, ok)
+      call choose_mode(machine, state, turning, at_rest, slow, ok, at_level)
       do j = 1, size(machine%joints)
         if (at_rest(j)) state%left(j) = abs(state%phase(j))
         if (slow(j) /= 0 .and. state%phase(j) /= 0) state%left(j) = 0
@@ -71,11 +73,12 @@ contains
     complex(wp) :: turning(moving%harmonics)
     type(jointed_state_t) :: start
     integer :: touching(most_joints), hit(most_joints), j
-    logical :: at_rest(most_joints), plastic
+    logical :: at_rest(most_joints), at_level(most_joints), plastic
     real(wp) :: speed(most_joints), lost
     associate (machine => moving%machine)
       turning = turning_at(machine%frequency, state%time, moving%harmonics)
       start = state
+      at_level = .false.
       at_rest = .false.
       touching = 0
       hit = 0
@@ -98,7 +101,10 @@ contains
         call hold(moving, state, turning, at_rest, touching)
         return
       end if
-      if (ok) call settle(moving, state, turning, at_rest, touching, ok)
+      ! Impacts change the forces.
+      if (.not. any(hit /= 0)) at_level(pack(list%joint, fallen .and. (list%meaning == slides_up .or. list%meaning == slides_down &
+                                                                       .or. list%meaning == lets_go))) = .true.
+      if (ok) call settle(moving, state, turning, at_rest, touching, ok, at_level)
       if (ok .and. any(hit /= 0)) call end_chatter(moving, start, touching, hit, turning, state, tally)
       do j = 1, size(machine%joints)
         if (machine%joints(j)%kind == joint_friction .and. start%phase(j) /= 0 .and. state%phase(j) == 0) then

@@ -17,25 +17,32 @@ module mode_choice
 
   !> Rounding of forces and accelerations, as a share of their sizes.
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+  !> A force whose guard has fallen is at its limit if it is this near, as a share of its size.
+  real(wp), parameter :: near_level = sqrt(epsilon(1.0_wp))
 
 contains
 
   !> Sets the phases of the joints in `at_rest` (friction with no sliding speed) and `touching` (+1, -1: contacts closed at
-  !> a stop, with no speed). Those of the others stay. `ok` is false if no choice is found.
-  pure subroutine choose_mode(machine, state, turning, at_rest, touching, ok)
+  !> a stop, with no speed). Those of the others stay. `ok` is false if no choice is found. The force of those `at_level` has just
+  !> come to its limit: one near it is taken as there, whatever the rounding of the flight was.
+  pure subroutine choose_mode(machine, state, turning, at_rest, touching, ok, at_level)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:)
     logical, intent(out) :: ok
+    logical, intent(in), optional :: at_level(:)
+    logical :: near(most_joints)
     integer :: before(most_joints), released(most_joints), verdict(most_joints), round, j
     logical :: again, put_back(most_joints)
     before = state%phase
     released = 0
+    near = .false.
+    if (present(at_level)) near = at_level
     put_back = .false.
     do round = 1, 2*size(machine%joints) + 2
-      call answer(machine, state, turning, at_rest .and. released(:size(at_rest)) == 0, touching, before, verdict, ok)
+      call answer(machine, state, turning, at_rest .and. released(:size(at_rest)) == 0, touching, near, before, verdict, ok)
       if (.not. ok) return
       again = .false.
       do j = 1, size(machine%joints)
@@ -149,18 +156,18 @@ contains
 
   !> One convex problem and its ties. `verdict` of friction: 0 sticks, +1, -1 starts to slide; of contacts: 0 stays closed, 1
   !> opens.
-  pure subroutine answer(machine, state, turning, at_rest, touching, before, verdict, ok)
+  pure subroutine answer(machine, state, turning, at_rest, touching, near, before, verdict, ok)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
-    logical, intent(in) :: at_rest(:)
+    logical, intent(in) :: at_rest(:), near(:)
     integer, intent(in) :: touching(:), before(:)
     integer, intent(out) :: verdict(:)
     logical, intent(out) :: ok
     type(question_t) :: question
     type(jointed_state_t) :: trial
     real(wp), dimension(machine%n) :: force, rate, a, jerk, next
-    real(wp), dimension(most_joints) :: r, y, drift, size_of_y
+    real(wp), dimension(most_joints) :: r, y, drift, size_of_y, blur
     integer :: side(most_joints), j, i
     verdict = 0
     trial = state
@@ -187,9 +194,11 @@ contains
       size_of_y = sizes(machine, question, trial, turning, force)
       call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
-      call keep_loaded(machine, question, y, side, rounding*size_of_y)
+      blur = rounding*size_of_y
+      where (near(question%joint(:n))) blur(:n) = near_level*size_of_y(:n)
+      call keep_loaded(machine, question, y, side, blur)
       call classify(machine, question, side, verdict)
-      if (.not. is_tied(question, r, y, side, rounding*size_of_y)) return
+      if (.not. is_tied(question, r, y, side, blur)) return
       ! The next derivative decides among those that are tied.
       next = force
       do i = 1, n
@@ -197,11 +206,12 @@ contains
       end do
       a = matmul(machine%mobility, next)
       call free_force(machine, trial, turning, force, a, rate)
-      call narrow(question, r, y, side, rounding*size_of_y)
+      call narrow(question, r, y, side, blur)
       call drift_of(machine, question, trial, turning, 3, rate, drift)
       size_of_y = sizes(machine, question, trial, turning, abs(force)*machine%frequency + abs(rate))
       call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
+      call keep_loaded(machine, question, y, side, 64*rounding*size_of_y)
       call classify(machine, question, side, verdict)
       if (.not. is_tied(question, r, y, side, 64*rounding*size_of_y)) return
       next = rate
@@ -215,6 +225,7 @@ contains
       size_of_y = sizes(machine, question, trial, turning, abs(force)*machine%frequency**2 + abs(rate))
       call solve(question, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
+      call keep_loaded(machine, question, y, side, 4096*rounding*size_of_y)
       where (side(:n) /= 0 .and. abs(y(:n)) <= 4096*rounding*size_of_y(:n) .and. .not. question%fixed(:n)) side(:n) = 0
       call classify(machine, question, side, verdict)
     end associate

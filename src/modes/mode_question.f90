@@ -175,7 +175,7 @@ contains
     integer :: i
     associate (n => question%count)
       do i = 1, n
-        if (side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
+        if (question%fixed(i) .or. side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
         if (machine%joints(question%joint(i))%kind /= joint_friction) cycle
         question%fixed(i) = depends_on(question%g(:n, :n), i, side(:n) == 0)
       end do
