@@ -52,7 +52,7 @@ contains
     end associate
   end function test_value
 
-  !> Zero where two multipliers of a map have the product 1.
+  !> Zero where two multipliers of a map have the product 1. One that is not known beside large ones counts as none.
   pure real(wp) function circle_test(m, multipliers) result(value)
     real(wp), intent(in) :: m(:, :)
     complex(wp), intent(in) :: multipliers(:)
@@ -65,7 +65,11 @@ contains
     all_pairs = 1
     do i = 2, size(multipliers)
       do k = 1, i - 1
-        all_pairs = all_pairs*(multipliers(i)*multipliers(k) - 1)
+        if (multipliers(i) /= multipliers(i) .or. multipliers(k) /= multipliers(k)) then
+          all_pairs = -all_pairs
+        else
+          all_pairs = all_pairs*(multipliers(i)*multipliers(k) - 1)
+        end if
       end do
     end do
     value = real(all_pairs, wp)

@@ -67,7 +67,8 @@ contains
   !> Whether all multipliers are within the unit circle.
   pure logical function is_stable(orbit)
     type(orbit_t), intent(in) :: orbit
-    is_stable = maxval(abs(orbit%multipliers)) < 1
+    ! The largest comes first; those that are not known are smaller.
+    is_stable = abs(orbit%multipliers(1)) < 1
   end function is_stable
 
   !> Sets the sizes of a family: of the parameter by its range, of the state by the largest motion that the drive alone brings

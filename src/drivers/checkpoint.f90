@@ -62,6 +62,10 @@ contains
         if (.not. self%reading) then
           call session%journal%line('damaged', "'"//self%path//"' is damaged from its beginning: nothing of it is used")
           call check_result(path, .false., error)
+          ! Whole parts behind the damage may be of other work.
+          if (.not. allocated(error)) call self%file%close(error)
+          if (.not. allocated(error)) call make_empty(self%path, error)
+          if (.not. allocated(error)) call self%file%open(self%path, .true., error)
         else if (first(2) /= crc32_text(identity, 0_int64)) then
           call fail(error, exit_other_case, "'"//self%path//"' belongs to another map, other options or another version; "// &
                     '--force begins again')

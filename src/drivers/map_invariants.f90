@@ -158,16 +158,25 @@ contains
       to_text(nint(sum(counts), int64))//' points, '//to_text(labelled)//' have a label')
   end subroutine check_counts
 
-  !> Events of a trajectory follow each other and impacts reverse the velocity.
+  !> Events of a trajectory follow each other and impacts reverse the velocity: of a structure that of the joint, which others that
+  !> strike with it may make faster. Of two bodies the file does not know it.
   subroutine check_events(reader, points, error)
     type(reader_t), intent(in) :: reader
     integer(int64), intent(out) :: points
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: events(:, :)
+    logical :: turns_back, of_joint, of_pair
     integer :: i
     points = 0
-    call reader%read_columns([character(len=15) :: '/event_kind', '/event_time', '/event_v_before', '/event_v_after'], &
-                             events, error)
+    of_joint = reader%has('/event_joint_v_before')
+    of_pair = reader%has('/event_driver_v')
+    if (of_joint) then
+      call reader%read_columns([character(len=21) :: '/event_kind', '/event_time', '/event_joint_v_before', &
+                                '/event_joint_v_after'], events, error)
+    else
+      call reader%read_columns([character(len=21) :: '/event_kind', '/event_time', '/event_v_before', '/event_v_after'], &
+                               events, error)
+    end if
     if (allocated(error)) return
     points = size(events, 1)
     do i = 1, size(events, 1)
@@ -175,7 +184,8 @@ contains
         if (events(i, 2) < events(i - 1, 2)) call fail(error, exit_io, "'"//reader%path//"': event "//to_text(i - 1)// &
                                              ' comes before the one before it')
       end if
-      if (nint(events(i, 1)) <= 2 .and. (events(i, 3)*events(i, 4) > 0 .or. abs(events(i, 4)) > abs(events(i, 3)))) then
+      turns_back = .not. events(i, 3)*events(i, 4) > 0 .and. (of_joint .or. .not. abs(events(i, 4)) > abs(events(i, 3)))
+      if (nint(events(i, 1)) <= 2 .and. .not. (turns_back .or. of_pair)) then
         call fail(error, exit_io, "'"//reader%path//"': impact "//to_text(i - 1)//' does not reverse the velocity')
       end if
       if (allocated(error)) return

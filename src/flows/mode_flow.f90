@@ -6,6 +6,7 @@
 !> of the drive is periodic. Where the modes are too near to being one, or the drive to one of them, `modal` is false and
 !> the motion is the exponential series of `matrix`, which every linear structure has.
 module mode_flow
+  use boxed_forces, only: dependent, shared_inverse
   use eigen, only: general_eigen, modulus, solve_complex, symmetric_eigen, undamped_modes
   use jointed, only: joint_contact, joint_soft, jointed_t, offset_of
   use jointed_state, only: is_held
@@ -102,7 +103,7 @@ contains
           deallocate (unit)
         end associate
       end if
-      if (left > 1e-10_wp*g(i, i)) flow%independent = [flow%independent, i]
+      if (left > dependent*g(i, i)) flow%independent = [flow%independent, i]
     end do
     k = size(flow%independent)
     allocate (flow%carried(machine%n, k), flow%hold(m, m), unit(k), answer(k))
@@ -113,15 +114,14 @@ contains
       flow%carried(:, i) = matmul(machine%mobility, matmul(w(:, flow%independent), answer))
     end do
     if (k < m) then
+      flow%hold = shared_inverse(g)
+    else
       do i = 1, m
-        g(i, i) = g(i, i)*(1 + sqrt(epsilon(1.0_wp)))
+        column = [(0.0_wp, k=1, m)]
+        column(i) = 1
+        call solve(g, column, flow%hold(:, i), ok)
       end do
     end if
-    do i = 1, m
-      column = [(0.0_wp, k=1, m)]
-      column(i) = 1
-      call solve(g, column, flow%hold(:, i), ok)
-    end do
     flow%reaction = matmul(flow%hold, matmul(transpose(w), machine%mobility))
     flow%still = [(keeps_still(machine, flow, j), j=1, size(machine%joints))]
   end subroutine set_constraints
@@ -142,7 +142,7 @@ contains
         left = left - flow%carried(:, i)*sum(joint%row*alone)
       end associate
     end do
-    keeps_still = keeps_still .and. sum(machine%joints(j)%row*left) <= 1e-10_wp*sum(machine%joints(j)%row*alone)
+    keeps_still = keeps_still .and. sum(machine%joints(j)%row*left) <= dependent*sum(machine%joints(j)%row*alone)
   end function keeps_still
 
   !> Harmonics of the forces on the coordinates, those of springs on moving surfaces included, and of the surfaces of the

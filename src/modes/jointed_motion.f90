@@ -98,11 +98,13 @@ contains
     type(watch_t) :: watch
     real(wp) :: before
     integer :: count_guards, stalls, holds, key
-    logical :: fallen(most_guards), ok, turned
+    logical :: fallen(most_guards), ok, turned, counts_on
     reason = 0
     stalls = 0
     holds = 0
-    if (.not. present(one_event)) state%burst = 0
+    counts_on = .false.
+    if (present(one_event)) counts_on = one_event
+    if (.not. counts_on) state%burst = 0
     state%at_section = .false.
     watch%extremes = [tally%x_min, tally%x_max]
     watch%top_speed = tally%v_max

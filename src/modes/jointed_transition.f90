@@ -102,8 +102,10 @@ contains
         return
       end if
       ! Impacts change the forces.
-      if (.not. any(hit /= 0)) at_level(pack(list%joint, fallen .and. (list%meaning == slides_up .or. list%meaning == slides_down &
-                                                                       .or. list%meaning == lets_go))) = .true.
+      do j = 1, size(list)
+        if (.not. fallen(j) .or. any(hit /= 0)) cycle
+        if (any(list(j)%meaning == [slides_up, slides_down, lets_go])) at_level(list(j)%joint) = .true.
+      end do
       if (ok) call settle(moving, state, turning, at_rest, touching, ok, at_level)
       if (ok .and. any(hit /= 0)) call end_chatter(moving, start, touching, hit, turning, state, tally)
       do j = 1, size(machine%joints)

@@ -9,10 +9,10 @@ module boxed_forces
   implicit none
   private
 
-  public :: solve_boxed, depends_on
+  public :: solve_boxed, depends_on, shared_inverse
 
   !> Constraints that depend on each other to this relative amount share their force evenly.
-  real(wp), parameter :: dependent = 1e-10_wp
+  real(wp), parameter, public :: dependent = 1e-10_wp
   !> Each takes the half of the digits off the error that sharing evenly brings.
   integer, parameter :: refinements = 2
 
@@ -34,9 +34,7 @@ contains
     h = g
     shared = is_singular(g)
     if (shared) then
-      do i = 1, n
-        h(i, i) = h(i, i)*(1 + sqrt(epsilon(1.0_wp)))
-      end do
+      h = regular(g)
     end if
     ok = .false.
     do i = 1, n
@@ -69,6 +67,43 @@ contains
       end if
     end do
   end subroutine solve_boxed
+
+  !> Inverse of a positive semidefinite matrix, as far as it has one: of the forces that bring about a motion those that are shared
+  !> evenly, X of X G X = X, symmetric.
+  pure function shared_inverse(g) result(inverse)
+    real(wp), intent(in) :: g(:, :)
+    real(wp) :: inverse(size(g, 1), size(g, 1)), onto(size(g, 1), size(g, 1))
+    ! What is no motion is taken from the right sides before it can grow.
+    onto = transpose(shared_solution(g, g))
+    inverse = shared_solution(g, onto)
+  end function shared_inverse
+
+  !> Solution of G x = b for each column of `b`, which must be in the range of G.
+  pure function shared_solution(g, b) result(x)
+    real(wp), intent(in) :: g(:, :), b(:, :)
+    real(wp) :: x(size(g, 1), size(b, 2)), h(size(g, 1), size(g, 1))
+    real(wp), dimension(size(g, 1)) :: zero
+    logical, dimension(size(g, 1)) :: fixed
+    integer :: i, side(size(g, 1))
+    h = regular(g)
+    zero = 0
+    fixed = .false.
+    side = 0
+    do i = 1, size(b, 2)
+      call forces_for(g, h, refinements, -b(:, i), zero, zero, fixed, side, x(:, i))
+    end do
+  end function shared_solution
+
+  !> The matrix with a diagonal that is a little larger.
+  pure function regular(g) result(h)
+    real(wp), intent(in) :: g(:, :)
+    real(wp) :: h(size(g, 1), size(g, 1))
+    integer :: i
+    h = g
+    do i = 1, size(g, 1)
+      h(i, i) = h(i, i)*(1 + sqrt(epsilon(1.0_wp)))
+    end do
+  end function regular
 
   !> Whether constraint `i` cannot move where those of `held` do not.
   pure logical function depends_on(g, i, held)

@@ -237,7 +237,8 @@ def test_both_arms_that_break_the_symmetry_end_in_the_branch_point(separatrix, t
         labels = decode_flags(result["label"]).values
         at = labels == "BP"
         values, branch = result["parameter"].values[at], result["branch"].values[at]
-        assert np.ptp(values) < 1e-11
+        # each branch locates it by itself
+        assert np.ptp(values) < 1e-12
         # the symmetric branch, and both arms: two branches that end there, or one that passes
         symmetric = [
             result["symmetric"].values[result["branch"].values == one].mean() > 0.5 for one in branch

@@ -105,7 +105,6 @@ def test_stability_is_that_of_the_program(source_dir: Path, separatrix: Path, tm
     assert sx.stability(case, x0=-1.0, periods=2000).motion == "periodic"
     with pytest.raises(sx.SeparatrixError, match="^periods: found 3, allowed"):
         sx.stability(case, periods=3)
-    with pytest.raises(sx.CaseError, match=r"budd_dux.toml: key 'start.x0': found"):
+    with pytest.raises(sx.CaseError, match=r"^start.x0=1.0: key 'start.x0': found"):
         sx.stability(case, x0=1.0)
-    with pytest.raises(sx.CaseError, match="variations are known of one body"):
-        sx.stability(source_dir / "examples" / "pair_backlash.toml")
+    assert sx.stability(source_dir / "examples" / "pair_backlash.toml", periods=500).impacts > 0

@@ -226,7 +226,7 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
     # what only fitted records say, over a base that is not at its minimum, may be what the base lacks to it
-    proven = best.gates.get("hold-out", True) or decision.rounds[0].base.fit.converged
+    proven = best.gates.get("hold-out", False) or decision.rounds[0].base.fit.converged
     if not (best.gates["admissible"] and best.gates["converged"] and proven):
         return _without_name(bench, decision)
     decision.accepted = [best]

@@ -189,11 +189,12 @@ def _apart_in_force(one: Fitted, other: Fitted, scale: float, rate: float) -> fl
     """Size in standard errors of what tells the forces of two machines apart along a motion."""
     first = one.problem.prepared[0]
     motion, measured, pieces = first.driven.scaled(scale, rate), first.record.force, first.record.pieces
+    deviation = np.hypot(first.sigma, motion.inertia_error)
     places = [i for i, free in enumerate(one.problem.free) if free.record is None]
 
     def force(fitted: Fitted, values: np.ndarray) -> np.ndarray:
         machine = fitted.problem.machine_values(0, values)
-        return force_needed(fitted.model, machine, motion, measured, pieces) / first.sigma
+        return force_needed(fitted.model, machine, motion, measured, pieces) / deviation
 
     try:
         base = force(one, one.fit.values)

@@ -191,6 +191,9 @@ def _telling(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarra
         part = slice(first, last)
         step = solve_scaled(left[part, part], score[part], np.ones(last - first, bool))
         gains.append(float(score[part] @ step) - (last - first))
+    if max(gains) <= 0:
+        # nothing is missing, or noise is said to be more than there is
+        return np.zeros(sum(sizes), bool)
     near = np.array(gains) >= _NEARLY * max(gains)
     simplest = min(size for size, one in zip(sizes, near, strict=True) if one)
     return np.repeat(near & (np.array(sizes) == simplest), sizes)

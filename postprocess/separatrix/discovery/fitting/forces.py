@@ -87,7 +87,9 @@ def _share_of_place(model, values: dict[str, float], motion: Driven, measured: n
     path = "friction.kinetic_coefficient"
     more = {**values, path: _value(model, values, path) + 1.0}
     changed = _accelerations(model, more, motion, measured) - _accelerations(model, values, motion, measured)
-    return np.abs(changed) / _value(model, values, "body.gravity")
+    gravity = _value(model, values, "body.gravity")
+    # without a weight there is no friction that a place could change
+    return np.abs(changed) / gravity if gravity > 0 else np.ones(motion.x.size)
 
 
 def _value(model, values: dict[str, float], path: str) -> float:

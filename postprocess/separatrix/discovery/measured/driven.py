@@ -87,14 +87,18 @@ def driven(
         moves[first + 1 : last] &= ~turns
         moves[first:last] &= np.cumsum(np.abs(np.diff(x[first:last], prepend=x[first]))) > _BEGUN * np.ptp(x)
     error = _TOGETHER * mass * np.sqrt(np.maximum(smoothed.covariance[:, 2, 2], 0.0))
-    turned = _turning_places(smoothed, x, speed)
+    turned = _turning_places(smoothed, x, speed, pieces)
     return Driven(x.copy(), speed.copy(), a.copy(), error, moves, turned)
 
 
-def _turning_places(smoothed: Smoothed, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _turning_places(
+    smoothed: Smoothed, x: np.ndarray, v: np.ndarray, pieces: list[tuple[int, int]]
+) -> np.ndarray:
     """Where the motion turned between each sample and the one before: at once where the speed jumps."""
     found = x.copy()
     at = np.flatnonzero((v[1:] < 0) != (v[:-1] < 0))
+    # what was in a gap is not known
+    at = at[~np.isin(at + 1, [first for first, _ in pieces])]
     steps = np.diff(smoothed.t)[at]
     before, after = v[at], v[at + 1]
     jump = np.isin(at, smoothed.impacts)

@@ -41,7 +41,8 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
     if not stated:
         notes.append(f"noise of the force {sigma:.3g} {unit}, from fourth differences")
     of_x = max(white_noise(record.x), resolution_of(record.x) / np.sqrt(12))
-    motion = max(record.header.get("sensor_noise_sigma_m") or of_x, QUIET * float(np.std(record.x)))
+    of_sensor = (record.header.get("sensor_noise_sigma_m") or 0.0) / np.sqrt(_together(record))
+    motion = max(of_sensor or of_x, QUIET * float(np.std(record.x)))
     prepared = Prepared(
         record, sigma, velocity_noise(record), resolution, notes=notes, origin=float(record.t[0])
     )
