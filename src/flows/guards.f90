@@ -75,7 +75,7 @@ contains
           end if
         case (joint_contact)
           if (phase == 0) then
-            call gap_guards(machine, state, j, list, count_guards)
+            if (.not. lies_still(machine, flow, state, j)) call gap_guards(machine, state, j, list, count_guards)
           else
             call put(list, count_guards, joint_guard_t(j, lets_go, force=-d, held=held))
           end if
@@ -88,6 +88,19 @@ contains
     end do
     call set_blur(machine, flow, state, list(:count_guards))
   end subroutine guards_of
+
+  !> Whether a joint has no speed and gets none in this mode.
+  pure logical function lies_still(machine, flow, state, j)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: j
+    real(wp) :: u
+    associate (joint => machine%joints(j), v => state%v(:machine%n))
+      u = sum(joint%row*v) + joint%offset%rate
+      lies_still = flow%still(j) .and. abs(u) <= 64*epsilon(u)*(sum(abs(joint%row*v)) + abs(joint%offset%rate))
+    end associate
+  end function lies_still
 
   !> Sizes of sums for their rounding.
   pure subroutine set_blur(machine, flow, state, list)

@@ -196,7 +196,7 @@ contains
       if (.not. ok) return
       blur = rounding*size_of_y
       where (near(question%joint(:n))) blur(:n) = near_level*size_of_y(:n)
-      call keep_loaded(machine, question, y, side, blur)
+      call keep_loaded(question, y, side, blur)
       call classify(machine, question, side, verdict)
       if (.not. is_tied(question, r, y, side, blur)) return
       ! The next derivative decides among those that are tied.
@@ -211,7 +211,7 @@ contains
       size_of_y = sizes(machine, question, trial, turning, abs(force)*machine%frequency + abs(rate))
       call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
-      call keep_loaded(machine, question, y, side, 64*rounding*size_of_y)
+      call keep_loaded(question, y, side, 64*rounding*size_of_y)
       call classify(machine, question, side, verdict)
       if (.not. is_tied(question, r, y, side, 64*rounding*size_of_y)) return
       next = rate
@@ -225,7 +225,7 @@ contains
       size_of_y = sizes(machine, question, trial, turning, abs(force)*machine%frequency**2 + abs(rate))
       call solve(question, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
-      call keep_loaded(machine, question, y, side, 4096*rounding*size_of_y)
+      call keep_loaded(question, y, side, 4096*rounding*size_of_y)
       where (side(:n) /= 0 .and. abs(y(:n)) <= 4096*rounding*size_of_y(:n) .and. .not. question%fixed(:n)) side(:n) = 0
       call classify(machine, question, side, verdict)
     end associate

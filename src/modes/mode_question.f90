@@ -166,9 +166,9 @@ contains
     end do
   end function is_tied
 
-  !> Friction at its level that joints which hold keep from moving is no tie: it slides at no speed, and they bear what comes.
-  pure subroutine keep_loaded(machine, question, y, side, tolerance)
-    type(jointed_t), intent(in) :: machine
+  !> A joint at its limit that joints which hold keep from moving is no tie: friction slides at no speed, a contact lies open at
+  !> its stop, and they bear what comes.
+  pure subroutine keep_loaded(question, y, side, tolerance)
     type(question_t), intent(inout) :: question
     real(wp), intent(in) :: y(:), tolerance(:)
     integer, intent(in) :: side(:)
@@ -176,7 +176,6 @@ contains
     associate (n => question%count)
       do i = 1, n
         if (question%fixed(i) .or. side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
-        if (machine%joints(question%joint(i))%kind /= joint_friction) cycle
         question%fixed(i) = depends_on(question%g(:n, :n), i, side(:n) == 0)
       end do
     end associate

@@ -14,12 +14,15 @@ from separatrix.library import Model
 pytestmark = pytest.mark.usefixtures("library")
 
 
-def told_of(folder, records, drawn) -> list[dict]:
-    """What is told of where the gap of a case of the campaign's generator is."""
+def told_of(folder, records, drawn, louder: float = 1.0) -> list[dict]:
+    """What is told of where the gap of a case of the generator is, noise said to be so much `louder`."""
     case = folder / "case"
     records.write_case(case, folder / "truth.json", drawn)
     base = Model.read(case / records.BASE)
-    data = gather([prepare(read_record(case / name), base) for name in records.TRAINING], 1.0, None)
+    prepared = [prepare(read_record(case / name), base) for name in records.TRAINING]
+    for one in prepared:
+        one.sigma *= louder
+    data = gather(prepared, 1.0, None)
     mass = scales_of(data, base).mass
     return sentences(where_maps(fit_base(data, base, mass), mass, Options()))
 
@@ -45,3 +48,13 @@ def test_a_loss_that_grows_with_the_speed_of_impacts_is_missing_at_impacts(sourc
     told = told_of(tmp_path, records, draw(5202, 0))
     assert {one["map"] for one in told} == {"impact speed"}
     assert all(one["text"].startswith("a speed after impacts of") for one in told)
+
+
+def test_nothing_is_told_where_the_noise_explains_all(source_dir, tmp_path, monkeypatch):
+    """No map explains more than its bins: the best of none was asked for."""
+    monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts"))
+    import records
+    from design import draw
+
+    assert told_of(tmp_path, records, draw(5101, 25), louder=1e4) == []

@@ -56,6 +56,14 @@ def test_a_body_that_never_moves_has_no_events(separatrix, tmp_path):
     succeed(separatrix, "verify", "case.trajectory.h5", folder=tmp_path)
 
 
+@pytest.mark.parametrize("example", ["structure_impact_damper", "pair_backlash"])
+def test_impacts_between_bodies_are_no_damage(separatrix, source_dir, example, tmp_path):
+    """The watched body need not turn round where two bodies strike each other."""
+    case = source_dir / "examples" / f"{example}.toml"
+    succeed(separatrix, "trajectory", case, "-o", "motion.h5", folder=tmp_path)
+    succeed(separatrix, "verify", "motion.h5", folder=tmp_path)
+
+
 @pytest.fixture(scope="module")
 def one_way(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the sweep of the case in both directions and in each of them."""
