@@ -133,7 +133,7 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
 def _known_motion(one: Prepared, swing: float) -> Smoothed:
     """Smooth a record whose force is compared, and keep its motion."""
     record = one.record
-    found = smooth(record.t, record.x, one.motion_sigma, swing)
+    found = smooth(record.t, record.x, one.motion_sigma, swing, stride(swing, record.t.size))
     one.driven = driven(found, record.v, one.velocity_sigma, one.mass, record.pieces)
     return found
 

@@ -47,11 +47,17 @@ class Smoothed:
         return np.column_stack([x + v * ahead + a * ahead**2 / 2, v + a * ahead])
 
 
-def smooth(t: np.ndarray, x: np.ndarray, sigma: float, period_samples: float | None = None) -> Smoothed:
-    """Smooth positions of noise `sigma` [m]; the drive period sets the window of detection."""
+def smooth(
+    t: np.ndarray, x: np.ndarray, sigma: float, period_samples: float | None = None, every: int = 1
+) -> Smoothed:
+    """Smooth positions of noise `sigma` [m]; the drive period sets the window of detection.
+
+    The jerk is tuned on one of `every` samples: neighbours of a record that is sampled far faster than it
+    moves tell it from noise no more.
+    """
     window = int(np.clip((period_samples or 100) / 14, 4, 12))
     impacts = detect_impacts(t, x, sigma, window)
-    jerk = _tuned_jerk(t, x, sigma, impacts)
+    jerk = _tuned_jerk(t[::every], x[::every], sigma, impacts // every)
     state, covariance, _ = _filter_and_smooth(t, x, sigma, jerk, impacts)
     return Smoothed(t, state, covariance, impacts)
 
