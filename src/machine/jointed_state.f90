@@ -26,7 +26,7 @@ module jointed_state
     real(wp) :: slider(most_joints) = 0, touch_speed(most_joints) = 0
     !> The joint has just changed its phase: the guard of its new phase starts at zero. +1, -1: the stop it has left.
     integer :: left(most_joints) = 0
-    !> Impacts in a row with next to no time between them.
+    !> Impacts in a row with next to no time between them; lanes and the event loop hand it to each other.
     integer :: burst = 0
     !> The motion without a clock has just reached the section.
     logical :: at_section = .false.

@@ -143,6 +143,6 @@ def test_events_are_those_of_the_referee(separatrix, name, tmp_path):
 def test_machines_that_nobody_chose(separatrix, seed, tmp_path):
     """Drawn at random: the referee meets the same events, and no time has many of them."""
     events, lost, of_one_time = random_structures.compared(seed, str(separatrix), tmp_path)
-    assert events > 0
+    assert events >= 5
     assert not lost
     assert of_one_time < 8

@@ -196,21 +196,27 @@ def instants(times: object) -> list[float]:
     return found
 
 
+def alone(times: list[float]) -> list[float]:
+    """Events that are no part of a chatter."""
+    steps = np.diff(times, prepend=-np.inf, append=np.inf)
+    return [
+        at for at, before, after in zip(times, steps, steps[1:], strict=False) if min(before, after) > CHATTER
+    ]
+
+
 def missing(ours: list[float], theirs: list[float]) -> list[float]:
     """Events of one list that are no part of a chatter and that the other has not."""
     lost = []
     for one, other in ((ours, theirs), (theirs, ours)):
-        for i, at in enumerate(one):
-            neighbours = one[max(i - 1, 0) : i] + one[i + 1 : i + 2]
+        for at in alone(one):
             k = bisect.bisect(other, at)
-            alone = all(abs(at - near) > CHATTER for near in neighbours)
-            if alone and not any(abs(at - near) <= AGREED for near in other[max(k - 1, 0) : k + 1]):
+            if not any(abs(at - near) <= AGREED for near in other[max(k - 1, 0) : k + 1]):
                 lost.append(at)
     return lost
 
 
 def compared(seed: int, program: str, folder: Path) -> tuple[int, list[float], int]:
-    """How many events the program meets, what one of the two lacks, most of one time."""
+    """How many events are held against the referee, what one of the two lacks, most of one time."""
     draw = Draw(seed)
     (folder / "case.toml").write_text(draw.case())
     command = [program, "trajectory", "case.toml", "--csv", "events.csv", "-o", "motion.h5", "--force", "-q"]
@@ -222,7 +228,7 @@ def compared(seed: int, program: str, folder: Path) -> tuple[int, list[float], i
     if lost:
         # Two events of one guard within a step are not seen by scipy.
         lost = missing(ours, draw.referee(0.003))
-    return len(ours), lost, max((times.count(at) for at in times), default=0)
+    return len(alone(ours)), lost, max((times.count(at) for at in times), default=0)
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ _FEW = 0.25
 # natural periods that a segment may last where the drive is slow
 _MOST_SWINGS = 1.5
 # squares by which a fit is far behind another, whatever its suspicious segments may gain
-_FAR_BEHIND = 60.0
+_SQUARES_BEHIND = 60.0
 # standard errors of the speed within which a body may be at rest
 _SLOW = 3.0
 
@@ -239,7 +239,7 @@ def _behind(fit: Fit, rival: Fit, suspects: np.ndarray) -> bool:
     """Whether a fit is far behind another one on all but the suspects."""
     both = fit.good & rival.good
     both[suspects] = False
-    return bool((fit.chi2 - rival.chi2)[both].sum() > _FAR_BEHIND + fit.decrement)
+    return bool((fit.chi2 - rival.chi2)[both].sum() > _SQUARES_BEHIND + fit.decrement)
 
 
 def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:

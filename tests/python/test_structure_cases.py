@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Python cases of structures and the files that they name."""
+
+import numpy as np
+import pytest
+import separatrix as sx
+from beams import cantilever
+from scipy import io, sparse
+
+
+def test_a_case_keeps_its_files(tmp_path, monkeypatch):
+    """A saved case, and one whose process has gone to another folder, says what it said where it was read."""
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    for name, matrix in zip(("mass", "stiffness"), cantilever(12), strict=True):
+        io.mmwrite(folder / f"{name}.mtx", sparse.coo_array(matrix))
+    (folder / "case.toml").write_text(
+        """
+[structure.beam]
+mass = "mass.mtx"
+stiffness = "stiffness.mtx"
+damping_ratio = 0.02
+modes = 2
+[structure.beam.point]
+tip = 1
+[drive.shaker]
+law = "force"
+body = "beam.tip"
+amplitude = 1
+frequency = 3
+[run]
+duration = 10.0
+window = 5.0
+"""
+    )
+    monkeypatch.chdir(folder)
+    case = sx.load("case.toml")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    assert sx.load(case.save(elsewhere / "case.toml")) == case
+    beside = case.save(folder / "copy.toml")
+    assert beside.read_text() == (folder / "case.toml").read_text()
+    monkeypatch.chdir(elsewhere)
+    (elsewhere / "case.toml").unlink()
+    # what bears the name of its file here is not its file
+    (elsewhere / "mass.mtx").write_text("nothing")
+    changed = case.with_({"structure.beam.damping_ratio": 0.05})
+    assert changed != case
+    assert changed.with_({"structure.beam.damping_ratio": 0.02}) == case
+    assert sx.load(case.save("copy.toml")) == case
+    assert np.array_equal(sx.trajectory(case)["x"], sx.trajectory(beside)["x"])
+    (elsewhere / "bad.toml").write_text("[structure.beam]\nmass = 1\n")
+    with pytest.raises(sx.CaseError, match="structure.beam.stiffness") as refused:
+        sx.load("bad.toml")
+    assert str(refused.value).startswith("bad.toml:")
