@@ -103,6 +103,15 @@ contains
     state%time = merge(time_end, min(pressed%start + march%time, time_end), fallen == march_time_over)
     state%x = pressed%surface + side*march%y(1)
     state%v = side*march%y(2)
+    outcome = outcome_of(fallen)
+    if (outcome == flight_barrier) state%x = pressed%surface
+    if (outcome == flight_speed_reached .or. pressed%direction*state%v < 0) state%v = 0
+    if (machine%effects%dahl_stiffness > 0) state%z = dahl_force(machine%effects, pressed%memory, state%x)
+  end subroutine fly_contact
+
+  !> The outcome of a flight that ended so.
+  pure integer function outcome_of(fallen) result(outcome)
+    integer, intent(in) :: fallen
     select case (fallen)
     case (march_failed)
       outcome = flight_failed
@@ -110,14 +119,10 @@ contains
       outcome = flight_time_over
     case (turning)
       outcome = flight_speed_reached
-      state%v = 0
     case default
       outcome = flight_barrier
-      state%x = pressed%surface
     end select
-    if (pressed%direction*state%v < 0) state%v = 0
-    if (machine%effects%dahl_stiffness > 0) state%z = dahl_force(machine%effects, pressed%memory, state%x)
-  end subroutine fly_contact
+  end function outcome_of
 
   !> p', p'' and the power put into the barrier.
   pure function pressed_slope(self, time, y) result(slope)

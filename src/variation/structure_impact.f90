@@ -69,8 +69,8 @@ contains
     logical, intent(in) :: plastic
     real(wp), intent(out) :: v(:), by_speed(:, :), by_time(:)
     integer :: list(most_joints), m, i, j, k
-    real(wp), dimension(most_joints) :: gamma, given, impulse, near
-    real(wp) :: s, u, h, values(most_joints, -2:2), slopes(most_joints, most_joints), kick(machine%n), forth, back
+    real(wp), dimension(most_joints) :: gamma, given, impulse
+    real(wp) :: s, u, slopes(most_joints, most_joints), kick(machine%n)
     m = 0
     do j = 1, size(machine%joints)
       if (side(j) == 0 .or. machine%joints(j)%kind /= joint_contact) cycle
@@ -79,13 +79,39 @@ contains
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given(m))
       gamma(m) = -side(j)*u
     end do
-    call impulses(gamma, impulse)
+    call find_impulses(machine, list(:m), side, plastic, gamma, impulse, slopes)
     v = state%v(:machine%n)
     by_speed = 0
     by_time = 0
     do i = 1, machine%n
       by_speed(i, i) = 1
     end do
+    do i = 1, m
+      kick = -side(list(i))*matmul(machine%mobility, machine%joints(list(i))%row)
+      v = v + kick*impulse(i)
+      do k = 1, m
+        associate (row => machine%joints(list(k))%row)
+          do j = 1, machine%n
+            by_speed(:, j) = by_speed(:, j) + kick*slopes(i, k)*(-side(list(k))*row(j))
+          end do
+          by_time = by_time + kick*slopes(i, k)*(-side(list(k))*given(k))
+        end associate
+      end do
+    end do
+  end subroutine strike_with_slopes
+
+  !> Impulses of the contacts in `list` for their opening speeds `gamma` [m/s], and the derivatives of these, not a number where an
+  !> impulse is not smooth.
+  pure subroutine find_impulses(machine, list, side, plastic, gamma, impulse, slopes)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: list(:), side(:)
+    logical, intent(in) :: plastic
+    real(wp), intent(in) :: gamma(:)
+    real(wp), intent(out) :: impulse(:), slopes(:, :)
+    real(wp) :: near(most_joints), h, values(most_joints, -2:2), forth, back
+    integer :: m, i, k
+    m = size(list)
+    call impulses(gamma, impulse)
     slopes = 0
     if (m == 1) slopes(1, 1) = lone_slope(machine, list(1), gamma(1), plastic)
     do i = 1, merge(m, 0, m > 1)
@@ -102,22 +128,9 @@ contains
       if (abs(gamma(i)) > 10*h .and. abs(forth - back) > bent*max(forth, back)) slopes(:m, i) = ieee_value(1.0_wp, ieee_quiet_nan)
       if (.not. abs(gamma(i)) > 10*h) slopes(:m, i) = 0
     end do
-    do i = 1, m
-      kick = -side(list(i))*matmul(machine%mobility, machine%joints(list(i))%row)
-      v = v + kick*impulse(i)
-      do k = 1, m
-        associate (row => machine%joints(list(k))%row)
-          do j = 1, machine%n
-            by_speed(:, j) = by_speed(:, j) + kick*slopes(i, k)*(-side(list(k))*row(j))
-          end do
-          by_time = by_time + kick*slopes(i, k)*(-side(list(k))*given(k))
-        end associate
-      end do
-    end do
 
   contains
 
-    !> Impulses of the contacts for their opening speeds.
     pure subroutine impulses(opening, impulse)
       real(wp), intent(in) :: opening(:)
       real(wp), intent(out) :: impulse(:)
@@ -137,7 +150,7 @@ contains
       if (.not. ok) impulse = ieee_value(1.0_wp, ieee_quiet_nan)
     end subroutine impulses
 
-  end subroutine strike_with_slopes
+  end subroutine find_impulses
 
   !> How the impulse of one contact alone, -(1 + e) gamma/g, changes with its opening speed.
   pure real(wp) function lone_slope(machine, j, gamma, plastic) result(slope)
