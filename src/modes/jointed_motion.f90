@@ -20,6 +20,7 @@ module jointed_motion
     event_turning_point, log_t, tally_t, word_period
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
     reason_time_over
+  use still_joints, only: stand_still
   use transition_list, only: note_transition, transition_t, transitions_t
   implicit none
   private
@@ -194,7 +195,7 @@ contains
     end associate
   end subroutine follow_section
 
-  !> Events and losses of a transition.
+  !> Events and losses of a transition. Friction sticks or is released as it stops to move or begins to, whatever its force.
   pure subroutine log_transition(moving, before, after, list, fallen, log)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(in) :: before, after
@@ -202,20 +203,25 @@ contains
     logical, intent(in) :: fallen(:)
     type(log_t), intent(inout) :: log
     type(jointed_state_t) :: struck
-    logical :: told(most_joints)
+    complex(wp) :: turning(moving%harmonics)
+    logical, dimension(size(moving%machine%joints)) :: told, stood, stands
     integer :: g, j, kind
     associate (machine => moving%machine)
       struck = after
       struck%time = before%time
       call book_change(machine, before, struck, log)
+      turning = turning_at(machine%frequency, before%time, moving%harmonics)
+      stood = stand_still(machine, before, turning)
+      stands = stand_still(machine, struck, turning)
       told = .false.
       do g = 1, size(list)
         if (.not. fallen(g)) cycle
         j = list(g)%joint
         select case (list(g)%meaning)
         case (slide_ends)
-          kind = merge(event_stick, event_turning_point, after%phase(j) == 0)
+          kind = merge(event_stick, event_turning_point, stands(j))
         case (slides_up, slides_down)
+          if (stands(j)) cycle
           kind = event_release
         case (meets_upper, meets_lower)
           kind = merge(event_impact_upper, event_impact_lower, list(g)%meaning == meets_upper)
@@ -238,8 +244,8 @@ contains
       end do
       ! What an impact or a cascade does to other joints.
       do j = 1, size(machine%joints)
-        if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (before%phase(j) == 0 .eqv. after%phase(j) == 0)) cycle
-        call log_event(machine, merge(event_stick, event_release, after%phase(j) == 0), j, before, struck, log)
+        if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
+        call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, struck, log)
       end do
     end associate
   end subroutine log_transition

@@ -144,15 +144,25 @@ contains
     integer, intent(in) :: order
     real(wp), intent(inout) :: force(:)
     real(wp), dimension(most_joints) :: r, y, drift
-    integer :: side(most_joints), i
+    integer :: side(most_joints)
     logical :: ok
     call drift_of(machine, question, state, turning, order, force, drift)
     side = 0
     call solve(question, drift, 0.0_wp, side, r, y, ok)
+    call add_forces(machine, question, r, force)
+  end subroutine hold_against
+
+  !> Adds the forces `r` of the joints in question [N], or their rates, to those on the coordinates.
+  pure subroutine add_forces(machine, question, r, force)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(in) :: question
+    real(wp), intent(in) :: r(:)
+    real(wp), intent(inout) :: force(:)
+    integer :: i
     do i = 1, question%count
       force = force + r(i)*machine%joints(question%joint(i))%row
     end do
-  end subroutine hold_against
+  end subroutine add_forces
 
   !> One convex problem and its ties. `verdict` of friction: 0 sticks, +1, -1 starts to slide; of contacts: 0 stays closed, 1
   !> opens.
@@ -168,23 +178,10 @@ contains
     type(jointed_state_t) :: trial
     real(wp), dimension(machine%n) :: force, rate, a, jerk, next
     real(wp), dimension(most_joints) :: r, y, drift, size_of_y, blur
-    integer :: side(most_joints), j, i
+    integer :: side(most_joints)
     verdict = 0
     trial = state
-    do j = 1, size(machine%joints)
-      if (at_rest(j)) then
-        associate (level => machine%joints(j)%friction%break_away)
-          call ask(question, j, -level, level)
-        end associate
-        trial%phase(j) = 0
-        side(question%count) = -before(j)
-      else if (touching(j) /= 0) then
-        if (touching(j) > 0) call ask(question, j, -huge(1.0_wp), 0.0_wp)
-        if (touching(j) < 0) call ask(question, j, 0.0_wp, huge(1.0_wp))
-        trial%phase(j) = touching(j)
-        side(question%count) = 0
-      end if
-    end do
+    call ask_all(machine, at_rest, touching, before, question, trial%phase, side)
     ok = .true.
     if (question%count == 0) return
     call set_mobility(machine, question)
@@ -201,9 +198,7 @@ contains
       if (.not. is_tied(question, r, y, side, blur)) return
       ! The next derivative decides among those that are tied.
       next = force
-      do i = 1, n
-        next = next + r(i)*machine%joints(question%joint(i))%row
-      end do
+      call add_forces(machine, question, r, next)
       a = matmul(machine%mobility, next)
       call free_force(machine, trial, turning, force, a, rate)
       call narrow(question, r, y, side, blur)
@@ -215,9 +210,7 @@ contains
       call classify(machine, question, side, verdict)
       if (.not. is_tied(question, r, y, side, 64*rounding*size_of_y)) return
       next = rate
-      do i = 1, n
-        next = next + r(i)*machine%joints(question%joint(i))%row
-      end do
+      call add_forces(machine, question, r, next)
       jerk = matmul(machine%mobility, next)
       call second_rate(machine, trial, turning, a, jerk, rate)
       call narrow(question, r, y, side, 64*rounding*size_of_y)
@@ -230,6 +223,32 @@ contains
       call classify(machine, question, side, verdict)
     end associate
   end subroutine answer
+
+  !> Asks for the forces of all joints at rest and of all contacts that touch, which are held in `phase`; `side` is where the
+  !> search for the answer begins: friction that slid before is first tried at the limit that it came from.
+  pure subroutine ask_all(machine, at_rest, touching, before, question, phase, side)
+    type(jointed_t), intent(in) :: machine
+    logical, intent(in) :: at_rest(:)
+    integer, intent(in) :: touching(:), before(:)
+    type(question_t), intent(inout) :: question
+    integer, intent(inout) :: phase(:)
+    integer, intent(out) :: side(:)
+    integer :: j
+    side = 0
+    do j = 1, size(machine%joints)
+      if (at_rest(j)) then
+        associate (level => machine%joints(j)%friction%break_away)
+          call ask(question, j, -level, level)
+        end associate
+        phase(j) = 0
+        side(question%count) = -before(j)
+      else if (touching(j) /= 0) then
+        if (touching(j) > 0) call ask(question, j, -huge(1.0_wp), 0.0_wp)
+        if (touching(j) < 0) call ask(question, j, 0.0_wp, huge(1.0_wp))
+        phase(j) = touching(j)
+      end if
+    end do
+  end subroutine ask_all
 
   pure subroutine classify(machine, question, side, verdict)
     type(jointed_t), intent(in) :: machine

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Machines of several bodies through the whole program: files, ranks, quadruple precision."""
 
+import csv
+
 import h5py
 import numpy as np
 import pytest
@@ -92,3 +94,59 @@ def test_too_many_bodies_for_a_search_are_warned_of(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(bodies + drive + "[run]\nduration = 20\nwindow = 7\n" + axes)
     said = succeed(separatrix, "basin", "case.toml", folder=tmp_path).out
     assert "warning: no attractors are looked for: the section has 18 coordinates, more than 16" in said
+
+
+RING = """
+[body.a]
+mass = 1
+[body.b]
+mass = 1.3
+[body.c]
+mass = 0.7
+[spring.a]
+between = ["a"]
+stiffness = 20
+damping = 0.2
+[spring.b]
+between = ["b"]
+stiffness = 30
+[spring.c]
+between = ["c"]
+stiffness = 10
+[friction.ab]
+between = ["a", "b"]
+force = 1.0
+[friction.bc]
+between = ["b", "c"]
+force = 0.8
+[friction.ca]
+between = ["c", "a"]
+force = 0.9
+static_force = 1.3
+[drive.push]
+body = "a"
+law = "force"
+frequency = 3
+amplitude = 6
+[start]
+v0 = 0.3
+[run]
+duration = 60
+"""
+
+
+def test_events_of_a_ring_of_friction_are_those_of_what_moves(separatrix, tmp_path):
+    """A joint slides from its release to its stick and stands still else, also where others hold it."""
+    (tmp_path / "ring.toml").write_text(RING)
+    succeed(separatrix, "trajectory", "ring.toml", "--csv", "events.csv", folder=tmp_path)
+    with (tmp_path / "events.csv").open() as file:
+        events = list(csv.DictReader(file))
+    for joint in (1, 2, 3):
+        mine = [event for event in events if float(event["joint"]) == joint]
+        assert any(event["kind"] == "release" for event in mine)
+        slides = mine[0]["kind"] != "release"
+        for before, event in zip([mine[0], *mine], mine, strict=False):
+            assert (event["kind"] == "release") != slides, f"joint {joint} at {event['time']} s"
+            moved = abs(float(event["joint_x"]) - float(before["joint_x"]))
+            assert event is before or (moved > 1e-9) == slides
+            slides = event["kind"] != "stick"
