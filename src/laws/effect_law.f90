@@ -20,8 +20,8 @@ module effect_law
 
   public :: add_to_effects, add_to_sensor, replace_friction, finish_effects, effect_force, effect_energy, &
     effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed, &
-    friction_change, steepest_by_speed, steepest_by_place, slip_in_series, stretch_force, stretch_slope, stretch_bounds, &
-    place_force, steepest_force
+    friction_change, has_tables, steepest_by_speed, steepest_by_place, slip_in_series, stretch_force, stretch_slope, &
+    stretch_bounds, place_force, steepest_force
 
   real(wp), parameter :: farthest_behind = 100
 
@@ -131,6 +131,12 @@ contains
                         effects%upwards%count > 0 .or. effects%over_place%count > 0
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
   end subroutine finish_effects
+
+  !> Whether a table gives a force.
+  pure logical function has_tables(effects)
+    type(effects_t), intent(in) :: effects
+    has_tables = any([effects%upwards%count, effects%over_place%count, effects%spring%count, effects%force%count] > 0)
+  end function has_tables
 
   !> Force [N] on a body at `x` [m] that slips at `v` [m/s] as `slip` says, the spring being stretched by `stretch` [m].
   !> Continued smoothly beyond v = 0, where a slip ends.
