@@ -5,7 +5,7 @@
 module lane_preparation
   use contact_law, only: contact_hunt_crossley, contact_kelvin_voigt
   use curve_law, only: continued_at, curve_t, pieces_of
-  use effect_law, only: constant_force, effects_t, has_tables
+  use effect_law, only: constant_force, effects_t
   use elementary, only: exponential, logarithm
   use exact_flow, only: largest_damping_ratio
   use kinds, only: wp
@@ -144,8 +144,8 @@ contains
     associate (effects => law%effects)
       linear = law%restoring%is_linear .and. law%restoring%stiffness > 0 .and. .not. law%drive%interval > 0 .and. &
         law%friction%layer_speed <= 0 .and. size(law%drive%cosine) <= most_harmonics
-      linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic, effects%dahl_stiffness]) > 0)
-      linear = linear .and. .not. has_tables(effects) .and. .not. effects%play > 0
+      linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic_damping, effects%cubic, effects%dahl_stiffness]) > 0)
+      linear = linear .and. .not. (effects%by_table .or. effects%play > 0)
       linear = linear .and. .not. (abs(effects%friction_slope) > 0 .and. abs(effects%asymmetric_coulomb) > 0)
     end associate
   end function has_linear_modes
@@ -262,7 +262,7 @@ contains
       if (friction%second_excess > 0) flow%available = flow%available .and. has_series(friction%second_exponent)
       if (effects%dahl_stiffness > 0) flow%available = flow%available .and. &
         effects%dahl_sliding > 2*abs(effects%asymmetric_coulomb)
-      if (law%contact%soft) flow%available = flow%available .and. .not. has_tables(effects)
+      if (law%contact%soft) flow%available = flow%available .and. .not. effects%by_table
       if (law%contact%soft) call set_contact(law, flow%machine%contact, flow%available)
       if (.not. flow%available) return
       call set_common(moving, flow)
@@ -296,6 +296,7 @@ contains
       l%viscous = friction%damping/law%mass
       l%asymmetric_viscous = effects%asymmetric_viscous/law%mass
       l%quadratic = effects%quadratic_drag/law%mass
+      l%cubic_damping = effects%cubic_damping/law%mass
       l%kinetic = friction%kinetic/law%mass
       if (.not. effects%dahl_stiffness > 0) l%asymmetric = effects%asymmetric_coulomb/law%mass
       l%offset = effects%offset/law%mass
@@ -316,7 +317,7 @@ contains
       l%half_play = effects%play/2
       l%corner = effects%corner**2
       l%series_stiffness = effects%series_stiffness/law%mass
-      if (has_tables(effects)) call set_tables(effects, l)
+      if (effects%by_table) call set_tables(effects, l)
     end associate
   end subroutine set_law
 

@@ -135,7 +135,8 @@ struct corner_series {
 
 // The acceleration of a body that slips as `direction` says, by everything but a soft barrier, as a series.
 struct force_series {
-  vec stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order], factor[order];
+  vec stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order], factor[order],
+      speed_square[order];
   excess_series excess[2];
   corner_series corner[2];
   table_series table[tables];
@@ -173,8 +174,12 @@ struct force_series {
       a += table[over_place].next(pieces[over_place], x[k], k);
     if (l.table[over_speed].knots > 0)
       a -= d * table[over_speed].next(pieces[over_speed], d * v[k], k);
+    if (l.quadratic != 0 || l.cubic_damping != 0)
+      speed_square[k] = square_of(v, k);
     if (l.quadratic != 0)
-      a -= l.quadratic * d * square_of(v, k);
+      a -= l.quadratic * d * speed_square[k];
+    if (l.cubic_damping != 0)
+      a -= l.cubic_damping * product(speed_square, v, k);
     dry[k] = {};
     if (l.dahl_stiffness > 0) {
       // z - level: its derivative is -(sigma/level) times itself and the rate of the position.

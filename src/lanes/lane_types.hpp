@@ -66,7 +66,8 @@ struct lane_table {
 // `effect_law.f90`. A closed form: series 0.
 struct lane_law {
   double series;
-  double stiffness, pendulum, cubic, viscous, asymmetric_viscous, quadratic, kinetic, asymmetric, offset;
+  double stiffness, pendulum, cubic, viscous, asymmetric_viscous, quadratic, cubic_damping, kinetic,
+      asymmetric, offset;
   // Spring without stretch where the foot is at its mean [m].
   double length;
   // Stribeck excesses, and the speed above which they are nil; all dry friction at rest.
