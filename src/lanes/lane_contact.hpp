@@ -310,7 +310,8 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
     proven = proven & ~left;
     left =
         left | (proven & take_series_events(m, pieces, t, proven, barrier, g)) | (flying & (g.flights >= g.budget));
-    put(limit, flying, pick(proven, m.stride, 0.5 * t.end * length));
+    // A step that leaves a piece of a table may do so behind its event.
+    put(limit, flying, pick(proven, m.stride, 0.5 * pick(kept, t.end, vec(1.0)) * length));
     put(g.status, left, lane_left);
     mask there = proven & ~left & last & ~(t.turns | t.hits | t.slows);
     if (any(there))

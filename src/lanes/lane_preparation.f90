@@ -144,7 +144,8 @@ contains
     associate (effects => law%effects)
       linear = law%restoring%is_linear .and. law%restoring%stiffness > 0 .and. .not. law%drive%interval > 0 .and. &
         law%friction%layer_speed <= 0 .and. size(law%drive%cosine) <= most_harmonics
-      linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic_damping, effects%cubic, effects%dahl_stiffness]) > 0)
+      linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic_damping, effects%cubic, &
+                                           effects%dahl_stiffness]) > 0)
       linear = linear .and. .not. (effects%by_table .or. effects%play > 0)
       linear = linear .and. .not. (abs(effects%friction_slope) > 0 .and. abs(effects%asymmetric_coulomb) > 0)
     end associate

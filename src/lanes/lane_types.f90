@@ -50,8 +50,8 @@ module lane_types
   !> Mirrors `lane_law` of lane_types.hpp.
   type, bind(c) :: law_t
     real(c_double) :: series = 0
-    real(c_double) :: stiffness = 0, pendulum = 0, cubic = 0, viscous = 0, asymmetric_viscous = 0, quadratic = 0, cubic_damping = 0, &
-      kinetic = 0, asymmetric = 0, offset = 0, length = 0
+    real(c_double) :: stiffness = 0, pendulum = 0, cubic = 0, viscous = 0, asymmetric_viscous = 0, quadratic = 0, &
+      cubic_damping = 0, kinetic = 0, asymmetric = 0, offset = 0, length = 0
     real(c_double) :: excess(2) = 0, velocity(2) = 1, exponent(2) = 1, edge = 0, rest_friction = 0
     real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
     real(c_double) :: has_tables = 0
