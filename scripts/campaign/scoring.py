@@ -114,6 +114,8 @@ class Score:
     """The records have the small faults of a rig."""
     whole: int
     """Samples of all records together."""
+    leaves: str
+    """What the machine of the verdict leaves, where it was held to be adequate."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -219,6 +221,7 @@ def score(truth: dict, result: dict) -> Score:
         by_family=in_catalogue and right and names not in reported(verdict),
         rig=bool(truth.get("rig")),
         whole=truth.get("samples", 0),
+        leaves=verdict.get("leaves", "") if answer in ("named", "ambiguous") else "",
         seconds=result["seconds"],
         baselines=result.get("baselines", {}),
         baselines_right={

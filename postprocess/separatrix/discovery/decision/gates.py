@@ -76,4 +76,5 @@ def _of_some_size(best: Judged, options: Options) -> bool:
 def judge_ceiling(bench: Bench, one: Judged) -> None:
     """Set the gate of the adequacy: what a flexible machine would still explain."""
     one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
-    one.gates["adequate"] = adequate(one, bench.options)
+    one.leaves = adequate(one, bench.options)
+    one.gates["adequate"] = bool(one.leaves)

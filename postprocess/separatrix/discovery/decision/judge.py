@@ -39,6 +39,8 @@ class Judged:
     ceiling: Ceiling | None = None
     # share of the gain that small faults of a rig do not explain
     own: float = 1.0
+    # what it leaves, if it is adequate
+    leaves: str = ""
 
     @property
     def name(self) -> str:
@@ -236,12 +238,15 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     return True, ""
 
 
-def adequate(one: Judged, options: Options) -> bool:
-    """Whether what is left is noise, or little of a gap that was closed nearly all.
+NOISE, LITTLE, LARGER_NOISE = "noise", "little of the gap", "larger noise"
 
-    Either it is no more than a share of the gap, however significant, or the fit is like noise and a flexible
-    force explains nothing more, or less than the effect does and nothing that is sizeable; or it explains
-    nothing more of what is somewhat more than noise. Small faults of a rig count as noise.
+
+def adequate(one: Judged, options: Options) -> str:
+    """What an adequate machine leaves; '' if it is not adequate.
+
+    `noise`: the fit is like noise and a flexible force explains nothing more, or less than the effect does and
+    nothing that is sizeable. `little of the gap`: no more than a share of it, however significant. `larger
+    noise`: somewhat more than noise, of which no force explains anything. Small faults of a rig count as noise.
     """
     fit = one.ceiling.fit
     gained = max(0.0, 2 * one.training)
@@ -250,10 +255,12 @@ def adequate(one: Judged, options: Options) -> bool:
     clean = one.ceiling.p > options.detection_level or trifle
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
     if fit.sample_chi2 <= options.adequate_chi2 and (clean or closed):
-        return True
+        return NOISE
+    if _all_closed(one, options):
+        return LITTLE
     # no force explains more: the noise is larger than it was said or measured to be
     noisier = one.ceiling.p > options.detection_level and share >= options.adequate_share
-    return bool((noisier and fit.sample_chi2 <= options.missed_chi2) or _all_closed(one, options))
+    return LARGER_NOISE if noisier and fit.sample_chi2 <= options.missed_chi2 else ""
 
 
 def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None) -> bool:

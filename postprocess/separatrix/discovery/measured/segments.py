@@ -58,6 +58,16 @@ def padded(record: np.ndarray, first: np.ndarray, last: np.ndarray) -> Segments:
     return Segments(record, first, last, index, inside)
 
 
+def seeing(segments: Segments, records: list[Samples]) -> np.ndarray:
+    """Samples of the segments (segments, length) whose velocity says something, if it was measured."""
+    found = segments.inside.copy()
+    for number, samples in enumerate(records):
+        if samples.blind is not None:
+            rows = segments.record == number
+            found[rows] &= ~samples.blind[segments.index[rows]]
+    return found
+
+
 def _calm(smooth: Smoothed) -> np.ndarray:
     """How good a start each sample is: speed over its usual size, 0 near impacts."""
     speed = np.abs(smooth.v)
