@@ -10,6 +10,7 @@ from separatrix.discovery.decision.judge import (
     admissible,
     clear_of,
     detection,
+    foretells,
     held_out_bounds,
     judged,
     sizeable,
@@ -58,7 +59,7 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
-        helps = any(low > 0 for low, _ in bounds)
+        helps = any(low > 0 for low, _ in bounds) or foretells(best, options)
         best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
     best.gates["separate"] = not rivals
     best.gates["admissible"] = admissible(best, base, options)[0]

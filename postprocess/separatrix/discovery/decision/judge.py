@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evidence of the candidates and the gates that a name has to pass."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
@@ -20,6 +21,8 @@ _BLOCKS = 2
 _FEW = 5
 # share of the mean information on an effect below which a segment says nothing of it
 _SILENT = 0.01
+# p value of so many segments in which a held-out record is foretold better
+_CHANCE = 0.05
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
 _KINK_SHARE = 0.01
 
@@ -117,19 +120,46 @@ def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, flo
     return bounds
 
 
+def foretells(one: Judged, options: Options) -> bool:
+    """Whether a held-out record by itself tells an effect from nothing, by the odds of a name, and not by one
+    segment alone.
+
+    What a right base foretells is beaten by more than log(1/p) with a probability of p at most (Ville), however
+    unlike the segments are. It has to be beaten without the best segment too, or in so many of them that this
+    is no chance (sign test).
+    """
+    for number in np.unique(one.prediction.record):
+        parts = one.held_out_parts[one.prediction.record == number] / one.prediction.misfit
+        parts = parts[parts != 0]
+        if parts.sum() <= options.separation:
+            continue
+        better = int(np.sum(parts > 0))
+        if parts.sum() > parts.max() or binom.sf(better - 1, parts.size, 0.5) < _CHANCE:
+            return True
+    return False
+
+
 def _telling(one: Judged) -> np.ndarray:
     """Whether both machines follow a held-out segment and it has information on what was added."""
     fitted, prediction = one.fitted, one.prediction
     shared = [i for i, free in enumerate(fitted.problem.free) if free.record is None]
-    added = [shared.index(i) for i in fitted.added if i in shared]
-    sizes = np.array([_size(fitted, shared[i]) for i in added])
-    matrix = prediction.fit.reduced.matrix[:, added, added] * sizes**2
-    information = matrix.max(axis=1, initial=0.0)
+    added = [i for i in fitted.added if i in shared]
+    places = [shared.index(i) for i in added]
+    information = _information(fitted, prediction.fit.reduced.matrix, added, places)
     tells = np.zeros(information.size, bool)
     for number in np.unique(prediction.record):
         here = prediction.record == number
         tells[here] = information[here] > _SILENT * information[here].mean()
     return tells & (one.held_out_parts != 0)
+
+
+def _information(
+    fitted: Fitted, matrix: np.ndarray, added: Sequence[int], places: Sequence[int] | None = None
+) -> np.ndarray:
+    """What each segment says of the added parameters, over their sizes; `places` of them in the matrix."""
+    sizes = np.array([_size(fitted, i) for i in added])
+    places = added if places is None else places
+    return (matrix[:, places, places] * sizes**2).max(axis=1, initial=0.0)
 
 
 def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> np.ndarray:
@@ -144,8 +174,9 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 def stable(one: Judged, base: Fitted, options: Options) -> float:
     """Share of block bootstraps of the segments in which the effect pays for its parameters.
 
-    Held-out segments are drawn too where the training records themselves tell the effect from nothing. All
-    gains are over the misfit.
+    Only segments that have information on the effect are drawn; where they are few, it has to pay without the
+    best of them. Held-out segments are drawn too where the training records themselves tell the effect from
+    nothing. All gains are over the misfit.
     """
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
@@ -155,9 +186,17 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     gain, parts = gain / misfit, parts / misfit
     if not added.size:
         return 0.0
+    information = _information(one.fitted, fit.reduced.matrix, added)
+    tells = information > _SILENT * information.mean()
+    rest = min(0.0, float(parts[~tells].sum()))
+    proven = one.held_out_parts.size and gain - one.parameters > options.separation
+    if tells.sum() < _FEW:
+        foretold = one.held_out_parts.sum() / one.prediction.misfit if proven else 0.0
+        others = parts[tells].sum() - parts[tells].max(initial=0.0)
+        return float(others + rest + foretold > one.parameters)
     random = np.random.default_rng([options.seed, 12])
-    sums = _block_sums(parts, random, options.bootstraps)
-    if one.held_out_parts.size and gain - one.parameters > options.separation:
+    sums = rest + _block_sums(parts[tells], random, options.bootstraps)
+    if proven:
         sums = sums + _block_sums(one.held_out_parts / one.prediction.misfit, random, options.bootstraps)
     return float(np.mean(sums > one.parameters))
 

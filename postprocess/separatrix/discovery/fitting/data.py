@@ -31,6 +31,8 @@ _MOST_SWINGS = 1.5
 _SQUARES_BEHIND = 60.0
 # standard errors within which an impact happens when the smoother says
 _TIMES = 3.0
+# of the mean time between impacts, how far beside one nothing is compared at most
+_BESIDE = 0.03
 # standard errors of the speed within which a body may be at rest
 _SLOW = 3.0
 
@@ -147,11 +149,14 @@ def _blind(one: Prepared, seen: Smoothed) -> np.ndarray | None:
         return None
     blind = np.zeros(v.size, bool)
     single = samples.size == 1
-    for row in jumps(v, max(one.velocity_sigma, white_noise(one.record.v))):
+    rows = jumps(v, max(one.velocity_sigma, white_noise(one.record.v)))
+    longest = _BESIDE * (samples.t[-1] - samples.t[0]) / max(1, rows.size)
+    for row in rows:
         if not (single[row] and single[row + 1]):
             continue
         near = seen.nearest(samples.t[row : row + 1])[0]
         late = _TIMES * np.sqrt(seen.covariance[near, 0, 0]) / np.max(np.abs(v[row : row + 2]))
+        late = min(late, longest)
         first, last = np.searchsorted(samples.t, [samples.t[row + 1] - late, samples.t[row] + late])
         blind[min(first, row) : max(last, row + 2)] = True
     return blind & single
