@@ -13,6 +13,7 @@ from separatrix.discovery.decision.misfit import missed
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, run_round
 from separatrix.discovery.decision.several import with_more
+from separatrix.discovery.decision.strange import other_units
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
@@ -269,7 +270,9 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
     decision.accepted = [best]
     decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
-    decision.outcome = "ambiguous" if failed else "named"
+    odd = other_units(bench.training, decision.rounds[0].base.model)
+    decision.reasons += odd
+    decision.outcome = "ambiguous" if failed or odd else "named"
     decision.equivalent = bool(rivals) and all(equivalent(best, one) for one in rivals)
     return decision
 

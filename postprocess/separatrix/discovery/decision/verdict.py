@@ -14,7 +14,7 @@ from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
-from separatrix.discovery.decision.strange import other_drive, other_machine
+from separatrix.discovery.decision.strange import other_drive, other_machine, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.curves import function_of
 from separatrix.discovery.fitting.data import Data
@@ -182,6 +182,7 @@ def _warnings(findings: Findings) -> list[str]:
     for _, data, fitted in fits:
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
     notes += other_machine(bench.training, fits[0][2], bench.options)
+    notes += other_units(bench.training, findings.base.model)
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(bench.training, findings.base)
     best = findings.decision.accepted
