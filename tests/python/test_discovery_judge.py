@@ -53,7 +53,7 @@ def test_an_effect_that_a_few_segments_carry_needs_the_held_out_record():
 
 
 def test_an_effect_that_few_segments_can_show_pays_without_the_best_of_them():
-    """Break-away shows where the body starts: three of twenty segments, which a resampling may all leave out."""
+    """Break-away shows where the body starts: three of 20 segments, which a resampling may all leave out."""
     base = fitted("", np.full(COUNT, 100.0))
     for gains, holds in (([9.0, 8.0, 7.0], True), ([30.0, 0.5, 0.2], False)):
         parts, told = np.zeros(COUNT), np.full(COUNT, 1e-6)

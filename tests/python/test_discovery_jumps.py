@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A measured velocity says nothing next to an impact whose time is less well known than its samples lie apart."""
+"""A measured velocity says nothing next to an impact whose time is known less well than it is sampled."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_jumps_are_steps_beyond_the_noise_and_beyond_the_steps_beside_them():
 
 @pytest.mark.usefixtures("library")
 def test_a_sample_on_the_wrong_side_of_an_impact_holds_no_fit(source_dir, tmp_path, monkeypatch):
-    """In five of 54 segments one velocity before an impact was fitted by one after it, for good: chi^2 of 6000."""
+    """In five of 54 segments one velocity before an impact was fitted by one after it: chi^2 of 6000 each."""
     monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
     monkeypatch.syspath_prepend(str(source_dir / "scripts"))
     import records

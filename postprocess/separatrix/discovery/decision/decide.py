@@ -120,7 +120,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
 def _with_more_foretold(
     bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]
 ) -> tuple[Judged, list[Judged]]:
-    """An effect that leaves noise where it was fitted but misses a held-out record, and another one beside it.
+    """An effect that leaves noise where it was fitted but misses a held-out record, and another beside it.
 
     What two effects do together where they were fitted one may do alone, but not at another drive.
     """
@@ -139,7 +139,7 @@ def _with_more_foretold(
 
 
 def _misses(told: Prediction, fitted: Fit, options: Options) -> bool:
-    """Whether held-out records are missed by more than chance, and not in a few segments that may be caught."""
+    """Whether held-out records are missed, by more than chance and not in a few segments that may be caught."""
     fit, kept = told.fit, told.good.copy()
     caught = suspicious(fit)
     if caught.size <= _CAUGHT:

@@ -117,7 +117,9 @@ def hypotheses(training: Motion) -> Iterator[Hypothesis]:
     yield from _memories(training)
     if training.problem.in_force:
         yield _after_turning(training)
-        yield Hypothesis(("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record")
+        yield Hypothesis(
+            ("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record"
+        )
     if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= _FEWEST_IMPACTS:
         yield from _at_impacts(training)
 

@@ -124,8 +124,8 @@ def foretells(one: Judged, options: Options) -> bool:
     """Whether a held-out record by itself tells an effect from nothing, by the odds of a name, and not by one
     segment alone.
 
-    What a right base foretells is beaten by more than log(1/p) with a probability of p at most (Ville), however
-    unlike the segments are. It has to be beaten without the best segment too, or in so many of them that this
+    What a right base foretells is beaten by more than log(1/p) with a probability of p at most (Ville),
+    however unlike the segments are. It has to be beaten without the best segment too, or in so many of them that this
     is no chance (sign test).
     """
     for number in np.unique(one.prediction.record):
@@ -283,9 +283,10 @@ NOISE, LITTLE, LARGER_NOISE = "noise", "little of the gap", "larger noise"
 def adequate(one: Judged, options: Options) -> str:
     """What an adequate machine leaves; '' if it is not adequate.
 
-    `noise`: the fit is like noise and a flexible force explains nothing more, or less than the effect does and
-    nothing that is sizeable. `little of the gap`: no more than a share of it, however significant. `larger
-    noise`: somewhat more than noise, of which no force explains anything. Small faults of a rig count as noise.
+    `noise`: the fit is like noise and a flexible force explains nothing more, or less than the effect does
+    and nothing that is sizeable. `little of the gap`: no more than a share of it, however significant.
+    `larger noise`: somewhat more than noise, of which no force explains anything. Small faults of a rig count
+    as noise.
     """
     fit = one.ceiling.fit
     gained = max(0.0, 2 * one.training)

@@ -82,8 +82,8 @@ def other_units(data: Data, model) -> list[str]:
         if factor is not None and not 1 / _UNITS < factor < _UNITS:
             what = "the mass that force and acceleration give" if of_mass else "the force"
             notes.append(
-                f"{record.name}: {what} is {number(factor, 2)} times that of the machine of the case: other units "
-                "of force or place, or another machine"
+                f"{record.name}: {what} is {number(factor, 2)} times that of the machine of the case: "
+                "other units of force or place, or another machine"
             )
     return notes
 

@@ -189,8 +189,8 @@ def _warnings(findings: Findings) -> list[str]:
     if best and best[0].leaves == LARGER_NOISE:
         size = best[0].ceiling.fit.sample_chi2
         notes.append(
-            f"reduced chi^2 is {size:.3g} with effect.{best[0].name}, and no force explains more: the noise is "
-            f"taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
+            f"reduced chi^2 is {size:.3g} with effect.{best[0].name}, and no force explains more: the noise "
+            f"is taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
         )
     fit = findings.base.fit
     if not fit.converged:

@@ -214,8 +214,8 @@ def _gains(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
 def _telling(maps: list[tuple], gains: np.ndarray, own: set[str]) -> np.ndarray:
     """Which maps are told: the simplest of those that explain nearly as much as any other.
 
-    Where a motion repeats itself, the place, the speed and the phase of a missing force go together: there the
-    maps of the variable that a named effect depends on, `own`, are told if they explain most of it too.
+    Where a motion repeats itself, the place, the speed and the phase of a missing force go together: there
+    the maps of the variable that a named effect depends on, `own`, are told if they explain most of it too.
     """
     if gains.max() <= 0:
         # nothing is missing, or noise is said to be more than there is

@@ -142,9 +142,8 @@ def _check_limits(
         if not long:
             continue
         share = sum(last - first for first, last in long) / x.size
-        message = (
-            f"{where(long[0][0])}: {name} stays at its {end} value {extreme:.6g} {unit} for {len(long)} stretches"
-        )
+        stays = f"{name} stays at its {end} value {extreme:.6g} {unit}"
+        message = f"{where(long[0][0])}: {stays} for {len(long)} stretches"
         if len(long) >= 2 and share > _CLIPPED_SHARE:
             raise SeparatrixError(f"{message}, {100 * share:.0f} % of the samples: clipped")
         warnings.append(f"{message}: clipped?")

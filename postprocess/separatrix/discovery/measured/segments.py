@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records cut into short segments, each with a start of its own.
 
-A segment starts where the motion is smooth: away from impacts (also those that only a velocity shows), from turning points (where friction switches
-and may hold the body) and from gaps. Segments of a record follow one another without a hole.
+A segment starts where the motion is smooth: away from impacts (also those that only a velocity shows), from
+turning points (where friction switches and may hold the body) and from gaps. Segments of a record follow one
+another without a hole.
 """
 
 from dataclasses import dataclass
