@@ -1,11 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
-!> stretch of the springs of elastic friction.
+!> A jointed structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
+!> the springs of elastic friction.
 module jointed_section
   use jointed, only: joint_contact, joint_elastic
-  use jointed_motion, only: jointed_motion_t, start_jointed
+  use jointed_flows, only: without_contacts
+  use jointed_motion, only: jointed_motion_t, prepare_jointed, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use section_size, only: most_coordinates
@@ -14,17 +15,17 @@ module jointed_section
   private
 
   public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed, &
-    watched_speed
+    watched_speed, free_jointed
 
 contains
 
   !> Number of coordinates on the section.
   pure integer function coordinates_of_jointed(moving) result(n)
     type(jointed_motion_t), intent(in) :: moving
-    n = size(moving%directions, 2) + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
+    n = size(moving%directions, 2) + size(moving%speeds, 2) + count(moving%machine%joints%kind == joint_elastic)
   end function coordinates_of_jointed
 
-  !> Number of the coordinate that is the velocity of the watched place.
+  !> Number of the coordinate that is the velocity of the watched place, in a motion without a clock.
   pure integer function watched_speed(moving) result(at)
     type(jointed_motion_t), intent(in) :: moving
     at = size(moving%directions, 2) + moving%machine%watched
@@ -35,6 +36,17 @@ contains
     type(jointed_motion_t), intent(in) :: moving
     fits_section = coordinates_of_jointed(moving) <= most_coordinates
   end function fits_section
+
+  !> The same machine without stops, if that takes away just the first coordinate, the one position; else nothing.
+  pure subroutine free_jointed(moving, free, found)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_motion_t), intent(out) :: free
+    logical, intent(out) :: found
+    found = moving%drifts
+    if (.not. found) return
+    call prepare_jointed(without_contacts(moving%machine), moving%options, free)
+    found = size(free%speeds, 2) == size(moving%speeds, 2)
+  end subroutine free_jointed
 
   !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
   !> drive at `angle` [rad].
@@ -86,15 +98,15 @@ contains
     type(jointed_state_t) :: state
     real(wp) :: q(moving%machine%n), v(moving%machine%n), s, u, limit
     complex(wp) :: turning(moving%harmonics)
-    integer :: n, places, j, k
+    integer :: places, speeds, j, k
     logical :: ok
-    n = moving%machine%n
     places = size(moving%directions, 2)
+    speeds = size(moving%speeds, 2)
     q = matmul(moving%directions, point(:places))
-    v = point(places + 1:places + n)
+    v = matmul(moving%speeds, point(places + 1:places + speeds))
     call start_jointed(moving, q, v, 0.0_wp, state, ok)
     turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
-    k = places + n
+    k = places + speeds
     do j = 1, size(moving%machine%joints)
       associate (joint => moving%machine%joints(j))
         if (joint%kind /= joint_elastic) cycle
@@ -115,14 +127,15 @@ contains
     type(jointed_state_t), intent(in) :: state
     real(wp) :: point(most_coordinates), s, u
     complex(wp) :: turning(moving%harmonics)
-    integer :: n, places, j, k
+    integer :: n, places, speeds, j, k
     point = 0
+    if (.not. fits_section(moving)) return
     n = moving%machine%n
     places = size(moving%directions, 2)
-    if (places + n + count(moving%machine%joints%kind == joint_elastic) > most_coordinates) return
+    speeds = size(moving%speeds, 2)
     point(:places) = matmul(transpose(moving%directions), state%q(:n))
-    point(places + 1:places + n) = state%v(:n)
-    k = places + n
+    point(places + 1:places + speeds) = matmul(transpose(moving%speeds), state%v(:n))
+    k = places + speeds
     turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
     do j = 1, size(moving%machine%joints)
       associate (joint => moving%machine%joints(j))
@@ -135,17 +148,18 @@ contains
     end do
   end function jointed_point
 
-  !> Sizes of the coordinates in a motion over `half_range` [m].
+  !> Sizes of the coordinates in a motion over `half_range` [m]. What may drift has those of what stops and forces allow.
   pure function scales_of_jointed(moving, half_range) result(scales)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates), length
-    integer :: places, n
-    n = moving%machine%n
+    integer :: places, speeds
     places = size(moving%directions, 2)
+    speeds = size(moving%speeds, 2)
     length = max(half_range, 1e-3_wp*moving%machine%length_scale)
+    if (speeds < moving%machine%n) length = min(length, moving%machine%length_scale)
     scales = length
-    scales(places + 1:places + n) = length*moving%machine%frequency
+    scales(places + 1:places + speeds) = length*moving%machine%frequency
   end function scales_of_jointed
 
 end module jointed_section

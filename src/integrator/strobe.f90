@@ -11,7 +11,7 @@ module strobe
   use energy, only: energy_of_body, record_with_book
   use jointed_log, only: energy_of_jointed, log_sample, watched_state
   use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
-  use jointed_section, only: coordinates_of_jointed, fits_section, jointed_at, jointed_point, scales_of_jointed, &
+  use jointed_section, only: coordinates_of_jointed, fits_section, free_jointed, jointed_at, jointed_point, scales_of_jointed, &
     start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
@@ -50,8 +50,9 @@ contains
     type(motion_t), intent(out) :: free
     logical, intent(out) :: found
     found = .false.
-    if (.not. allocated(moving%pair)) return
     free = moving
+    if (allocated(moving%jointed)) call free_jointed(moving%jointed, free%jointed, found)
+    if (.not. allocated(moving%pair)) return
     free%machine%contact = contact_t()
     call free_pair(moving%pair, free%pair, found)
   end subroutine without_stops
