@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from separatrix.discovery.decision import decide, flexible, judge, several
 from separatrix.discovery.decision.gates import foremost
-from separatrix.discovery.decision.judge import Judged, _together_clear, foretells, held_out_bounds, stable
+from separatrix.discovery.decision.judge import (
+    Judged,
+    _together_clear,
+    beyond_doubt,
+    foretells,
+    held_out_bounds,
+    stable,
+)
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
@@ -81,6 +88,13 @@ def test_a_held_out_record_tells_an_effect_by_the_odds_of_a_name():
     # one segment alone may be one of a wrong minimum
     alone = np.array([7.0, *11 * [-0.1]])
     assert not foretells(foretold(alone, np.ones(12)), OPTIONS)
+    # impacts of one speed say nothing of how restitution falls with it; a doubtful effect is not proven so
+    silent, base = foretold(np.full(12, 0.1), np.ones(12)), fitted("", np.full(COUNT, 100.0))
+    assert beyond_doubt(silent, base, OPTIONS)
+    assert not beyond_doubt(silent, replace(base, fit=fit(np.full(COUNT, 100.0), decrement=50.0)), OPTIONS)
+    assert not beyond_doubt(foretold(np.zeros(12), np.ones(12)), base, OPTIONS)
+    silent.training = 5.0
+    assert not beyond_doubt(silent, base, OPTIONS)
 
 
 def foretold(gains: np.ndarray, information: np.ndarray) -> Judged:
@@ -343,5 +357,6 @@ def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record
     best = judged(np.full(COUNT, 5.0), np.zeros(COUNT))
     best.gates = {"hold-out": foretells, "admissible": True, "converged": True}
     decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
-    bench = SimpleNamespace(options=replace(OPTIONS, adequate_chi2=2.0))
+    options, data = replace(OPTIONS, adequate_chi2=2.0), SimpleNamespace(prepared=[])
+    bench = SimpleNamespace(options=options, training=data)
     assert decide._conclude(bench, decision, best, []).outcome == outcome

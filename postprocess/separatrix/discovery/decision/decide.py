@@ -139,7 +139,7 @@ def _with_more_foretold(
 
 
 def _misses(told: Prediction, fitted: Fit, options: Options) -> bool:
-    """Whether held-out records are missed, by more than chance and not in a few segments that may be caught."""
+    """Whether held-out records are missed, by more than chance and not in a few segments alone."""
     fit, kept = told.fit, told.good.copy()
     caught = suspicious(fit)
     if caught.size <= _CAUGHT:

@@ -8,6 +8,7 @@ from separatrix.discovery.decision.judge import (
     Judged,
     adequate,
     admissible,
+    beyond_doubt,
     clear_of,
     detection,
     foretells,
@@ -60,6 +61,7 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
         helps = any(low > 0 for low, _ in bounds) or foretells(best, options)
+        helps |= beyond_doubt(best, base, options)
         best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
     best.gates["separate"] = not rivals
     best.gates["admissible"] = admissible(best, base, options)[0]

@@ -21,6 +21,8 @@ _BLOCKS = 2
 _FEW = 5
 # share of the mean information on an effect below which a segment says nothing of it
 _SILENT = 0.01
+# log-likelihood of an effect that no held-out record can show
+_DOUBTLESS = 10.0
 # p value of so many segments in which a held-out record is foretold better
 _CHANCE = 0.05
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
@@ -125,8 +127,8 @@ def foretells(one: Judged, options: Options) -> bool:
     segment alone.
 
     What a right base foretells is beaten by more than log(1/p) with a probability of p at most (Ville),
-    however unlike the segments are. It has to be beaten without the best segment too, or in so many of them that this
-    is no chance (sign test).
+    however unlike the segments are. It has to be beaten without the best segment too, or in so many of them
+    that this is no chance (sign test).
     """
     for number in np.unique(one.prediction.record):
         parts = one.held_out_parts[one.prediction.record == number] / one.prediction.misfit
@@ -137,6 +139,17 @@ def foretells(one: Judged, options: Options) -> bool:
         if parts.sum() > parts.max() or binom.sf(better - 1, parts.size, 0.5) < _CHANCE:
             return True
     return False
+
+
+def beyond_doubt(one: Judged, base: Fitted, options: Options) -> bool:
+    """Whether fitted records tell an effect of which held-out ones say nothing: both machines foretell them alike.
+
+    Over a base that is not at its minimum they do not.
+    """
+    parts, misfit = one.held_out_parts, one.prediction.misfit
+    compared = np.count_nonzero(parts) > parts.size / 2
+    alike = compared and float(np.abs(parts).sum()) < options.separation * misfit
+    return bool(alike and base.fit.converged and one.training - one.parameters > _DOUBTLESS * misfit)
 
 
 def _telling(one: Judged) -> np.ndarray:
