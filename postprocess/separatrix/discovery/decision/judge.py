@@ -142,7 +142,7 @@ def foretells(one: Judged, options: Options) -> bool:
 
 
 def beyond_doubt(one: Judged, base: Fitted, options: Options) -> bool:
-    """Whether fitted records tell an effect of which held-out ones say nothing: both machines foretell them alike.
+    """Whether fitted records tell an effect of which held-out ones say nothing: they are foretold alike.
 
     Over a base that is not at its minimum they do not.
     """
