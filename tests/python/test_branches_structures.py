@@ -325,7 +325,7 @@ count = 10
 
 
 def test_crisis_of_a_structure_is_that_of_the_body_it_is(follow, tmp_path: Path):
-    """The machine of sweep_coulomb.toml, its crank a force and its equilibrium at 0: 0.8629196 (docs/user-guide.md)."""
+    """The machine of sweep_coulomb.toml, its crank a force, its equilibrium at 0: 0.8629196 (user guide)."""
     case, stiffness, natural = tmp_path / "crank.toml", 88.82643960980423, 3 * np.pi
     foot = stiffness * np.array([0.09495, 0.01 + 0.02849j, -0.02003 - 0.02686j])
     # a cos + b sin of the crank angle is the real part of (a + ib) exp(-i angle)
