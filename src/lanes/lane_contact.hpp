@@ -308,8 +308,8 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
     // At a barrier that it moves towards, a body hits at once.
     left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
     proven = proven & ~left;
-    left =
-        left | (proven & take_series_events(m, pieces, t, proven, barrier, g)) | (flying & (g.flights >= g.budget));
+    left = left | (proven & take_series_events(m, pieces, t, proven, barrier, g)) |
+           (flying & (g.flights >= g.budget));
     // A step that leaves a piece of a table may do so behind its event.
     put(limit, flying, pick(proven, m.stride, 0.5 * pick(kept, t.end, vec(1.0)) * length));
     put(g.status, left, lane_left);

@@ -414,8 +414,8 @@ LANE_DEVICE inline mask take_series_events(const lane_machine &m, const table_pi
   if (any(due & t.hits))
     restitution = restitution_at(m, w);
   mask slow = soft ? w <= 0.0 : restitution * w <= m.slow;
-  mask rare = due & ((t.turns & (push <= holds)) | (t.hits & slow) |
-                     (magnitude(x) >= m.domain) | (factor <= 0.0));
+  mask rare =
+      due & ((t.turns & (push <= holds)) | (t.hits & slow) | (magnitude(x) >= m.domain) | (factor <= 0.0));
   due = due & ~rare;
   mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
   LANE_COUNT(events, count(events));
