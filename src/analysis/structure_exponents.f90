@@ -10,7 +10,8 @@ module structure_exponents
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: int64, wp
   use motion, only: start_state
-  use motion_state, only: event_impact_lower, event_impact_upper, event_turning_point, state_t, tally_t
+  use motion_state, only: event_impact_lower, event_impact_upper, event_touch_lower, event_touch_upper, &
+    event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
   use structure, only: coordinates_of, mode_number, state_in, structure_t
   use structure_family, only: advance_section, least_dimension, start_of_structure, state_at_start, vary_section
@@ -222,6 +223,8 @@ contains
           if (e > 0) spectrum%sum_exact = spectrum%sum_exact + 2*logarithm(e)
           if (.not. e > 0) spectrum%has_sum = .false.
           spectrum%has_sum = spectrum%has_sum .and. event%before == event%after
+        case (event_touch_upper, event_touch_lower)
+          spectrum%impacts = spectrum%impacts + 1
         case (event_turning_point)
           spectrum%sum_exact = spectrum%sum_exact &
             + logarithm(abs(slide_rate(structure, event, event%after, event%departure)/ &

@@ -324,16 +324,15 @@ count = 10
 """
 
 
-def test_crisis_of_a_structure_is_that_of_the_body_it_is(follow, tmp_path: Path):
-    """The machine of sweep_coulomb.toml, its crank a force, its equilibrium at 0: 0.8629196 (user guide)."""
+def test_a_graze_where_friction_turns_round_with_the_impact(follow, tmp_path: Path):
+    """The machine of sweep_coulomb.toml, its crank a force: the graze is that of the one body."""
     case, stiffness, natural = tmp_path / "crank.toml", 88.82643960980423, 3 * np.pi
     foot = stiffness * np.array([0.09495, 0.01 + 0.02849j, -0.02003 - 0.02686j])
     # a cos + b sin of the crank angle is the real part of (a + ib) exp(-i angle)
     foot *= np.exp(-1j * np.radians(191.1) * np.arange(1, 4))
-    lists = {"cosine": foot.real.tolist(), "sine": foot.imag.tolist()}
-    case.write_text(CRANK.format(stiffness=stiffness, **lists))
-    more = ("--searches", "2", "--contacts")
-    points, _ = follow(case, "drive.force.frequency", 0.8628 * natural, 0.8632 * natural, *more)
-    crises = [point["parameter"] for point in points if point["label"] == "boundary_crisis"]
-    # known to where arrivals are too rare to be seen
-    assert [value / natural for value in crises] == pytest.approx([0.8629196], abs=1e-6)
+    case.write_text(CRANK.format(stiffness=stiffness, cosine=foot.real.tolist(), sine=foot.imag.tolist()))
+    points, _ = follow(case, "drive.force.frequency", 0.8627 * natural, 0.8634 * natural, "--searches", "2")
+    grazes = [point["parameter"] / natural for point in points if point["label"].startswith("GR")]
+    assert grazes == pytest.approx([0.8628268060133], abs=1e-11)
+    assert {point["word"] for point in points} >= {"R....", "R.R..."}
+    assert next(point["label"] for point in points if point["label"].startswith("GR")) == "GR-fold"
