@@ -170,6 +170,7 @@ def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
     assert verdict["outcome"] == "characterised"
     assert verdict["effects"] == []
     assert verdict["character"][0]["depends_on"] == ["slow time"]
+    assert "asked for" in verdict["not_tested"]["cubic_damping"]
 
 
 @pytest.mark.parametrize(("column", "factor"), (("force", 1e-3), ("force", 9.81), ("x", 1e3)))

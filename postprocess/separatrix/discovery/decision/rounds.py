@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.judge import Judged, judged
-from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import ON_REQUEST, STARTS, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
@@ -146,6 +146,9 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
         if name in base.names or (options.candidates and name not in options.candidates):
             continue
         if any(path.startswith(f"effect.{name}.") for path in base.model.parameters):
+            continue
+        if name in ON_REQUEST and not options.candidates:
+            absent[name] = ON_REQUEST[name]
             continue
         if base.problem.in_force and effects()[name].acts != "flight":
             absent[name] = "it does nothing to the force along a known motion"
