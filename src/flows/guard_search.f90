@@ -68,20 +68,9 @@ contains
       do g = 1, search%functions
         there(:, g) = derivatives(search, g, b, growth, turning)
       end do
-      root = huge(1.0_wp)
-      do g = 1, search%guards
-        if (idle(g)) cycle
-        if (certified(g) >= b) cycle
-        if (certified(g) <= a) then
-          if (stays_positive(search, g, a, b, here(:, g), there(:, g))) cycle
-        end if
-        call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
-        if (root(g) < time) time = root(g)
-      end do
+      call search_panel(search, a, b, here, there, tie, certified, idle, time, root, evaluations)
       if (any(root(:search%guards) <= time)) then
-        do g = 1, search%guards
-          fallen(g) = root(g) <= time + tie
-        end do
+        fallen(:search%guards) = root(:search%guards) <= time + tie
         call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
                    top_speed, evaluations)
         if (present(margin)) call note_misses(search, list, a, time, here, fallen, margin, evaluations)
@@ -99,6 +88,28 @@ contains
       end if
     end do
   end subroutine find_first
+
+  !> The zeros of the guards, each its `root` [s], on the panel from `a` to `b` [s], where the values are `here` and `there`;
+  !> huge where there is none before `time`, which becomes that of the first. Zeros within `tie` of it are found too.
+  pure subroutine search_panel(search, a, b, here, there, tie, certified, idle, time, root, evaluations)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: a, b, here(0:, :), there(0:, :), tie, certified(:)
+    logical, intent(in) :: idle(:)
+    real(wp), intent(inout) :: time
+    real(wp), intent(out) :: root(:)
+    integer, intent(inout) :: evaluations
+    integer :: g
+    root = huge(1.0_wp)
+    do g = 1, search%guards
+      if (idle(g)) cycle
+      if (certified(g) >= b) cycle
+      if (certified(g) <= a) then
+        if (stays_positive(search, g, a, b, here(:, g), there(:, g))) cycle
+      end if
+      call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
+      if (root(g) < time) time = root(g)
+    end do
+  end subroutine search_panel
 
   !> Guards that are zero at the start, where the values are `here`: those that fall at once, those that are nothing but rounding
   !> (`idle`), and how long within `length` [s] the others are `certified` not to fall.
