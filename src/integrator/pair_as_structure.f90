@@ -99,7 +99,7 @@ contains
       else
         controller = controller_t(row=driving, reference=wave, proportional=pair%proportional, integral=pair%integral, &
                                   derivative=pair%derivative, sample_time=pair%sample_time)
-        call add_controller(machine, controller, error)
+        call add_controller(machine, controller, 'integral.1', error)
         if (allocated(error)) return
       end if
     end if

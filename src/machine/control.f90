@@ -16,14 +16,16 @@ module control
 
 contains
 
-  !> Adds a controller, the frequency of the machine and all bodies being known; one for a machine. A continuous one acts as spring,
-  !> damper and force; its integral y is one more coordinate, of unit mass, under y'' = e'. A body whose motion is given, it does
-  !> not know.
-  pure subroutine add_controller(machine, controller, error)
+  !> Adds a controller, the frequency of the machine and all bodies and joints being known; one for a machine, and none with a
+  !> body whose motion is given. A continuous one acts as spring, damper and force; its integral y is one more coordinate,
+  !> `name`, of unit mass, under y'' = e'.
+  pure subroutine add_controller(machine, controller, name, error)
     type(jointed_t), intent(inout) :: machine
     type(controller_t), intent(in) :: controller
+    character(len=*), intent(in) :: name
     type(error_t), allocatable, intent(out) :: error
     complex(wp), allocatable :: harmonic(:), rates(:)
+    real(wp), allocatable :: shape(:, :)
     real(wp) :: row(machine%n + 1)
     integer :: m
     if (allocated(machine%controller)) then
@@ -40,7 +42,13 @@ contains
     end if
     associate (c => machine%controller)
       if (abs(c%integral) > 0) then
-        call add_body(machine, 'integral', 1.0_wp, 0.0_wp)
+        call add_body(machine, name, 1.0_wp, 0.0_wp)
+        if (allocated(machine%start_shape)) then
+          shape = machine%start_shape
+          deallocate (machine%start_shape)
+          allocate (machine%start_shape(machine%n, 2), source=0.0_wp)
+          machine%start_shape(:machine%n - 1, :) = shape
+        end if
         c%integral_at = machine%n
         c%row = [c%row, 0.0_wp]
         do m = 1, size(machine%joints)

@@ -52,6 +52,13 @@ contains
       end do
     end do
     if (.not. (machine%driven .or. machine%section_time > 0) .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)
+    if (allocated(machine%controller)) then
+      ! What a controller sees tells how its integral grows.
+      associate (at => machine%controller%integral_at)
+        if (at > 0) depends(:, at) = 0
+        if (at > 0) depends(at, :) = 0
+      end associate
+    end if
     call span_of(depends, directions, count_directions)
   end subroutine speeds_of
 

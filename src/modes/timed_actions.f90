@@ -5,7 +5,7 @@
 module timed_actions
   use blow, only: strike
   use control, only: error_of
-  use jointed, only: joint_contact, joint_friction, jointed_t, most_joints
+  use jointed, only: joint_contact, joint_friction, joint_section, jointed_t, most_joints
   use jointed_flows, only: jointed_motion_t
   use jointed_log, only: book_change, energy_of_jointed, watched_state
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
@@ -129,7 +129,9 @@ contains
       log%book%work = log%book%work + energy_of_jointed(machine, pushed) - energy_of_jointed(machine, before)
       call book_change(machine, pushed, state, log)
       call record_event(log, event_blow, watched_state(machine, before), state%v(machine%watched))
-      call put_column(log%event_joint, log%events, [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
+      ! In the place of a joint stands the number after the last.
+      call put_column(log%event_joint, log%events, &
+                      [count(machine%joints%kind /= joint_section) + 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
     end associate
   end subroutine give_impulse
 
