@@ -139,7 +139,7 @@ axis = [{ name = "x0", from = -0.5, to = 0.5, count = 5 }, { name = "v0", from =
     [
         (SERVO + SERVO.replace("servo", "other"), "found a controller beside another"),
         (SERVO + FOOT, "beside a body whose motion"),
-        (KNOCK.replace("ball", "foot") + FOOT, "drive.knock.body: found a body whose motion is given"),
+        (KNOCK.replace("ball", "foot") + FOOT, "'drive.knock.body': found a body whose motion is given"),
     ],
 )
 def test_what_is_refused(separatrix: Path, tmp_path: Path, parts, said):
