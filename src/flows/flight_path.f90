@@ -7,7 +7,7 @@ module flight_path
   use elementary, only: exponential, sine_cosine
   use guards, only: joint_guard_t
   use jointed, only: joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees, most_joints
-  use jointed_state, only: acts_as_spring, is_curved, is_held, joint_force, jointed_state_t, turning_at
+  use jointed_state, only: acts_as_spring, is_curved, is_held, joint_force, jointed_state_t, running_control, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
   use polynomial, only: value_at
@@ -87,6 +87,11 @@ contains
     integer :: j
     force = machine%load
     rate = 0
+    if (allocated(machine%controller)) then
+      call running_control(machine%controller, state, now, r)
+      force = force + now*machine%controller%row
+      rate = rate + r*machine%controller%row
+    end if
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
         if (is_held(joint, state%phase(j)) .or. is_curved(joint, state%phase(j))) cycle

@@ -61,9 +61,20 @@ contains
     harmonics = harmonics_of(machine)
     call set_constraints(machine, flow)
     call set_forcing(machine, flow, harmonics, forcing, surface)
-    call set_modes(machine, flow, forcing, surface)
+    if (adds_up(machine)) then
+      flow%modal = .false.
+    else
+      call set_modes(machine, flow, forcing, surface)
+    end if
     if (with_matrix .or. .not. flow%modal) call set_matrix(machine, flow, forcing, surface)
   end subroutine build_flow
+
+  !> Whether a controller adds up what it sees: its integral makes the stiffness unsymmetric, which has no undamped modes.
+  pure logical function adds_up(machine)
+    type(jointed_t), intent(in) :: machine
+    adds_up = .false.
+    if (allocated(machine%controller)) adds_up = machine%controller%integral_at > 0
+  end function adds_up
 
   pure subroutine stiffen(flow, row, stiffness, damping)
     type(mode_flow_t), intent(inout) :: flow

@@ -10,6 +10,7 @@ module jointed_section
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use section_size, only: most_coordinates
+  use timed_actions, only: acts_on_time
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -31,10 +32,10 @@ contains
     at = size(moving%directions, 2) + moving%machine%watched
   end function watched_speed
 
-  !> Whether there is room for the coordinates.
+  !> Whether there is room for the coordinates, and they tell what follows: nothing acts at times of its own.
   pure logical function fits_section(moving)
     type(jointed_motion_t), intent(in) :: moving
-    fits_section = coordinates_of_jointed(moving) <= most_coordinates
+    fits_section = coordinates_of_jointed(moving) <= most_coordinates .and. .not. acts_on_time(moving%machine)
   end function fits_section
 
   !> The same machine without stops, if that takes away just the first coordinate, the one position; else nothing.

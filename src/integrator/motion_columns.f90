@@ -100,6 +100,7 @@ contains
     do i = 1, count_joints
       names = names//trim(machine%joints(i)%name)//' '
     end do
+    if (allocated(machine%impulses)) names = names//'impulse'
     allocate (joints(4, log%events))
     if (log%events > 0) joints = log%event_joint(:, :log%events)
     deallocate (columns)

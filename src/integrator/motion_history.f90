@@ -46,12 +46,16 @@ contains
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     real(wp) :: kinetic(log%samples)
+    real(wp), allocatable :: velocity(:)
     integer :: i
     if (allocated(moving%jointed)) then
       associate (machine => moving%jointed%machine)
         do i = 1, log%samples
-          kinetic(i) = 0.5_wp*sum(log%sample_coordinates(machine%n + 1:, i) &
-                                  *matmul(machine%mass, log%sample_coordinates(machine%n + 1:, i)))
+          velocity = log%sample_coordinates(machine%n + 1:, i)
+          if (allocated(machine%controller)) then
+            if (machine%controller%integral_at > 0) velocity(machine%controller%integral_at) = 0
+          end if
+          kinetic(i) = 0.5_wp*sum(velocity*matmul(machine%mass, velocity))
         end do
       end associate
       return

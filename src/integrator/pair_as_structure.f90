@@ -8,8 +8,9 @@ module pair_as_structure
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion
   use constants, only: two_pi, unreachable
   use elementary, only: sine_cosine
+  use control, only: add_controller, add_impulse
   use errors, only: error_t, fail
-  use jointed, only: joint_contact, joint_friction, joint_soft, joint_t, jointed_t, wave_t
+  use jointed, only: controller_t, impulse_t, joint_contact, joint_friction, joint_soft, joint_t, jointed_t, wave_t
   use kinds, only: wp
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion, pair_t
   use pair_modes, only: pair_motion_t, pair_state_t
@@ -18,7 +19,7 @@ module pair_as_structure
   implicit none
   private
 
-  public :: structure_of_pair, start_as_structure, pair_of_structure
+  public :: structure_of_pair, start_as_structure, pair_of_structure, flown_structure, flown_start
 
 contains
 
@@ -60,6 +61,69 @@ contains
     end if
     call finish(machine, error)
   end subroutine structure_of_pair
+
+  !> The structure of any two bodies, for flights: coordinates are the places of both on the ground, or of the driven one where the
+  !> motion of the other is given, relative to it where that carries the stops.
+  pure subroutine flown_structure(pair, machine, error)
+    type(pair_t), intent(in) :: pair
+    type(jointed_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(controller_t) :: controller
+    type(wave_t) :: wave
+    real(wp), parameter :: driving(2) = [1.0_wp, 0.0_wp], driven(2) = [0.0_wp, 1.0_wp]
+    logical :: given
+    given = pair%drive == driven_by_motion
+    allocate (wave%harmonic(1))
+    wave%mean = pair%mean
+    wave%rate = pair%velocity
+    wave%harmonic = cmplx(pair%amplitude, -pair%quadrature, wp)
+    machine%frequency = pair%frequency
+    machine%section_time = pair%period
+    call add_body(machine, 'driving', pair%mass, 0.0_wp)
+    call add_body(machine, 'driven', pair%driven_mass, 0.0_wp)
+    machine%watched = 2
+    if (given .and. pair%carried) then
+      machine%mass(1, 1) = pair%mass + pair%driven_mass
+      machine%mass(1, 2) = pair%driven_mass
+      machine%mass(2, 1) = pair%driven_mass
+      call add_joints(pair, driven, driven, machine)
+    else
+      call add_joints(pair, driven - driving, merge(driven - driving, driven, pair%carried), machine)
+    end if
+    if (given) then
+      call give_motion(machine, 'driving', wave)
+    else
+      call add_link(machine, driving, pair%stiffness, pair%damping, pair%free_length)
+      if (pair%drive == driven_by_force) then
+        call add_force(machine, driving, wave%mean, wave%harmonic)
+      else
+        controller = controller_t(row=driving, reference=wave, proportional=pair%proportional, integral=pair%integral, &
+                                  derivative=pair%derivative, sample_time=pair%sample_time)
+        call add_controller(machine, controller, 'integral.1', error)
+        if (allocated(error)) return
+      end if
+    end if
+    call finish(machine, error)
+    if (allocated(error) .or. .not. abs(pair%blow) > 0) return
+    call add_impulse(machine, impulse_t(row=merge(1.0_wp, 0.0_wp, machine%names == 'driven'), amount=pair%blow, &
+                                        time=pair%blow_time))
+  end subroutine flown_structure
+
+  !> Places and velocities (rows) of the coordinates of `flown_structure` at a start of both bodies, the drive at `angle` [rad].
+  pure function flown_start(pair, driven, driver, angle) result(start)
+    type(pair_t), intent(in) :: pair
+    real(wp), intent(in) :: driven(2), driver(2), angle
+    real(wp), allocatable :: start(:, :)
+    if (pair%drive == driven_by_motion) then
+      start = reshape(driven, [2, 1])
+      if (pair%carried) start(:, 1) = driven - given_motion(pair, angle)
+    else
+      start = reshape([driver, driven], [2, 2])
+      if (abs(pair%integral) > 0 .and. .not. pair%sample_time > 0 .and. pair%drive == driven_by_controller) then
+        start = reshape([driver, driven, 0.0_wp, 0.0_wp], [2, 3])
+      end if
+    end if
+  end function flown_start
 
   !> What a structure cannot be, or what has no section by the drive.
   pure subroutine refuse(pair, error)
@@ -114,7 +178,7 @@ contains
     real(wp) :: driver(2), sine, cosine
     call sine_cosine(modulo(angle, two_pi), sine, cosine)
     driver(1) = pair%mean + pair%amplitude*cosine + pair%quadrature*sine
-    driver(2) = pair%frequency*(pair%quadrature*cosine - pair%amplitude*sine)
+    driver(2) = pair%velocity + pair%frequency*(pair%quadrature*cosine - pair%amplitude*sine)
   end function given_motion
 
   !> A start of two bodies (`x` [m], `v` [m/s] of the driven one, crank angle [rad]) as one of their structure, see `start_strobe`.

@@ -24,6 +24,7 @@ module strobe
     tells_what_follows
   use section_size, only: most_coordinates
   use text, only: to_text
+  use timed_actions, only: acts_on_time
   use turn_section, only: advance_body_to_turn, advance_jointed_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
     jointed_at_turn, jointed_turn_point, scales_of_turn
   implicit none
@@ -86,8 +87,12 @@ contains
     character(len=:), allocatable :: text
     text = ''
     if (has_section(moving)) return
-    if (allocated(moving%jointed)) text = 'the section has '//to_text(coordinates_of_jointed(moving%jointed))// &
-                                          ' coordinates, more than '//to_text(most_coordinates)
+    if (allocated(moving%jointed)) then
+      text = 'the section has '//to_text(coordinates_of_jointed(moving%jointed))//' coordinates, more than '// &
+             to_text(most_coordinates)
+      if (acts_on_time(moving%jointed%machine)) text = 'with impulses, or samples of a controller, the state at crank angle 0 '// &
+                                                       'does not tell what follows'
+    end if
     if (allocated(moving%pair)) text = 'with '//trim(merge('drive.sample_time', 'body.blow        ', &
                                                            moving%pair%machine%sample_time > 0))// &
                                        ' the state at crank angle 0 does not tell what follows'
@@ -159,6 +164,7 @@ contains
       call start_jointed(moving%jointed, before%jointed%q(:n), before%jointed%v(:n), angle, strobe%jointed, ok)
     end associate
     strobe%jointed%slider = before%jointed%slider
+    strobe%jointed%integral = before%jointed%integral
     strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
     if (.not. ok) strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
   end function resume_jointed

@@ -106,6 +106,7 @@ contains
     associate (machine => moving%machine)
       fits = machine%driven .and. machine%linear .and. machine%n <= lane_coordinates .and. moving%harmonics <= lane_waves .and. &
         moving%section == 0 .and. size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
+      fits = fits .and. .not. allocated(machine%controller) .and. .not. allocated(machine%impulses)
       if (.not. fits) return
       fits = count(machine%joints%kind == joint_friction) <= lane_sliders .and. &
         all(machine%joints%kind == joint_friction .or. machine%joints%kind == joint_contact)

@@ -26,8 +26,9 @@ module part_rows
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
                                                                           contact_parameters%law /= 'kelvin_voigt')
-  character(len=law_length), parameter :: drives(2) = [character(len=law_length) :: 'drive:force', 'drive:motion']
-  character(len=1), parameter :: drive_unit(2) = ['N', 'm']
+  character(len=law_length), parameter :: drives(4) = [character(len=law_length) :: 'drive:force', 'drive:motion', &
+    'drive:controller', 'drive:impulse']
+  character(len=1), parameter :: drive_unit(3) = ['N', 'm', 'm']
   character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
   character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
 
@@ -59,7 +60,9 @@ module part_rows
               'Monjaraz-Tec, Gross, Krack, J. Vib. Acoust. 144 (2022)'), &
     (law_row_t('part', 'contact:'//other_contacts(i)%name, other_contacts(i)%meaning, other_contacts(i)%source), i=1, 12), &
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
-    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', '')]
+    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
+    law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
+    law_row_t('part', drives(4), 'impulse on a body at a time after the start', '')]
 
   !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
   !> drive, one place.
@@ -134,16 +137,23 @@ module part_rows
                      optional=.true., default=none_above), i=1, 3), &
     (parameter_row_t('part', contacts(i), 'lower', 'm', any_value, 'smallest value of second minus first', &
                      optional=.true., default=none_below), i=1, 3), &
-    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 4), &
     (parameter_row_t('part', drives(i), 'frequency', 'rad/s', not_negative, &
-                     'angular frequency; that of the first drive if absent', optional=.true.), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'mean', drive_unit(i), any_value, 'mean', optional=.true.), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'amplitude', drive_unit(i), any_value, 'amplitude', optional=.true.), i=1, 2), &
+                     'angular frequency; that of the first drive if absent', optional=.true.), i=1, 3), &
+    (parameter_row_t('part', drives(i), 'mean', drive_unit(i), any_value, 'mean', optional=.true.), i=1, 3), &
+    (parameter_row_t('part', drives(i), 'amplitude', drive_unit(i), any_value, 'amplitude', optional=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'angle', 'rad', range_t(-1e4_wp, 1e4_wp), &
-                     'added to the angle phi of the drive', optional=.true.), i=1, 2), &
+                     'added to the angle phi of the drive', optional=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'cosine', drive_unit(i), any_value, &
-                     'a_1, a_2, ... of cos(n phi), besides the amplitude', optional=.true., list=.true.), i=1, 2), &
+                     'a_1, a_2, ... of cos(n phi), besides the amplitude', optional=.true., list=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'sine', drive_unit(i), any_value, 'b_1, b_2, ... of sin(n phi)', &
-                     optional=.true., list=.true.), i=1, 2)]
+                     optional=.true., list=.true.), i=1, 3), &
+    parameter_row_t('part', drives(3), 'proportional', 'N/m', not_negative, 'P', optional=.true.), &
+    parameter_row_t('part', drives(3), 'integral', 'N/(ms)', not_negative, 'I', optional=.true.), &
+    parameter_row_t('part', drives(3), 'derivative', 'N s/m', not_negative, 'D', optional=.true.), &
+    parameter_row_t('part', drives(3), 'sample_time', 's', not_negative, &
+                    'time between samples, the force being held in between; 0: continuous', optional=.true.), &
+    parameter_row_t('part', drives(4), 'impulse', 'N s', any_value, 'impulse'), &
+    parameter_row_t('part', drives(4), 'time', 's', not_negative, 'after the start', optional=.true.)]
 
 end module part_rows

@@ -199,17 +199,17 @@ contains
     call merge_friction(machine)
     call check(machine, error)
     if (allocated(error)) return
-    allocate (squares(machine%n), shapes(machine%n, machine%n))
+    allocate (squares(machine%n), shapes(machine%n, machine%n), machine%mobility(machine%n, machine%n))
     call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
     ! Not from the modes, but for rounding the same: what an impulse does not reach has an exact zero.
-    machine%mobility = machine%mass
     do k = 1, machine%n
       call solve(machine%mass, [(merge(1.0_wp, 0.0_wp, i == k), i=1, machine%n)], machine%mobility(:, k), found)
     end do
     machine%mobility = (machine%mobility + transpose(machine%mobility))/2
     machine%driven = machine%frequency > 0
     machine%period = 1
-    if (machine%driven) then
+    if (.not. machine%driven .and. machine%section_time > 0) machine%frequency = two_pi/machine%section_time
+    if (machine%frequency > 0) then
       machine%period = two_pi/machine%frequency
     else if (squares(machine%n) > 0) then
       k = count(squares <= 1e-12_wp*squares(machine%n)) + 1

@@ -49,6 +49,26 @@ module jointed
     real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0
   end type joint_t
 
+  !> A controller that moves a place s = row'q after a reference, its force u = P e + I (integral of e) + D e' acting along the row,
+  !> e = reference - s; the reference runs on from the start. What is continuous of it is part of the structure (`control`).
+  type, public :: controller_t
+    real(wp), allocatable :: row(:)
+    type(wave_t) :: reference
+    real(wp) :: proportional = 0, integral = 0, derivative = 0
+    !> Time between samples [s], between which the force is held; 0: continuous.
+    real(wp) :: sample_time = 0
+    !> Number of the coordinate that is the integral of e, 0 without one.
+    integer :: integral_at = 0
+    !> What the structure has of it: of its stiffness, damping and constant force.
+    real(wp), allocatable :: stiffness(:, :), damping(:, :), load(:)
+  end type controller_t
+
+  !> An impulse along a row [N s] at a time after the start [s].
+  type, public :: impulse_t
+    real(wp), allocatable :: row(:)
+    real(wp) :: amount = 0, time = 0
+  end type impulse_t
+
   type, public :: jointed_t
     !> Number of coordinates.
     integer :: n = 0
@@ -65,6 +85,11 @@ module jointed
     real(wp) :: frequency = 0, period = 0
     !> Something depends on the time.
     logical :: driven = .false.
+    !> Time from section to section of a machine without a drive [s]; 0: its section is an event.
+    real(wp) :: section_time = 0
+    type(controller_t), allocatable :: controller
+    !> In the order of their times.
+    type(impulse_t), allocatable :: impulses(:)
     integer :: together = together_newton
     !> The coordinate that extremes refer to.
     integer :: watched = 1

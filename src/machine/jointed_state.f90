@@ -6,13 +6,14 @@ module jointed_state
   use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
   use friction_law, only: falls, sliding_friction, sliding_slope
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+  use jointed, only: controller_t, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
     most_degrees, most_joints, wave_value
   use kinds, only: wp
   implicit none
   private
 
-  public :: turning_at, joint_motion, joint_force, joint_energy, free_force, key_of, is_held, acts_as_spring, is_curved, is_marched
+  public :: turning_at, joint_motion, joint_force, joint_energy, free_force, running_control, key_of, is_held, acts_as_spring, &
+    is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not
@@ -28,6 +29,10 @@ module jointed_state
     integer :: left(most_joints) = 0
     !> Impacts in a row with next to no time between them; lanes and the event loop hand it to each other.
     integer :: burst = 0
+    !> Time of the section since the start [s]; impulses given, samples of a controller taken, the force that it holds [N] and
+    !> the integral of what it has seen [m s].
+    real(wp) :: clock = 0, control = 0, integral = 0
+    integer :: struck = 0, samples = 0
     !> The motion without a clock has just reached the section.
     logical :: at_section = .false.
   end type jointed_state_t
@@ -207,6 +212,11 @@ contains
     n = machine%n
     force = machine%load - matmul(machine%damping, state%v(:n)) - matmul(machine%stiffness, state%q(:n))
     if (present(rate)) rate = -matmul(machine%damping, a) - matmul(machine%stiffness, state%v(:n))
+    if (allocated(machine%controller)) then
+      call running_control(machine%controller, state, s, u)
+      force = force + s*machine%controller%row
+      if (present(rate)) rate = rate + u*machine%controller%row
+    end if
     do m = 1, size(machine%force, 2)
       force = force + real(machine%force(:, m)*turning(m))
       if (present(rate)) rate = rate - m*machine%frequency*aimag(machine%force(:, m)*turning(m))
@@ -221,5 +231,17 @@ contains
       end associate
     end do
   end subroutine free_force
+
+  !> What a controller holds, and what is in its force because its reference runs on; and the rate [N, N/s].
+  pure subroutine running_control(controller, state, force, rate)
+    type(controller_t), intent(in) :: controller
+    type(jointed_state_t), intent(in) :: state
+    real(wp), intent(out) :: force, rate
+    force = state%control
+    rate = 0
+    if (controller%sample_time > 0) return
+    rate = controller%proportional*controller%reference%rate
+    force = force + rate*(state%clock + state%time)
+  end subroutine running_control
 
 end module jointed_state

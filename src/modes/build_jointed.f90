@@ -4,8 +4,8 @@
 !> From the parts of a case to a jointed structure.
 module build_jointed
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
+  use build_control, only: add_controllers, add_impulses
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
-  use elementary, only: sine_cosine
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
@@ -16,6 +16,7 @@ module build_jointed
   use matrices, only: solve
   use places, only: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of
   use status, only: exit_bad_case
+  use waves, only: wave_of
   implicit none
   private
 
@@ -74,7 +75,11 @@ contains
       if (choices(i)%name /= 'drive:motion') cycle
       call give_motion(machine, trim(machine%names(coordinate(place_of(choices(i))))), wave_of(choices(i)))
     end do
-    call finish(machine, error)
+    associate (given => given_of(choices, coordinate))
+      call add_controllers(choices, rows, given, machine, error)
+      if (.not. allocated(error)) call finish(machine, error)
+      if (.not. allocated(error)) call add_impulses(choices, rows, given, machine, error)
+    end associate
   end subroutine jointed_of
 
   !> Laws of machines of one or two bodies, and effects, have no place here.
@@ -121,7 +126,7 @@ contains
     integer :: i
     real(wp) :: frequency
     do i = 1, size(choices)
-      if (index(choices(i)%name, 'drive:') /= 1) cycle
+      if (index(choices(i)%name, 'drive:') /= 1 .or. choices(i)%name == 'drive:impulse') cycle
       frequency = value_of(choices(i), 'frequency')
       if (.not. frequency > 0) cycle
       if (machine%frequency > 0 .and. abs(frequency - machine%frequency) > 0) then
@@ -132,7 +137,7 @@ contains
       machine%frequency = frequency
     end do
     do i = 1, size(choices)
-      if (index(choices(i)%name, 'drive:') /= 1 .or. machine%frequency > 0) cycle
+      if (index(choices(i)%name, 'drive:') /= 1 .or. choices(i)%name == 'drive:impulse' .or. machine%frequency > 0) cycle
       if (.not. varies(choices(i))) cycle
       call fail(error, exit_bad_case, path_of(choices(i))//'.frequency: missing, allowed more than 0 rad/s')
       return
@@ -144,26 +149,6 @@ contains
     type(law_choice_t), intent(in) :: choice
     varies = abs(value_of(choice, 'amplitude')) > 0 .or. size(list_of(choice, 'cosine')) + size(list_of(choice, 'sine')) > 0
   end function varies
-
-  !> mean + amplitude cos(phi + angle) + sum a_n cos(n phi) + b_n sin(n phi).
-  pure function wave_of(choice) result(wave)
-    type(law_choice_t), intent(in) :: choice
-    type(wave_t) :: wave
-    real(wp) :: sine, cosine
-    integer :: n
-    wave%mean = value_of(choice, 'mean')
-    associate (a => list_of(choice, 'cosine'), b => list_of(choice, 'sine'))
-      allocate (wave%harmonic(max(1, size(a), size(b))), source=(0.0_wp, 0.0_wp))
-      do n = 1, size(a)
-        wave%harmonic(n) = wave%harmonic(n) + a(n)
-      end do
-      do n = 1, size(b)
-        wave%harmonic(n) = wave%harmonic(n) - cmplx(0.0_wp, b(n), wp)
-      end do
-    end associate
-    call sine_cosine(value_of(choice, 'angle'), sine, cosine)
-    wave%harmonic(1) = wave%harmonic(1) + value_of(choice, 'amplitude')*cmplx(cosine, sine, wp)
-  end function wave_of
 
   !> A spring whose force is not linear: its linear part belongs to the structure.
   pure subroutine add_spring(machine, choice, row)

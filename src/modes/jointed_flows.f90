@@ -53,7 +53,7 @@ contains
       moving%drifts = places == 0
     end if
     joints = size(machine%joints)
-    if (.not. machine%driven) then
+    if (.not. machine%driven .and. .not. machine%section_time > 0) then
       moving%section = joints + 1
       moving%machine%joints = [machine%joints, section_of(machine)]
     end if

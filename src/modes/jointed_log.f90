@@ -3,6 +3,7 @@
 
 !> What is written down of the motion of a jointed structure when asked: samples, events, and where the energy went.
 module jointed_log
+  use control, only: active_force, bodies_of
   use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
   use jointed, only: joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
@@ -32,17 +33,31 @@ contains
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
     complex(wp) :: turning(harmonics_of(machine))
+    type(jointed_state_t) :: bodies
     real(wp) :: s, u
     integer :: j
     turning = turning_at(machine%frequency, state%time, size(turning))
-    associate (q => state%q(:machine%n), v => state%v(:machine%n))
+    bodies = bodies_of(machine, state)
+    associate (q => bodies%q(:machine%n), v => bodies%v(:machine%n))
       energy = 0.5_wp*sum(v*matmul(machine%mass, v)) + 0.5_wp*sum(q*matmul(machine%stiffness, q)) - sum(machine%load*q)
+      if (has_continuous_control(machine)) then
+        associate (controller => machine%controller)
+          energy = energy - 0.5_wp*sum(q*matmul(controller%stiffness, q)) + sum(controller%load*q)
+        end associate
+      end if
     end associate
     do j = 1, size(machine%joints)
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       energy = energy + joint_energy(machine%joints(j), state%phase(j), state%slider(j), s)
     end do
   end function energy_of_jointed
+
+  !> Whether the matrices of a machine have a controller in them.
+  pure logical function has_continuous_control(machine)
+    type(jointed_t), intent(in) :: machine
+    has_continuous_control = .false.
+    if (allocated(machine%controller)) has_continuous_control = .not. machine%controller%sample_time > 0
+  end function has_continuous_control
 
   !> The watched coordinate as that of one body.
   pure type(state_t) function watched_state(machine, state) result(body)
@@ -139,11 +154,15 @@ contains
     real(wp), intent(out) :: friction, damping, contact, work
     complex(wp) :: turning(harmonics_of(machine))
     real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate
+    type(jointed_state_t) :: bodies
     integer :: i, j, m
     turning = turning_at(machine%frequency, state%time, size(turning))
-    associate (v => state%v(:machine%n))
+    bodies = bodies_of(machine, state)
+    associate (v => bodies%v(:machine%n))
       damping = sum(v*matmul(machine%damping, v))
       work = 0
+      if (has_continuous_control(machine)) damping = damping - sum(v*matmul(machine%controller%damping, v))
+      if (allocated(machine%controller)) work = sum(v*active_force(machine, state))
       do m = 1, size(machine%force, 2)
         work = work + sum(v*real(machine%force(:, m)*turning(m)))
       end do

@@ -4,6 +4,7 @@
 !> The event loop of a jointed structure: fly to the first guard, make the transition, until a time.
 module jointed_motion
   use constants, only: two_pi
+  use control, only: error_of
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up, &
     turns_round
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
@@ -20,7 +21,11 @@ module jointed_motion
     event_turning_point, log_t, tally_t, word_period
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
     reason_time_over
+<<<<<<< HEAD
   use still_joints, only: stand_still
+=======
+  use timed_actions, only: act, acts_on_time, next_action
+>>>>>>> work/pair-control
   use transition_list, only: note_transition, transition_t, transitions_t
   implicit none
   private
@@ -50,6 +55,7 @@ contains
       state%q(:machine%n) = q(:machine%n)
       state%v(:machine%n) = v(:machine%n)
       if (machine%driven) state%time = modulo(angle, two_pi)/machine%frequency
+      state%clock = -state%time
       turning = turning_at(machine%frequency, state%time, moving%harmonics)
       at_rest = .false.
       touching = 0
@@ -77,6 +83,12 @@ contains
           end select
         end associate
       end do
+      if (allocated(machine%controller)) then
+        ! Its integral grows by what it sees.
+        associate (at => machine%controller%integral_at)
+          if (at > 0) call error_of(machine, state, turning, state%v(at), u)
+        end associate
+      end if
       call settle(moving, state, turning, at_rest, touching, ok)
     end associate
   end subroutine start_jointed
@@ -97,9 +109,9 @@ contains
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
-    real(wp) :: before
+    real(wp) :: before, until
     integer :: count_guards, stalls, holds, key
-    logical :: fallen(most_guards), ok, turned, counts_on
+    logical :: fallen(most_guards), ok, turned, counts_on, timed
     reason = 0
     stalls = 0
     holds = 0
@@ -111,6 +123,7 @@ contains
     watch%top_speed = tally%v_max
     watch%wants_speed = tally%wants_v_max
     watch%wants_margin = moving%drifts
+    timed = acts_on_time(moving%machine)
     associate (machine => moving%machine)
       do while (state%time < time_end .and. .not. state%at_section)
         tally%events = tally%events + 1
@@ -118,14 +131,24 @@ contains
         if (holds >= most_holds) reason = reason_step_failed
         if (reason /= 0) exit
         before = state%time
+        until = time_end
+        if (timed) then
+          until = min(until, next_action(machine, state))
+          if (until <= state%time) then
+            call act(moving, state, ok, log)
+            if (.not. ok) reason = reason_step_failed
+            if (.not. ok) exit
+            cycle
+          end if
+        end if
         key = key_of(machine, state%phase)
         call note_slip(moving, state, key, tally)
         if (ready(moving, key) > 0) then
-          call fly(machine, moving%flows(ready(moving, key)), moving%options, state, time_end, list, count_guards, fallen, watch, &
+          call fly(machine, moving%flows(ready(moving, key)), moving%options, state, until, list, count_guards, fallen, watch, &
                    tally%steps, reason, log)
         else
           if (spare%key /= key) call build_flow(machine, key, with_matrix(moving), spare)
-          call fly(machine, spare, moving%options, state, time_end, list, count_guards, fallen, watch, tally%steps, reason, log)
+          call fly(machine, spare, moving%options, state, until, list, count_guards, fallen, watch, tally%steps, reason, log)
         end if
         if (reason /= 0) exit
         if (state%time > before) state%left = 0
@@ -262,6 +285,7 @@ contains
     call advance_jointed(moving, state, moving%machine%period, tally, reason, log, transitions)
     if (reason /= 0) return
     state%time = 0
+    state%clock = state%clock + moving%machine%period
     if (present(log)) then
       log%origin = log%origin + moving%machine%period
       if (.not. allocated(log%instants)) log%next_sample = 0
@@ -302,6 +326,7 @@ contains
       if (moving%machine%joints(j)%kind == joint_elastic) state%slider(j) = &
         state%slider(j) - moving%machine%joints(j)%offset%rate*state%time
     end do
+    state%clock = state%clock + state%time
     state%time = 0
     call append_word(tally, word_period)
   end subroutine advance_to_turn

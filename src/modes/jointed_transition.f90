@@ -16,7 +16,7 @@ module jointed_transition
   implicit none
   private
 
-  public :: transition, settle, rounding_of_speed
+  public :: transition, settle, rounding_of_speed, judge_friction
 
   !> So many impacts, each within this share of a period after the last, are the end of a chatter of several contacts.
   integer, parameter :: long_burst = 60

@@ -6,7 +6,7 @@
 module mode_question
   use boxed_forces, only: depends_on, solve_boxed
   use jointed, only: joint_contact, joint_friction, jointed_t, most_joints
-  use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t
+  use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t, running_control
   use kinds, only: wp
   implicit none
   private
@@ -98,6 +98,10 @@ contains
     n = machine%n
     parts = abs(force) + abs(machine%load) + matmul(abs(machine%damping), abs(state%v(:n))) &
             + matmul(abs(machine%stiffness), abs(state%q(:n)))
+    if (allocated(machine%controller)) then
+      call running_control(machine%controller, state, s, u)
+      parts = parts + (abs(state%control) + abs(s))*abs(machine%controller%row)
+    end if
     do i = 1, size(turning)
       if (i <= size(machine%force, 2)) parts = parts + abs(real(machine%force(:, i)))*abs(real(turning(i))) &
                                                      + abs(aimag(machine%force(:, i)))*abs(aimag(turning(i)))

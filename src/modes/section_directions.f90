@@ -51,7 +51,14 @@ contains
         depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
       end do
     end do
-    if (.not. machine%driven .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)
+    if (.not. (machine%driven .or. machine%section_time > 0) .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)
+    if (allocated(machine%controller)) then
+      ! What a controller sees tells how its integral grows.
+      associate (at => machine%controller%integral_at)
+        if (at > 0) depends(:, at) = 0
+        if (at > 0) depends(at, :) = 0
+      end associate
+    end if
     call span_of(depends, directions, count_directions)
   end subroutine speeds_of
 
@@ -72,7 +79,10 @@ contains
     real(wp), dimension(size(matrix, 1), size(matrix, 1)) :: depends, vectors
     real(wp) :: values(size(matrix, 1))
     integer :: i
-    call symmetric_eigen(matrix/max(maxval(abs(matrix)), tiny(1.0_wp)), values, vectors)
+    depends = matrix/max(maxval(abs(matrix)), tiny(1.0_wp))
+    ! The integral of a controller is not asked for by what it adds up.
+    if (maxval(abs(depends - transpose(depends))) > 1e-12_wp) depends = (depends + transpose(depends))/2
+    call symmetric_eigen(depends, values, vectors)
     do i = 1, size(matrix, 1)
       depends(:, i) = matmul(vectors, abs(values)*vectors(i, :))
     end do

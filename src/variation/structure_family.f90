@@ -23,6 +23,7 @@ module structure_family
   use pair_as_structure, only: start_as_structure, structure_of_pair
   use status, only: exit_bad_case
   use structure, only: coordinates_of, count_joints, mode_number, phases_in, settle, state_in, structure_of, structure_t
+  use timed_actions, only: acts_on_time
   use transition_list, only: transition_t, transitions_t
   use turn_section, only: longest_return
   use variations, only: neighbourhood_t, period_slope, vary
@@ -48,6 +49,10 @@ contains
     if (trial%n > most_states) why = 'it has too many coordinates'
     if (trial%n > most_equations/2 .and. (.not. moving%machine%linear .or. moving%options%flight == flight_adaptive)) then
       why = 'it has too many coordinates for a law that is not linear'
+    end if
+    if (acts_on_time(moving%machine)) why = 'impulses, or samples of a controller, come at times of their own'
+    if (allocated(moving%machine%controller)) then
+      if (moving%machine%controller%integral_at > 0) why = 'a controller adds up what it sees'
     end if
     do j = 1, count_joints(moving%machine)
       associate (joint => moving%machine%joints(j))
