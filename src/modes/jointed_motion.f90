@@ -21,11 +21,8 @@ module jointed_motion
     event_turning_point, log_t, tally_t, word_period
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
     reason_time_over
-<<<<<<< HEAD
   use still_joints, only: stand_still
-=======
   use timed_actions, only: act, acts_on_time, next_action
->>>>>>> work/pair-control
   use transition_list, only: note_transition, transition_t, transitions_t
   implicit none
   private
