@@ -4,17 +4,18 @@
 !> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
 !> stretch of the springs of elastic friction.
 module jointed_section
-  use jointed, only: joint_contact, joint_elastic
-  use jointed_motion, only: jointed_motion_t, start_jointed
+  use jointed, only: joint_contact, joint_elastic, joint_soft, jointed_t
+  use jointed_motion, only: advance_jointed_period, jointed_motion_t, prepare_jointed, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
+  use motion_state, only: tally_t
   use section_size, only: most_coordinates
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
   public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed, &
-    watched_speed
+    watched_speed, free_jointed, keeps_clear
 
 contains
 
@@ -23,6 +24,59 @@ contains
     type(jointed_motion_t), intent(in) :: moving
     n = size(moving%directions, 2) + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
   end function coordinates_of_jointed
+
+  !> The same structure without stops, if that takes away just the first `places` coordinates, places; else 0.
+  pure subroutine free_jointed(moving, free, places)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_motion_t), intent(out) :: free
+    integer, intent(out) :: places
+    type(jointed_t) :: machine
+    places = 0
+    if (.not. moving%machine%driven .or. .not. any(is_stop(moving%machine%joints%kind))) return
+    machine = moving%machine
+    machine%joints = pack(machine%joints, .not. is_stop(machine%joints%kind))
+    call prepare_jointed(machine, moving%options, free)
+    places = size(moving%directions, 2) - size(free%directions, 2)
+  end subroutine free_jointed
+
+  pure elemental logical function is_stop(kind)
+    integer, intent(in) :: kind
+    is_stop = kind == joint_contact .or. kind == joint_soft
+  end function is_stop
+
+  !> Whether a structure on the section comes no nearer to a stop in the next `periods` than displacements of all places by
+  !> `distance` [m] would close.
+  pure logical function keeps_clear(moving, state, periods, distance)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: periods
+    real(wp), intent(in) :: distance
+    type(jointed_motion_t) :: narrower
+    type(jointed_state_t) :: later
+    type(tally_t) :: tally
+    complex(wp) :: turning(moving%harmonics)
+    real(wp) :: s, u, nearer
+    integer :: j, i, reason
+    keeps_clear = .false.
+    narrower = moving
+    turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
+    do j = 1, size(moving%machine%joints)
+      associate (joint => narrower%machine%joints(j))
+        if (.not. is_stop(joint%kind)) cycle
+        nearer = distance*sum(abs(joint%row))
+        if (joint%upper < huge(1.0_wp)) joint%upper = joint%upper - nearer
+        if (joint%lower > -huge(1.0_wp)) joint%lower = joint%lower + nearer
+        call joint_motion(moving%machine, j, state%q, state%v, state%time, turning, s, u)
+        if (state%phase(j) /= 0 .or. .not. (s < joint%upper .and. s > joint%lower)) return
+      end associate
+    end do
+    later = state
+    do i = 1, periods
+      call advance_jointed_period(narrower, later, tally, reason)
+      if (reason /= 0 .or. tally%impacts > 0) return
+    end do
+    keeps_clear = .true.
+  end function keeps_clear
 
   !> Number of the coordinate that is the velocity of the watched place.
   pure integer function watched_speed(moving) result(at)

@@ -238,7 +238,7 @@ inline vec captors(const size &z, const structure_batch &batch, const vec (&q)[m
 }
 
 // Lanes `there`, where they are to stop: those that need not stop at the section pass; see `stop_or_pass` of
-// lane_stops.hpp.
+// lane_stops.hpp. What does not move may be at rest, which the caller has to be asked.
 template <class size>
 inline void take_stops(const structure_machine &m, const size &z, mask there, bool complete,
                        const structure_batch &batch, structure_group &g) {
@@ -250,13 +250,14 @@ inline void take_stops(const structure_machine &m, const size &z, mask there, bo
     im[k] = g.s.re[k] * b.im[k] + g.s.im[k] * b.re[k];
   }
   place_at(m, z, there, g.s, re, im, b, g.s.q, g.s.v);
-  mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5);
+  const vec moves = moves_of(m, z, g.s);
+  mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5) & (moves > 0.5);
   for (int i = 0; i < z.coordinates; i++)
     passing = passing & (magnitude(g.s.q[i]) <= m.domain);
   passing = complete ? passing : mask{};
   vec captor = any(passing) ? captors(z, batch, g.s.q, g.s.v) : vec{};
   passing = passing & ((captor < 0.5) | (g.c.leaves < 0.5));
-  put(g.c.flights, there, g.c.flights + moves_of(m, z, g.s));
+  put(g.c.flights, there, g.c.flights + moves);
   put(g.s.time, there, pick(section, vec{}, g.c.until));
   put(g.s.left, there, 0);
   put(g.s.burst, there, 0);

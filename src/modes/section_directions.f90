@@ -4,7 +4,7 @@
 !> Positions on which the motion of a jointed structure depends: a structure that nothing ties to the ground may be anywhere.
 module section_directions
   use eigen, only: symmetric_eigen
-  use jointed, only: joint_friction, joint_section, jointed_t, most_degrees
+  use jointed, only: joint_contact, joint_friction, joint_section, joint_soft, jointed_t, most_degrees
   use kinds, only: wp
   implicit none
   private
@@ -16,14 +16,54 @@ module section_directions
 
 contains
 
-  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. What is
-  !> tied to what tells them, not how strongly: machines of one build have the same.
+  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. Where
+  !> fewer count between the stops, those that count only for the stops come first. What is tied to what tells them, not how
+  !> strongly: machines of one build have the same.
   pure subroutine directions_of(machine, directions, count_directions)
     type(jointed_t), intent(in) :: machine
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
+    real(wp) :: between(most_degrees, most_degrees), left(machine%n, machine%n)
+    integer :: i, count_between
+    call directions_with(machine, .true., directions, count_directions)
+    call directions_with(machine, .false., between, count_between)
+    if (count_between == count_directions .or. count_between == 0) return
+    left = 0
+    do i = 1, count_between
+      left(:, i) = between(:machine%n, i)
+    end do
+    call tell_apart(directions(:machine%n, :count_directions), left(:, :count_between))
+  end subroutine directions_of
+
+  !> Turns orthonormal directions so that the last ones are `last`, which lie among them.
+  pure subroutine tell_apart(directions, last)
+    real(wp), intent(inout) :: directions(:, :)
+    real(wp), intent(in) :: last(:, :)
+    real(wp) :: rest(size(directions, 1), size(directions, 2))
+    integer :: i, k, first
+    first = size(directions, 2) - size(last, 2)
+    rest = directions
+    do k = 1, size(last, 2)
+      call take_out(last(:, k), rest)
+    end do
+    do k = 1, first
+      associate (left => norm2(rest, 1))
+        i = findloc(left > much*maxval(left), .true., 1)
+      end associate
+      directions(:, k) = rest(:, i)/norm2(rest(:, i))
+      call take_out(directions(:, k), rest)
+    end do
+    directions(:, first + 1:) = last
+  end subroutine tell_apart
+
+  !> The same, with the stops or without.
+  pure subroutine directions_with(machine, stops, directions, count_directions)
+    type(jointed_t), intent(in) :: machine
+    logical, intent(in) :: stops
+    real(wp), intent(out) :: directions(most_degrees, most_degrees)
+    integer, intent(out) :: count_directions
     real(wp), dimension(machine%n, machine%n) :: depends, vectors
-    real(wp) :: values(machine%n)
+    real(wp) :: values(machine%n), least
     integer :: i, j, n
     n = machine%n
     ! Without its signs: a negative stiffness would cancel what a joint adds.
@@ -32,23 +72,25 @@ contains
       depends(:, i) = matmul(vectors, abs(values)*vectors(i, :))
     end do
     do j = 1, size(machine%joints)
-      if (machine%joints(j)%kind == joint_friction .or. machine%joints(j)%kind == joint_section) cycle
+      if (any(machine%joints(j)%kind == [joint_friction, joint_section])) cycle
+      if (.not. stops .and. any(machine%joints(j)%kind == [joint_contact, joint_soft])) cycle
       do i = 1, n
         depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
       end do
     end do
     call symmetric_eigen(depends, values, vectors)
-    count_directions = count(abs(values) > 1e-12_wp*maxval(abs(values)))
+    least = 1e-12_wp*max(maxval(abs(values)), tiny(1.0_wp))
+    count_directions = count(abs(values) > least)
     directions = 0
     if (count_directions == n) then
       do i = 1, n
         directions(i, i) = 1
       end do
     else
-      vectors(:, :n - count_directions) = vectors(:, pack([(i, i=1, n)], .not. abs(values) > 1e-12_wp*maxval(abs(values))))
+      vectors(:, :n - count_directions) = vectors(:, pack([(i, i=1, n)], .not. abs(values) > least))
       call complement_of(vectors(:, :n - count_directions), directions(:n, :count_directions))
     end if
-  end subroutine directions_of
+  end subroutine directions_with
 
   !> An orthonormal basis of what is across some orthonormal columns: unit vectors less those and one another, at each step the
   !> first of which much is left.
