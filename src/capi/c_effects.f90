@@ -57,7 +57,7 @@ contains
         call to_c(trim(law_rows(find_law(effect_family, trim(row%law)))%meaning), meaning, meaning_size)
         call to_c(trim(row%name), parameter, parameter_size)
         call to_c(trim(row%unit), unit, unit_size)
-        numbers = [row%default, row%lower, row%upper, merge(1.0_wp, 0.0_wp, row%optional)]
+        numbers = [row%default, row%range%lower, row%range%upper, merge(1.0_wp, 0.0_wp, row%optional)]
       end associate
     end if
     code = answer(error, message, message_size)

@@ -63,7 +63,7 @@ contains
   !> Bounds and unit of a row of the law table.
   pure type(bounds_t) function row_bounds(row)
     type(parameter_row_t), intent(in) :: row
-    row_bounds = bounds_t(lower=row%lower, upper=row%upper, lower_open=row%lower_open, unit=row%unit)
+    row_bounds = bounds_t(lower=row%range%lower, upper=row%range%upper, lower_open=row%range%lower_open, unit=row%unit)
   end function row_bounds
 
   !> Bounds and unit of the parameter `path`; `found` is false if there is none.

@@ -9,12 +9,13 @@ module part_reader
   use case_values, only: take_real, take_reals, take_text
   use drive_record, only: read_record
   use kinds, only: wp
-  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, list_of, parameter_row_t, parameters, &
+  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, set_value, value_of
+  use part_names, only: check_columns, check_names, ground, names_of
   use structure_reader, only: read_structure
   use suggest, only: nearest_word
-  use text, only: join, number_in, replace_all, starts_with, to_text
-  use toml_bindings, only: toml_array, toml_string, toml_table
+  use text, only: join, number_in, to_text
+  use toml_bindings, only: toml_array, toml_string
   implicit none
   private
 
@@ -23,7 +24,6 @@ module part_reader
   !> Tables of parts, in the order in which they are kept; laws where a table gives none.
   character(len=8), parameter :: kinds_of_parts(5) = ['body    ', 'spring  ', 'friction', 'contact ', 'drive   ']
   character(len=8), parameter :: default_law(5) = ['mass    ', 'linear  ', 'coulomb ', '        ', '        ']
-  character(len=*), parameter :: ground = 'ground'
   !> Names of the places between which joints act: bodies, then points of structures.
   type :: bodies_t
     character(len=label_length), allocatable :: names(:)
@@ -45,30 +45,6 @@ contains
     end do
     if (size(names_of(source, 'structure')) > 0) has_parts = .true.
   end function has_parts
-
-  !> Names of the tables [kind.NAME], in the order of the text.
-  pure function names_of(source, kind) result(names)
-    type(case_source_t), intent(in) :: source
-    character(len=*), intent(in) :: kind
-    character(len=label_length), allocatable :: names(:)
-    character(len=label_length) :: found(size(source%entries)), name
-    integer :: i, last, count_names
-    count_names = 0
-    do i = 1, size(source%entries)
-      associate (path => source%entries(i)%entry%path)
-        if (.not. starts_with(path, kind//'.')) cycle
-        ! A key below a table that an override alone makes speaks for it, too.
-        last = scan(path(len(kind) + 2:), '.[') - 1
-        if (last < 0 .and. source%entries(i)%entry%kind /= toml_table) cycle
-        if (last < 0) last = len(path) - len(kind) - 1
-        name = path(len(kind) + 2:len(kind) + 1 + last)
-        if (any(found(:count_names) == name)) cycle
-        count_names = count_names + 1
-        found(count_names) = name
-      end associate
-    end do
-    names = found(:count_names)
-  end function names_of
 
   !> The laws of the five families, none but 'structure', then every part.
   subroutine read_parts(source, choices)
@@ -112,77 +88,6 @@ contains
       choices = [choices, structures]
     end do
   end subroutine read_parts
-
-  !> Names that can be told apart in paths and messages.
-  subroutine check_names(source, kind, names)
-    type(case_source_t), intent(inout) :: source
-    character(len=*), intent(in) :: kind
-    character(len=label_length), intent(in) :: names(:)
-    integer :: i
-    do i = 1, size(names)
-      if (verify(trim(names(i)), 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-') > 0) then
-        call report(source, kind//'.'//trim(names(i)), 'found the name "'//trim(names(i))//'", allowed letters, digits, _ and -')
-      else if (kind == 'body' .and. names(i) == ground) then
-        call report(source, kind//'.'//trim(names(i)), 'found a body with the name "ground", allowed any other: it is what '// &
-                    'stands still')
-      end if
-    end do
-  end subroutine check_names
-
-  !> Columns of results are named after the places, and after the coordinates of structures, with _ for a dot.
-  subroutine check_columns(source, names, structures)
-    type(case_source_t), intent(inout) :: source
-    character(len=label_length), intent(in) :: names(:)
-    type(law_choice_t), intent(in) :: structures(:)
-    integer :: i, k
-    do i = 1, size(names)
-      do k = 1, i - 1
-        if (column_of(names(i)) /= column_of(names(k))) cycle
-        call report(source, 'structure.'//names(i)(:index(names(i), '.') - 1), 'found the point "'//trim(names(i))// &
-                    '" and a "'//trim(names(k))//'", allowed names that differ in more than a dot')
-      end do
-    end do
-    do i = 1, size(structures)
-      if (index(structures(i)%name, 'structure:') /= 1) cycle
-      do k = 1, size(list_of(structures(i), 'x0'))
-        call check_coordinate(column_of(trim(structures(i)%label)//'.'//to_text(k)), trim(structures(i)%label), k)
-      end do
-    end do
-
-  contains
-
-    pure function column_of(name) result(column)
-      character(len=*), intent(in) :: name
-      character(len=:), allocatable :: column
-      column = replace_all(trim(name), '.', '_')
-    end function column_of
-
-    !> No place has the column of coordinate number `number` of a structure.
-    subroutine check_coordinate(column, structure, number)
-      character(len=*), intent(in) :: column, structure
-      integer, intent(in) :: number
-      integer :: place, dot
-      do place = 1, size(names)
-        if (column_of(names(place)) /= column) cycle
-        dot = index(names(place), '.')
-        if (dot == 0) then
-          call report(source, 'body.'//trim(names(place)), 'found a body'//also(structure, number))
-        else
-          call report(source, 'structure.'//names(place)(:dot - 1)//'.point.'//trim(names(place)(dot + 1:)), &
-                      'found a point'//also(structure, number))
-        end if
-      end do
-    end subroutine check_coordinate
-
-    pure function also(structure, number) result(text)
-      character(len=*), intent(in) :: structure
-      integer, intent(in) :: number
-      character(len=:), allocatable :: text
-      text = ' whose columns in results are those of coordinate '//to_text(number)//' of [structure.'//structure// &
-             '], allowed another name'
-    end function also
-
-  end subroutine check_columns
 
   !> The body or point that the start and the results refer to: the first, unless [watch] names another.
   subroutine read_watch(source, bodies, watched)

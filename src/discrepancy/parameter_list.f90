@@ -39,8 +39,8 @@ contains
       if (laws(i)%name == 'measured_force') cycle
       do j = 1, size(rows)
         if (is_hidden(rows(j))) cycle
-        one = parameter_t(unit=rows(j)%unit, lower=rows(j)%lower, upper=rows(j)%upper, lower_open=rows(j)%lower_open, &
-                          law=i, row=j)
+        one = parameter_t(unit=rows(j)%unit, lower=rows(j)%range%lower, upper=rows(j)%range%upper, &
+                          lower_open=rows(j)%range%lower_open, law=i, row=j)
         one%path = path_of(laws(i))//'.'//rows(j)%name
         do k = 1, size(laws(i)%parameters(j)%values)
           one%value = laws(i)%parameters(j)%values(k)

@@ -5,10 +5,11 @@
 module audit
   use kinds, only: int64, wp
   use random, only: uniform
+  use trajectory, only: outcome_t
   implicit none
   private
 
-  public :: sampled
+  public :: note_deviation, sampled
 
   !> What the rerun of the sample showed.
   type, public :: audit_t
@@ -47,5 +48,15 @@ contains
       left = left/shape(k)
     end do
   end function sampled
+
+  !> Notes how a point differs from its run in quadruple precision, `results` as `run_reference` gives them.
+  pure subroutine note_deviation(outcome, results, audit)
+    type(outcome_t), intent(in) :: outcome
+    real(wp), intent(in) :: results(6)
+    type(audit_t), intent(inout) :: audit
+    if (outcome%impacts /= nint(results(6), int64)) audit%impact_count_differs = audit%impact_count_differs + 1
+    audit%x_deviation = max(audit%x_deviation, abs(outcome%x - results(4)))
+    audit%v_deviation = max(audit%v_deviation, abs(outcome%v - results(5)))
+  end subroutine note_deviation
 
 end module audit

@@ -52,21 +52,11 @@ contains
     type(checkpoint_t) :: kept
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
-    integer :: axes(2), i, slices
+    integer :: i
     call open_map_session(command, session, reader)
     grid = grid_of(session%the_case, session%the_case%axes)
-    call check_axes(command%path, grid, axes, error)
-    if (.not. allocated(error)) call check_slices(grid, span_of(session%the_case), error)
-    call session%stop_if(error)
+    call open_planes(session, reader, grid, planes)
     path = result_path(command)
-    slices = product(pack(grid%shape, [(.not. any(axes == i), i=1, size(grid%shape))]))
-    allocate (planes(slices), names(slices))
-    do i = 1, size(planes)
-      call open_plane(grid, axes, i - 1, planes(i))
-      call read_labels(reader, grid%shape, axes, planes(i)%index, planes(i)%labels, planes(i)%inferred, error)
-      call session%stop_if(error)
-      call crossed_edges(planes(i)%labels, planes(i)%edges)
-    end do
     if (command%validate .or. command%dry_run) then
       call session%journal%line('plan', command%path//': '//to_text(sum([(size(planes(i)%edges), i=1, size(planes))]))// &
                                 ' edges between points of different labels')
@@ -77,6 +67,7 @@ contains
     if (.not. allocated(error)) call kept%open(session, path, work_identity(session, planes, catalogues), &
                                                'following the boundary', error)
     call session%stop_if(error)
+    allocate (names(size(planes)))
     do i = 1, size(planes)
       associate (slice => point_slice(grid, planes(i)%index))
         call open_journey(grid, span_of(session%the_case), slice, describe_regime, planes(i)%journey, error)
@@ -105,6 +96,26 @@ contains
     call session%journal%line('written', 'wrote '//path)
     call session%end_with(exit_done)
   end subroutine run_boundary
+
+  !> The planes of a map, one for each value of its other axes: their labels, and the edges between neighbours of different ones.
+  subroutine open_planes(session, reader, grid, planes)
+    type(session_t), intent(inout) :: session
+    type(reader_t), intent(inout) :: reader
+    type(grid_t), intent(in) :: grid
+    type(plane_t), allocatable, intent(out) :: planes(:)
+    type(error_t), allocatable :: error
+    integer :: axes(2), i
+    call check_axes(session%command%path, grid, axes, error)
+    if (.not. allocated(error)) call check_slices(grid, span_of(session%the_case), error)
+    call session%stop_if(error)
+    allocate (planes(product(pack(grid%shape, [(.not. any(axes == i), i=1, size(grid%shape))]))))
+    do i = 1, size(planes)
+      call open_plane(grid, axes, i - 1, planes(i))
+      call read_labels(reader, grid%shape, axes, planes(i)%index, planes(i)%labels, planes(i)%inferred, error)
+      call session%stop_if(error)
+      call crossed_edges(planes(i)%labels, planes(i)%edges)
+    end do
+  end subroutine open_planes
 
   !> What decides the curves: the case of the map with its axes, its labels and attractors, how far sets are grown, and the program.
   function work_identity(session, planes, catalogues) result(identity)

@@ -132,17 +132,8 @@ contains
     integer(int64), intent(in) :: counts(:)
     type(attractor_t), allocatable :: all_of_them(:)
     integer, allocatable :: slice(:)
-    integer :: i, k, position
-    position = sum([(size(catalogues(i)%attractors), i=1, size(catalogues))])
-    allocate (all_of_them(position), slice(position))
-    position = 0
-    do i = 1, size(catalogues)
-      do k = 1, size(catalogues(i)%attractors)
-        position = position + 1
-        all_of_them(position) = catalogues(i)%attractors(k)
-        slice(position) = i - 1
-      end do
-    end do
+    integer :: i
+    call put_together(catalogues, all_of_them, slice)
     if (size(all_of_them) == 0) return
     call schema%add_dimension('entry', size(all_of_them, kind=int64))
     call add('slice', type_int32, '1', 'slice of the parameter axes, C order from 0', real(slice, wp))
@@ -188,6 +179,24 @@ contains
     end subroutine add
 
   end subroutine add_catalogue
+
+  !> The attractors of all slices in one list, and the slice of each, from 0.
+  subroutine put_together(catalogues, attractors, slice)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    type(attractor_t), allocatable, intent(out) :: attractors(:)
+    integer, allocatable, intent(out) :: slice(:)
+    integer :: i, k, position
+    position = sum([(size(catalogues(i)%attractors), i=1, size(catalogues))])
+    allocate (attractors(position), slice(position))
+    position = 0
+    do i = 1, size(catalogues)
+      do k = 1, size(catalogues(i)%attractors)
+        position = position + 1
+        attractors(position) = catalogues(i)%attractors(k)
+        slice(position) = i - 1
+      end do
+    end do
+  end subroutine put_together
 
   !> All multipliers and all section points of the cycles of a catalogue.
   subroutine add_cycles(schema, entries)

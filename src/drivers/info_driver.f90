@@ -3,9 +3,9 @@
 
 !> `separatrix info`: what is in a file.
 module info_driver
-  use attractors, only: kind_chaotic, kind_names, kind_not_known, last_kind, regime_names
+  use attractors, only: regime_names
   use errors, only: error_t, fail
-  use event_words, only: word_text
+  use info_catalogue, only: add_catalogue
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
@@ -13,7 +13,6 @@ module info_driver
   use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
   use text, only: interval_text, join, to_text
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -27,9 +26,6 @@ module info_driver
     'wall_seconds', 'case_identity', 'command_line']
   character(len=*), parameter :: numeric(5) = [character(len=14) :: 'format_version', 'complete', 'ranks', 'host_count', &
     'wall_seconds']
-  character(len=*), parameter :: catalogue_columns(8) = [character(len=18) :: 'attractor', 'slice', 'regime', &
-    'period', 'event_word', 'amplitude', 'impacts_per_period', 'count']
-
 contains
 
   !> Prints the content of a file; a working file can be looked at as well.
@@ -252,100 +248,6 @@ contains
     end function number_text
 
   end subroutine add_refinement
-
-  subroutine add_catalogue(reader, json, body, error)
-    type(reader_t), intent(in) :: reader
-    logical, intent(in) :: json
-    character(len=:), allocatable, intent(inout) :: body
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: table(:, :), entry_kinds(:), rotations(:)
-    character(len=:), allocatable :: line
-    integer :: i, k
-    integer(int64) :: kind
-    if (.not. reader%has('/catalogue/attractor')) return
-    call reader%read_columns([('/catalogue/'//catalogue_columns(k), k=1, size(catalogue_columns))], table, error)
-    ! Older files do not have it.
-    if (.not. allocated(error)) then
-      if (reader%has('/catalogue/kind')) call reader%read_values('/catalogue/kind', entry_kinds, error)
-    end if
-    ! Of an angle.
-    if (.not. allocated(error)) then
-      if (reader%has('/catalogue/rotation_number')) call reader%read_values('/catalogue/rotation_number', rotations, error)
-    end if
-    if (allocated(error)) return
-    if (allocated(rotations)) then
-      if (size(rotations) /= size(table, 1)) deallocate (rotations)
-    end if
-    if (allocated(entry_kinds)) then
-      if (size(entry_kinds) /= size(table, 1)) deallocate (entry_kinds)
-    end if
-    if (json) body = body//', "catalogue": ['
-    if (.not. json) body = body//new_line('a')//'  catalogue (R, L: impact at upper, lower barrier; S: stick; '// &
-      'C, D: chatter; . : end of a period):'
-    do i = 1, size(table, 1)
-      line = ''
-      do k = 1, size(catalogue_columns)
-        if (len(line) > 0) line = line//', '
-        if (json) line = line//json_text(trim(catalogue_columns(k)))//': '
-        if (.not. json) line = line//trim(catalogue_columns(k))//' '
-        select case (catalogue_columns(k))
-        case ('regime')
-          line = line//quoted(code_name(table(i, k)))
-        case ('event_word')
-          line = line//quoted(word_text(whole(table(i, k))))
-        case ('amplitude', 'impacts_per_period')
-          line = line//to_text(table(i, k), 6)
-        case default
-          line = line//to_text(whole(table(i, k)))
-        end select
-      end do
-      if (allocated(rotations)) then
-        if (json) line = line//', "rotation_number": '
-        if (json .and. ieee_is_nan(rotations(i))) line = line//'null'
-        if (json .and. .not. ieee_is_nan(rotations(i))) line = line//to_text(rotations(i))
-        if (.not. json .and. abs(rotations(i)) > 0) line = line//', rotation_number '//to_text(rotations(i), 4)
-      end if
-      if (allocated(entry_kinds)) then
-        kind = whole(entry_kinds(i))
-        if (kind >= 1 .and. kind <= last_kind) then
-          if (json) line = line//', "kind": '//json_text(trim(kind_names(kind)))
-          if (.not. json .and. kind == kind_chaotic) line = line//', chaotic'
-          if (.not. json .and. kind == kind_not_known) line = line//', not known to be periodic: perhaps a long transient'
-        end if
-      end if
-      if (json) body = body//trim(merge(', ', '  ', i > 1))//'{'//line//'}'
-      if (.not. json) body = body//new_line('a')//'    '//line
-    end do
-    if (json) body = body//']'
-
-  contains
-
-    !> The name of a regime, or what stands in its place in a file that is not sound.
-    function code_name(code) result(name)
-      real(wp), intent(in) :: code
-      character(len=:), allocatable :: name
-      if (code >= lbound(regime_names, 1) .and. code <= ubound(regime_names, 1)) then
-        name = trim(regime_names(nint(code)))
-      else
-        name = 'unknown'
-      end if
-    end function code_name
-
-    !> The nearest integer; 0 for what has none.
-    pure integer(int64) function whole(value)
-      real(wp), intent(in) :: value
-      whole = 0
-      if (abs(value) < 2.0_wp**62) whole = nint(value, int64)
-    end function whole
-
-    function quoted(text)
-      character(len=*), intent(in) :: text
-      character(len=:), allocatable :: quoted
-      quoted = text
-      if (json) quoted = json_text(text)
-    end function quoted
-
-  end subroutine add_catalogue
 
   subroutine add_limits(reader, json, body, error)
     type(reader_t), intent(in) :: reader

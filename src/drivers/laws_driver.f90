@@ -99,8 +99,8 @@ contains
       do i = 1, size(rows)
         if (i > 1) list = list//', '
         list = list//'{"name": '//json_text(trim(rows(i)%name))//', "unit": '//json_text(trim(rows(i)%unit))// &
-          ', "lower": '//bound_json(rows(i)%lower)//', "upper": '//bound_json(rows(i)%upper)// &
-          ', "lower_open": '//to_text(rows(i)%lower_open)//', "list": '//to_text(rows(i)%list)// &
+          ', "lower": '//bound_json(rows(i)%range%lower)//', "upper": '//bound_json(rows(i)%range%upper)// &
+          ', "lower_open": '//to_text(rows(i)%range%lower_open)//', "list": '//to_text(rows(i)%list)// &
           ', "optional": '//to_text(rows(i)%optional)//', "default": '//default_json(rows(i))// &
           ', "meaning": '//json_text(trim(rows(i)%meaning))//'}'
       end do
@@ -123,18 +123,20 @@ contains
     type(parameter_row_t), intent(in) :: row
     character(len=:), allocatable :: text
     text = 'null'
-    if (row%optional .and. row%default >= row%lower .and. abs(row%default) < huge(row%default)) text = to_text(row%default)
+    if (row%optional .and. row%default >= row%range%lower .and. abs(row%default) < huge(row%default)) text = to_text(row%default)
   end function default_json
 
   pure function range_text(row) result(text)
     type(parameter_row_t), intent(in) :: row
     character(len=:), allocatable :: text
     text = ''
-    if (row%lower > -huge(row%lower)) text = trim(merge('> ', '>=', row%lower_open))//' '//to_text(row%lower)
-    if (row%upper < huge(row%upper)) then
-      if (len(text) > 0) text = text//', '
-      text = text//'<= '//to_text(row%upper)
-    end if
+    associate (range => row%range)
+      if (range%lower > -huge(range%lower)) text = trim(merge('> ', '>=', range%lower_open))//' '//to_text(range%lower)
+      if (range%upper < huge(range%upper)) then
+        if (len(text) > 0) text = text//', '
+        text = text//'<= '//to_text(range%upper)
+      end if
+    end associate
     if (len(text) == 0) text = 'any'
     if (row%list) text = 'list, each '//text
   end function range_text
@@ -145,7 +147,7 @@ contains
     text = ''
     if (.not. row%optional) return
     text = ' (optional'
-    if (row%default >= row%lower .and. abs(row%default) < huge(row%default)) text = text//', default '//to_text(row%default)
+    if (row%default >= row%range%lower .and. abs(row%default) < huge(row%default)) text = text//', default '//to_text(row%default)
     text = text//')'
   end function default_text
 

@@ -6,38 +6,35 @@
 module verify_driver
   use angle_units, only: unit_of
   use attractors, only: regime_names
-  use audit, only: audit_t, sampled
+  use audit, only: audit_t, note_deviation, sampled
   use axis, only: axis_t
   use basin, only: basin_points, catalogue_t, slice_cache_t
   use boundary_audit, only: audit_boundary, check_boundary
   use case_reader, only: load_case_text
-  use case_setup, only: grid_of, options_of, span_of
+  use case_setup, only: grid_of, span_of
   use case_type, only: case_t
   use command_line, only: command_t
   use errors, only: error_t, fail
-  use grid, only: grid_t, point_laws, point_slice, point_start, slice_laws
+  use grid, only: grid_t, point_laws, point_slice, point_start
   use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64, real32, wp
-  use law_table, only: change_parameter
+  use list_audit, only: audit_points
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
   use point_columns, only: point_table, point_values
-  use point_list, only: point_list_t
-  use points_driver, only: open_list_journey, read_further
   use reference, only: run_reference
   use refinement, only: origin_contradicted
   use restoring_law, only: position_is_angle
   use serial_team, only: serial_team_t
-  use span_check, only: check_periods
   use statistics, only: share_upper_limit
   use status, only: exit_io, exit_uncertain, reason_settled
   use stored_map, only: restore_catalogues
   use sweep_driver, only: sweep_axes
   use text, only: to_text
   use trajectories, only: journey_t, run_trajectories
-  use trajectory, only: outcome_t, span_t
+  use trajectory, only: outcome_t
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -268,78 +265,6 @@ contains
     end if
     if (nint(values(3)) == reason_settled) call note_deviation(outcome(1), results(:, 1), audit)
   end subroutine compare_with_reference
-
-  subroutine note_deviation(outcome, results, audit)
-    type(outcome_t), intent(in) :: outcome
-    real(wp), intent(in) :: results(6)
-    type(audit_t), intent(inout) :: audit
-    if (outcome%impacts /= nint(results(6), int64)) audit%impact_count_differs = audit%impact_count_differs + 1
-    audit%x_deviation = max(audit%x_deviation, abs(outcome%x - results(4)))
-    audit%v_deviation = max(audit%v_deviation, abs(outcome%v - results(5)))
-  end subroutine note_deviation
-
-  !> Reruns random points of a list.
-  subroutine audit_points(reader, the_case, sample, seed, audit, error)
-    type(reader_t), intent(in) :: reader
-    type(case_t), intent(in) :: the_case
-    integer, intent(in) :: sample, seed
-    type(audit_t), intent(inout) :: audit
-    type(error_t), allocatable, intent(out) :: error
-    type(axis_t) :: axes(3)
-    type(grid_t) :: grid
-    type(journey_t) :: journey
-    type(catalogue_t) :: none
-    type(outcome_t) :: outcomes(1)
-    type(case_t) :: own
-    type(point_list_t) :: list
-    real(wp), allocatable :: table(:, :)
-    real(wp) :: results(6, 1), start(3, 1)
-    character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
-    integer :: i, k, place(1), point
-    logical :: known
-    call reader%read_columns('/'//names, table, error)
-    if (.not. allocated(error)) list%x0 = table(:, 1)
-    if (.not. allocated(error)) call read_further(reader, list, error)
-    if (allocated(error)) return
-    allocate (none%attractors(0))
-    audit%whole = size(table, 1) <= sample
-    do i = 1, min(sample, size(table, 1))
-      place = sampled([size(table, 1)], audit%whole, seed, i)
-      point = place(1)
-      if (.not. all(abs(table(point, :3)) <= huge(1.0_wp))) then
-        call fail(error, exit_io, "'"//reader%path//"', point "//to_text(point - 1)//': the start is not finite')
-        return
-      end if
-      axes(1) = axis_t('drive.ratio', '1', [table(point, 3)])
-      own = the_case
-      do k = 1, size(list%names)
-        call change_parameter(own%laws, list%names(k), list%further(k, point), known)
-      end do
-      grid = grid_of(own, axes(:merge(1, 0, table(point, 3) > 0)))
-      call open_list_journey(grid, the_case, journey, error)
-      if (.not. allocated(error)) call check_periods(journey%span, journey%moving%machine%period, error)
-      if (allocated(error)) then
-        error%code = exit_io
-        error%message = "'"//reader%path//"', point "//to_text(point - 1)//': '//error%message
-        return
-      end if
-      start(:, 1) = [table(point, 1), table(point, 2), grid%start(3)]
-      call run_trajectories(journey, none%attractors, start, outcomes)
-      associate (outcome => outcomes(1))
-        audit%points = audit%points + 1
-        if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &
-            .or. outcome%impacts /= nint(table(point, 6)) .or. outcome%reason /= nint(table(point, 7))) then
-          audit%differing = audit%differing + 1
-          if (audit%differing == 1) audit%first_difference = 'point '//to_text(point - 1)
-        end if
-      end associate
-      call run_reference(slice_laws(grid, 0_int64), options_of(the_case), journey%span, none%attractors, start, results, error)
-      if (allocated(error)) return
-      if (nint(results(3, 1)) /= outcomes(1)%features%regime) audit%flips = audit%flips + 1
-      call note_deviation(outcomes(1), results(:, 1), audit)
-    end do
-    audit%changes = audit%flips
-  end subroutine audit_points
 
   subroutine report(command, kind, datasets, points, audit)
     type(command_t), intent(in) :: command

@@ -121,12 +121,9 @@ contains
     real(wp), intent(in) :: surface(:)
     type(path_t), intent(inout) :: path
     real(wp), dimension(most_degrees) :: q, v, place, speed, push, push_rate
-    real(wp) :: held_at(most_joints), held_rate(most_joints), b0, b1, w
-    complex(wp) :: forced, forced_rate, lambda
-    integer :: n, m, i, k, f, d, r, j, free
+    real(wp) :: w
+    integer :: n, m, free
     n = machine%n
-    f = flow%flexible
-    d = flow%damped
     free = size(flow%basis, 2)
     ! What is left of the state without the periodic response.
     q(:n) = state%q(:n)
@@ -137,15 +134,9 @@ contains
       v(:n) = v(:n) + w*aimag(flow%response(:, m)*path%turning(m))
     end do
     path%powers(:n, :) = 0
+    call carry_along(machine, flow, q, surface, path)
     push(:n) = path%force(:n)
     push_rate(:n) = path%force_rate(:n)
-    do i = 1, size(flow%independent)
-      j = flow%held(flow%independent(i))
-      held_at(i) = sum(machine%joints(j)%row*q(:n))
-      held_rate(i) = surface(j)
-      path%powers(:n, 0) = path%powers(:n, 0) + flow%carried(:, i)*held_at(i)
-      path%powers(:n, 1) = path%powers(:n, 1) + flow%carried(:, i)*held_rate(i)
-    end do
     push(:n) = push(:n) - matmul(flow%stiffness, path%powers(:n, 0)) - matmul(flow%damping, path%powers(:n, 1))
     push_rate(:n) = push_rate(:n) - matmul(flow%stiffness, path%powers(:n, 1))
     ! In basis coordinates.
@@ -155,13 +146,46 @@ contains
     speed(:free) = matmul(transpose(flow%basis), speed(:n))
     push(:free) = matmul(transpose(flow%basis), push(:n))
     push_rate(:free) = matmul(transpose(flow%basis), push_rate(:n))
+    call begin_exponentials(flow, n, speed, push, push_rate, place, path)
+    call begin_rigid(flow, n, place, speed, push, push_rate, path)
+  end subroutine begin_modal
+
+  !> What constraints do to all coordinates, `q` [m] being the start.
+  pure subroutine carry_along(machine, flow, q, surface, path)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: q(:), surface(:)
+    type(path_t), intent(inout) :: path
+    real(wp) :: held_at, held_rate
+    integer :: n, i, j
+    n = machine%n
+    do i = 1, size(flow%independent)
+      j = flow%held(flow%independent(i))
+      held_at = sum(machine%joints(j)%row*q(:n))
+      held_rate = surface(j)
+      path%powers(:n, 0) = path%powers(:n, 0) + flow%carried(:, i)*held_at
+      path%powers(:n, 1) = path%powers(:n, 1) + flow%carried(:, i)*held_rate
+    end do
+  end subroutine carry_along
+
+  !> Amplitudes of the exponentials, and the steady part of what they answer to a push that grows steadily; `place` is less
+  !> what they carry of the damped rigid coordinates. All in basis coordinates.
+  pure subroutine begin_exponentials(flow, n, speed, push, push_rate, place, path)
+    type(mode_flow_t), intent(in) :: flow
+    integer, intent(in) :: n
+    real(wp), intent(in) :: speed(:), push(:), push_rate(:)
+    real(wp), intent(inout) :: place(:)
+    type(path_t), intent(inout) :: path
+    complex(wp) :: forced, forced_rate, lambda
+    integer :: i, k, f, d
+    f = flow%flexible
+    d = flow%damped
     do k = 1, size(flow%exponent)
       lambda = flow%exponent(k)
       path%amplitude(k) = sum(flow%left(k, :f)*flow%frequency*place(:f)) + sum(flow%left(k, f + 1:)*speed(:f + d))
       forced = -sum(flow%left(k, f + 1:)*push(:f + d))/lambda
       forced_rate = -sum(flow%left(k, f + 1:)*push_rate(:f + d))/lambda
       forced = forced + forced_rate/lambda
-      ! Damped rigid coordinates: what the exponentials carry of them, and what drives the rest.
       do i = 1, d
         place(f + i) = place(f + i) - real(flow%drift(i, k)*path%amplitude(k))
       end do
@@ -169,6 +193,18 @@ contains
       path%powers(:n, 0) = path%powers(:n, 0) + real(flow%shape(:, k)*forced)
       path%powers(:n, 1) = path%powers(:n, 1) + real(flow%shape(:, k)*forced_rate)
     end do
+  end subroutine begin_exponentials
+
+  !> Rigid coordinates: with damping, of which the exponentials have carried their part, then without.
+  pure subroutine begin_rigid(flow, n, place, speed, push, push_rate, path)
+    type(mode_flow_t), intent(in) :: flow
+    integer, intent(in) :: n
+    real(wp), intent(in) :: place(:), speed(:), push(:), push_rate(:)
+    type(path_t), intent(inout) :: path
+    real(wp) :: b0, b1
+    integer :: i, k, r, f, d
+    f = flow%flexible
+    d = flow%damped
     do i = 1, d
       b0 = 0
       b1 = 0
@@ -180,13 +216,13 @@ contains
       path%powers(:n, 1) = path%powers(:n, 1) + flow%basis(:, f + i)*b0
       path%powers(:n, 2) = path%powers(:n, 2) + flow%basis(:, f + i)*(b1/2)
     end do
-    do r = f + d + 1, free
+    do r = f + d + 1, size(flow%basis, 2)
       path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, r)*place(r)
       path%powers(:n, 1) = path%powers(:n, 1) + flow%basis(:, r)*speed(r)
       path%powers(:n, 2) = path%powers(:n, 2) + flow%basis(:, r)*(push(r)/2)
       path%powers(:n, 3) = path%powers(:n, 3) + flow%basis(:, r)*(push_rate(r)/6)
     end do
-  end subroutine begin_modal
+  end subroutine begin_rigid
 
   !> The unknowns of the series, and its matrix with what is constant in this flight.
   pure subroutine begin_series(machine, flow, state, path)

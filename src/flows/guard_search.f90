@@ -8,7 +8,7 @@ module guard_search
   use certified_step, only: positive_step
   use elementary, only: exponential, logarithm
   use guard_functions, only: bases_at, bound, derivatives, search_t
-  use guards, only: joint_guard_t, most_guards
+  use guards, only: joint_guard_t, meets_lower, meets_upper, most_guards
   use kinds, only: wp
   implicit none
   private
@@ -27,8 +27,9 @@ contains
 
   !> The first falls within `duration` [s]: `time` is that of the first, `fallen` all guards that fall with it by no more than
   !> rounding; time = duration and none fallen if there is none. `extremes` are those of the watched coordinate on the way,
-  !> `top_speed` the largest of its speeds if `wants_speed`.
-  pure subroutine find_first(search, list, origin, duration, wants_speed, time, fallen, extremes, top_speed, evaluations)
+  !> `top_speed` the largest of its speeds if `wants_speed`; `margin`, where it is asked for, the smallest gap at which a stop was
+  !> missed [m].
+  pure subroutine find_first(search, list, origin, duration, wants_speed, time, fallen, extremes, top_speed, evaluations, margin)
     type(search_t), intent(in) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: origin, duration
@@ -37,6 +38,7 @@ contains
     logical, intent(out) :: fallen(:)
     real(wp), intent(inout) :: extremes(2), top_speed
     integer, intent(out) :: evaluations
+    real(wp), intent(inout), optional :: margin
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp), dimension(0:3, search%functions) :: here, there
     real(wp), dimension(most_guards) :: certified, root
@@ -66,26 +68,17 @@ contains
       do g = 1, search%functions
         there(:, g) = derivatives(search, g, b, growth, turning)
       end do
-      root = huge(1.0_wp)
-      do g = 1, search%guards
-        if (idle(g)) cycle
-        if (certified(g) >= b) cycle
-        if (certified(g) <= a) then
-          if (stays_positive(search, g, a, b, here(:, g), there(:, g))) cycle
-        end if
-        call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
-        if (root(g) < time) time = root(g)
-      end do
+      call search_panel(search, a, b, here, there, tie, certified, idle, time, root, evaluations)
       if (any(root(:search%guards) <= time)) then
-        do g = 1, search%guards
-          fallen(g) = root(g) <= time + tie
-        end do
+        fallen(:search%guards) = root(:search%guards) <= time + tie
         call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
                    top_speed, evaluations)
+        if (present(margin)) call note_misses(search, list, a, time, here, fallen, margin, evaluations)
         return
       end if
       call watch(search, a, b, here(:, search%functions), there(:, search%functions), .false., wants_speed, extremes, &
                  top_speed, evaluations)
+      if (present(margin)) call note_misses(search, list, a, b, here, fallen, margin, evaluations)
       a = b
       here = there
       panels = panels + 1
@@ -95,6 +88,28 @@ contains
       end if
     end do
   end subroutine find_first
+
+  !> The zeros of the guards, each its `root` [s], on the panel from `a` to `b` [s], where the values are `here` and `there`;
+  !> huge where there is none before `time`, which becomes that of the first. Zeros within `tie` of it are found too.
+  pure subroutine search_panel(search, a, b, here, there, tie, certified, idle, time, root, evaluations)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: a, b, here(0:, :), there(0:, :), tie, certified(:)
+    logical, intent(in) :: idle(:)
+    real(wp), intent(inout) :: time
+    real(wp), intent(out) :: root(:)
+    integer, intent(inout) :: evaluations
+    integer :: g
+    root = huge(1.0_wp)
+    do g = 1, search%guards
+      if (idle(g)) cycle
+      if (certified(g) >= b) cycle
+      if (certified(g) <= a) then
+        if (stays_positive(search, g, a, b, here(:, g), there(:, g))) cycle
+      end if
+      call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
+      if (root(g) < time) time = root(g)
+    end do
+  end subroutine search_panel
 
   !> Guards that are zero at the start, where the values are `here`: those that fall at once, those that are nothing but rounding
   !> (`idle`), and how long within `length` [s] the others are `certified` not to fall.
@@ -144,39 +159,64 @@ contains
     end if
     call note_extremes(search, last, extremes, top_speed)
     if (here(1)*last(1) < 0) then
-      d = turning_point(1)
+      d = turning_point(search, search%functions, 1, a, b, here, last, extremes(2) - extremes(1))
       call note_extremes(search, d, extremes, top_speed)
     end if
     if (wants_speed .and. here(2) > 0 .and. last(2) < 0) then
-      d = turning_point(2)
+      d = turning_point(search, search%functions, 2, a, b, here, last, 0.0_wp)
       call note_extremes(search, d, extremes, top_speed)
     end if
-  contains
-    !> Derivatives where number `order` of them is zero: a safeguarded secant.
-    pure function turning_point(order) result(found)
-      integer, intent(in) :: order
-      real(wp) :: found(0:3), low, high, at_low, at_high, t
-      complex(wp) :: now(search%terms), turn(size(search%turn, 1))
-      integer :: i
-      low = a
-      high = b
-      at_low = here(order)
-      at_high = last(order)
-      do i = 1, 8
-        t = low + (high - low)*min(0.95_wp, max(0.05_wp, at_low/(at_low - at_high)))
-        call bases_at(search, t, now, turn)
-        found = derivatives(search, search%functions, t, now, turn)
-        if (order == 1 .and. abs(found(1))*(high - low) <= 1e-10_wp*(extremes(2) - extremes(1) + abs(found(0)))) exit
-        if (found(order)*at_low > 0) then
-          low = t
-          at_low = found(order)
-        else
-          high = t
-          at_high = found(order)
-        end if
-      end do
-    end function turning_point
   end subroutine watch
+
+  !> Derivatives of function `g` where number `order` of them is zero, between `a` and `b`, from those there: a safeguarded secant.
+  !> The value is good to a share of `range` where that is more than 0.
+  pure function turning_point(search, g, order, a, b, here, last, range) result(found)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: g, order
+    real(wp), intent(in) :: a, b, here(0:3), last(0:3), range
+    real(wp) :: found(0:3), low, high, at_low, at_high, t
+    complex(wp) :: now(search%terms), turn(size(search%turn, 1))
+    integer :: i
+    low = a
+    high = b
+    at_low = here(order)
+    at_high = last(order)
+    do i = 1, 8
+      t = low + (high - low)*min(0.95_wp, max(0.05_wp, at_low/(at_low - at_high)))
+      call bases_at(search, t, now, turn)
+      found = derivatives(search, g, t, now, turn)
+      if (order == 1 .and. abs(found(1))*(high - low) <= 1e-10_wp*(range + abs(found(0)))) exit
+      if (found(order)*at_low > 0) then
+        low = t
+        at_low = found(order)
+      else
+        high = t
+        at_high = found(order)
+      end if
+    end do
+  end function turning_point
+
+  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, but have not `fallen`.
+  pure subroutine note_misses(search, list, a, b, here, fallen, margin, evaluations)
+    type(search_t), intent(in) :: search
+    type(joint_guard_t), intent(in) :: list(:)
+    real(wp), intent(in) :: a, b, here(0:, :)
+    logical, intent(in) :: fallen(:)
+    real(wp), intent(inout) :: margin
+    integer, intent(inout) :: evaluations
+    complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
+    real(wp) :: last(0:3)
+    integer :: g
+    do g = 1, search%guards
+      if (fallen(g) .or. .not. here(1, g) < 0 .or. .not. any(list(g)%meaning == [meets_upper, meets_lower])) cycle
+      call bases_at(search, b, growth, turning)
+      evaluations = evaluations + 1
+      last = derivatives(search, g, b, growth, turning)
+      if (last(1) < -rounding*(bound(search, g, 1, a, b - a) + list(g)%blur(1))) cycle
+      if (last(1) > 0) last = turning_point(search, g, 1, a, b, here(:, g), last, 0.0_wp)
+      margin = min(margin, max(last(0), 0.0_wp))
+    end do
+  end subroutine note_misses
 
   !> Length of the panels from the time `t` on: the quintic is to be good to about a thousandth of each guard's size.
   pure real(wp) function panel_length(search, t, duration) result(length)

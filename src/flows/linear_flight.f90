@@ -6,7 +6,7 @@ module linear_flight
   use flight_path, only: begin_path, guard_row, path_at, path_t, series_step, terms
   use guard_functions, only: prepare_search, search_t
   use guard_search, only: find_first
-  use guards, only: guards_of, joint_guard_t, most_guards
+  use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards
   use jointed, only: jointed_t
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
@@ -17,11 +17,14 @@ module linear_flight
 
   public :: fly_linear
 
-  !> Extremes of the watched coordinate and its largest speed, and what a flight cost.
+  !> Extremes of the watched coordinate and its largest speed, how near stops were, and what a flight cost.
   type, public :: watch_t
     real(wp) :: extremes(2) = [huge(1.0_wp), -huge(1.0_wp)]
     real(wp) :: top_speed = -huge(1.0_wp)
     logical :: wants_speed = .false.
+    !> Smallest gap at which a stop was missed [m]; of closed-form flights, and costly.
+    real(wp) :: margin = huge(1.0_wp)
+    logical :: wants_margin = .false.
     integer :: evaluations = 0
   end type watch_t
 
@@ -48,8 +51,13 @@ contains
     call begin_path(machine, flow, state, path)
     if (flow%modal) then
       call prepare_search(machine, flow, path, list, count_guards, machine%watched, search)
-      call find_first(search, list, path%start, until - path%start, watch%wants_speed, time, fallen, watch%extremes, &
-                      watch%top_speed, evaluations)
+      if (watch%wants_margin) then
+        call find_first(search, list, path%start, until - path%start, watch%wants_speed, time, fallen, watch%extremes, &
+                        watch%top_speed, evaluations, watch%margin)
+      else
+        call find_first(search, list, path%start, until - path%start, watch%wants_speed, time, fallen, watch%extremes, &
+                        watch%top_speed, evaluations)
+      end if
       watch%evaluations = watch%evaluations + evaluations
       call path_at(machine, flow, path, time, state%q, state%v)
     else
@@ -72,7 +80,7 @@ contains
     logical, intent(out) :: fallen(:)
     type(watch_t), intent(inout) :: watch
     real(wp) :: y(size(path%unknowns)), powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
-    real(wp) :: length, p(0:order), root(most_guards), first, fraction
+    real(wp) :: length, p(0:order), gap(0:terms, most_guards), root(most_guards), first, fraction
     integer :: g, i, k, n, stretches
     n = machine%n
     fallen = .false.
@@ -94,7 +102,9 @@ contains
           call drop_rounding(row(:, g), path%matrix, y, length, p)
         end if
         root(g) = first_zero(p)
+        gap(:, g) = p(:terms)
       end do
+      if (watch%wants_margin) call note_misses(list(:count_guards), gap, root, min(1.0_wp, minval(root)), watch%margin)
       call watch_series(powers(machine%watched, :), powers(n + machine%watched, :), min(1.0_wp, minval(root)), watch)
       first = minval(root(:max(count_guards, 1)))
       if (count_guards > 0 .and. first <= 1) then
@@ -136,16 +146,41 @@ contains
       end if
     end do
     watch%extremes = [min(watch%extremes(1), value(place, at)), max(watch%extremes(2), value(place, at))]
-  contains
-    pure real(wp) function value(p, t)
-      real(wp), intent(in) :: p(0:), t
-      integer :: k
-      value = p(ubound(p, 1))
-      do k = ubound(p, 1) - 1, 0, -1
-        value = value*t + p(k)
-      end do
-    end function value
   end subroutine watch_series
+
+  !> Gaps that stop closing on a stretch up to a `fraction` of it, from their series; those that fall there have a `root` at it.
+  pure subroutine note_misses(list, gap, root, fraction, margin)
+    type(joint_guard_t), intent(in) :: list(:)
+    real(wp), intent(in) :: gap(0:, :), root(:), fraction
+    real(wp), intent(inout) :: margin
+    real(wp) :: low, high, at, factors(ubound(gap, 1))
+    integer :: g, i, k
+    factors = [(k, k=1, size(factors))]
+    do g = 1, size(list)
+      if (.not. any(list(g)%meaning == [meets_upper, meets_lower]) .or. root(g) <= fraction) cycle
+      associate (slope => factors*gap(1:, g))
+        if (.not. slope(1) < 0 .or. value(slope, fraction) < -rounding*sum(abs(slope))) cycle
+        low = 0
+        high = fraction
+        do i = 1, 60
+          at = (low + high)/2
+          if (value(slope, at) < 0) low = at
+          if (.not. value(slope, at) < 0) high = at
+        end do
+      end associate
+      margin = min(margin, max(value(gap(:, g), high), 0.0_wp))
+    end do
+  end subroutine note_misses
+
+  !> A polynomial with coefficients by rising powers.
+  pure real(wp) function value(p, t)
+    real(wp), intent(in) :: p(0:), t
+    integer :: k
+    value = p(ubound(p, 1))
+    do k = ubound(p, 1) - 1, 0, -1
+      value = value*t + p(k)
+    end do
+  end function value
 
   !> Drops the leading terms of a series that are no more than the rounding of what they are sums of.
   pure subroutine drop_rounding(row, matrix, y, length, p)

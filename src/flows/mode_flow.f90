@@ -193,38 +193,12 @@ contains
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     real(wp), allocatable, intent(out) :: squares(:), damping(:, :)
-    real(wp), allocatable :: all_shapes(:, :), free(:, :), reduced(:, :), turned(:, :), levels(:), rigid_damping(:, :)
+    real(wp), allocatable :: free(:, :), reduced(:, :), turned(:, :), levels(:), rigid_damping(:, :)
     integer, allocatable :: order(:)
-    real(wp) :: largest, length
-    integer :: n, m, i, k, best
-    n = machine%n
-    m = n - size(flow%independent)
-    allocate (squares(n), all_shapes(n, n), free(n, m))
-    call undamped_modes(flow%stiffness, machine%mass, squares, all_shapes)
-    ! The part of the shapes that moves no constraint, made orthonormal, longest first.
-    do i = 1, n
-      all_shapes(:, i) = all_shapes(:, i) - matmul(flow%carried, [(sum(machine%joints(flow%held(flow%independent(k)))%row &
-                                                                       *all_shapes(:, i)), k=1, n - m)])
-    end do
-    do k = 1, m
-      best = 1
-      length = -1
-      do i = 1, n
-        if (sum(all_shapes(:, i)*matmul(machine%mass, all_shapes(:, i))) > length*(1 + 1e-9_wp)) then
-          best = i
-          length = sum(all_shapes(:, i)*matmul(machine%mass, all_shapes(:, i)))
-        end if
-      end do
-      free(:, k) = all_shapes(:, best)/sqrt(length)
-      do i = 1, 2
-        free(:, k) = free(:, k) - matmul(free(:, :k - 1), matmul(transpose(free(:, :k - 1)), matmul(machine%mass, free(:, k))))
-        free(:, k) = free(:, k)/sqrt(sum(free(:, k)*matmul(machine%mass, free(:, k))))
-      end do
-      do i = 1, n
-        all_shapes(:, i) = all_shapes(:, i) - free(:, k)*sum(free(:, k)*matmul(machine%mass, all_shapes(:, i)))
-      end do
-    end do
-    deallocate (squares)
+    real(wp) :: largest
+    integer :: m, i
+    call free_shapes(machine, flow, free)
+    m = size(free, 2)
     allocate (squares(m), turned(m, m))
     reduced = matmul(transpose(free), matmul(flow%stiffness, free))
     reduced = (reduced + transpose(reduced))/2
@@ -252,6 +226,42 @@ contains
     flow%frequency = sqrt(abs(squares(:flow%flexible)))
     damping = matmul(transpose(free), matmul(flow%damping, free))
   end subroutine set_basis
+
+  !> The part of the undamped shapes that moves no constraint, made orthonormal by the mass, longest first.
+  pure subroutine free_shapes(machine, flow, free)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), allocatable, intent(out) :: free(:, :)
+    real(wp), allocatable :: squares(:), all_shapes(:, :)
+    real(wp) :: length
+    integer :: n, m, i, k, best
+    n = machine%n
+    m = n - size(flow%independent)
+    allocate (squares(n), all_shapes(n, n), free(n, m))
+    call undamped_modes(flow%stiffness, machine%mass, squares, all_shapes)
+    do i = 1, n
+      all_shapes(:, i) = all_shapes(:, i) - matmul(flow%carried, [(sum(machine%joints(flow%held(flow%independent(k)))%row &
+                                                                       *all_shapes(:, i)), k=1, n - m)])
+    end do
+    do k = 1, m
+      best = 1
+      length = -1
+      do i = 1, n
+        if (sum(all_shapes(:, i)*matmul(machine%mass, all_shapes(:, i))) > length*(1 + 1e-9_wp)) then
+          best = i
+          length = sum(all_shapes(:, i)*matmul(machine%mass, all_shapes(:, i)))
+        end if
+      end do
+      free(:, k) = all_shapes(:, best)/sqrt(length)
+      do i = 1, 2
+        free(:, k) = free(:, k) - matmul(free(:, :k - 1), matmul(transpose(free(:, :k - 1)), matmul(machine%mass, free(:, k))))
+        free(:, k) = free(:, k)/sqrt(sum(free(:, k)*matmul(machine%mass, free(:, k))))
+      end do
+      do i = 1, n
+        all_shapes(:, i) = all_shapes(:, i) - free(:, k)*sum(free(:, k)*matmul(machine%mass, all_shapes(:, i)))
+      end do
+    end do
+  end subroutine free_shapes
 
   !> Exponentials of the flexible and the damped rigid coordinates.
   pure subroutine set_exponentials(flow, squares, damping)

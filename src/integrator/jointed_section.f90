@@ -1,10 +1,11 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure on the stroboscopic section: the positions on which anything depends, all velocities, and the
-!> stretch of the springs of elastic friction.
+!> A jointed structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
+!> the springs of elastic friction.
 module jointed_section
-  use jointed, only: joint_contact, joint_elastic, joint_soft, jointed_t
+  use jointed, only: joint_contact, joint_elastic, joint_soft
+  use jointed_flows, only: without_contacts
   use jointed_motion, only: advance_jointed_period, jointed_motion_t, prepare_jointed, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
@@ -22,21 +23,30 @@ contains
   !> Number of coordinates on the section.
   pure integer function coordinates_of_jointed(moving) result(n)
     type(jointed_motion_t), intent(in) :: moving
-    n = size(moving%directions, 2) + moving%machine%n + count(moving%machine%joints%kind == joint_elastic)
+    n = size(moving%directions, 2) + size(moving%speeds, 2) + count(moving%machine%joints%kind == joint_elastic)
   end function coordinates_of_jointed
 
-  !> The same structure without stops, if that takes away just the first `places` coordinates, places; else 0.
+  !> Number of the coordinate that is the velocity of the watched place, in a motion without a clock.
+  pure integer function watched_speed(moving) result(at)
+    type(jointed_motion_t), intent(in) :: moving
+    at = size(moving%directions, 2) + moving%machine%watched
+  end function watched_speed
+
+  !> Whether there is room for the coordinates.
+  pure logical function fits_section(moving)
+    type(jointed_motion_t), intent(in) :: moving
+    fits_section = coordinates_of_jointed(moving) <= most_coordinates
+  end function fits_section
+
+  !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
   pure subroutine free_jointed(moving, free, places)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_motion_t), intent(out) :: free
     integer, intent(out) :: places
-    type(jointed_t) :: machine
     places = 0
     if (.not. moving%machine%driven .or. .not. any(is_stop(moving%machine%joints%kind))) return
-    machine = moving%machine
-    machine%joints = pack(machine%joints, .not. is_stop(machine%joints%kind))
-    call prepare_jointed(machine, moving%options, free)
-    places = size(moving%directions, 2) - size(free%directions, 2)
+    call prepare_jointed(without_contacts(moving%machine), moving%options, free)
+    if (size(free%speeds, 2) == size(moving%speeds, 2)) places = size(moving%directions, 2) - size(free%directions, 2)
   end subroutine free_jointed
 
   pure elemental logical function is_stop(kind)
@@ -77,18 +87,6 @@ contains
     end do
     keeps_clear = .true.
   end function keeps_clear
-
-  !> Number of the coordinate that is the velocity of the watched place.
-  pure integer function watched_speed(moving) result(at)
-    type(jointed_motion_t), intent(in) :: moving
-    at = size(moving%directions, 2) + moving%machine%watched
-  end function watched_speed
-
-  !> Whether there is room for the coordinates.
-  pure logical function fits_section(moving)
-    type(jointed_motion_t), intent(in) :: moving
-    fits_section = coordinates_of_jointed(moving) <= most_coordinates
-  end function fits_section
 
   !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
   !> drive at `angle` [rad].
@@ -140,15 +138,15 @@ contains
     type(jointed_state_t) :: state
     real(wp) :: q(moving%machine%n), v(moving%machine%n), s, u, limit
     complex(wp) :: turning(moving%harmonics)
-    integer :: n, places, j, k
+    integer :: places, speeds, j, k
     logical :: ok
-    n = moving%machine%n
     places = size(moving%directions, 2)
+    speeds = size(moving%speeds, 2)
     q = matmul(moving%directions, point(:places))
-    v = point(places + 1:places + n)
+    v = matmul(moving%speeds, point(places + 1:places + speeds))
     call start_jointed(moving, q, v, 0.0_wp, state, ok)
     turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
-    k = places + n
+    k = places + speeds
     do j = 1, size(moving%machine%joints)
       associate (joint => moving%machine%joints(j))
         if (joint%kind /= joint_elastic) cycle
@@ -169,14 +167,15 @@ contains
     type(jointed_state_t), intent(in) :: state
     real(wp) :: point(most_coordinates), s, u
     complex(wp) :: turning(moving%harmonics)
-    integer :: n, places, j, k
+    integer :: n, places, speeds, j, k
     point = 0
+    if (.not. fits_section(moving)) return
     n = moving%machine%n
     places = size(moving%directions, 2)
-    if (places + n + count(moving%machine%joints%kind == joint_elastic) > most_coordinates) return
+    speeds = size(moving%speeds, 2)
     point(:places) = matmul(transpose(moving%directions), state%q(:n))
-    point(places + 1:places + n) = state%v(:n)
-    k = places + n
+    point(places + 1:places + speeds) = matmul(transpose(moving%speeds), state%v(:n))
+    k = places + speeds
     turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
     do j = 1, size(moving%machine%joints)
       associate (joint => moving%machine%joints(j))
@@ -189,17 +188,18 @@ contains
     end do
   end function jointed_point
 
-  !> Sizes of the coordinates in a motion over `half_range` [m].
+  !> Sizes of the coordinates in a motion over `half_range` [m]. What may drift has those of what stops and forces allow.
   pure function scales_of_jointed(moving, half_range) result(scales)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates), length
-    integer :: places, n
-    n = moving%machine%n
+    integer :: places, speeds
     places = size(moving%directions, 2)
+    speeds = size(moving%speeds, 2)
     length = max(half_range, 1e-3_wp*moving%machine%length_scale)
+    if (speeds < moving%machine%n) length = min(length, moving%machine%length_scale)
     scales = length
-    scales(places + 1:places + n) = length*moving%machine%frequency
+    scales(places + 1:places + speeds) = length*moving%machine%frequency
   end function scales_of_jointed
 
 end module jointed_section

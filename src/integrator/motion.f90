@@ -72,9 +72,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     moving%machine = machine
     moving%options = options
-    ! Tables are left to single flights.
-    if (machine%effects%upwards%count > 0 .or. machine%effects%over_place%count > 0 .or. machine%effects%by_position .or. &
-        machine%contact%kind == contact_table) moving%options%lane_width = 0
+    if (machine%effects%unknown_to_lanes .or. machine%contact%kind == contact_table) moving%options%lane_width = 0
     moving%layer = machine%friction%layer_speed
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive

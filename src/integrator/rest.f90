@@ -6,8 +6,7 @@
 module rest
   use certified_step, only: departure_step, positive_step
   use contact_law, only: contact_constant, contact_force, restitution_at
-  use effect_law, only: break_away_level, friction_change, friction_factor, steepest_by_place, steepest_by_speed, steepest_force, &
-    stretch_bounds
+  use effect_law, only: break_away_level, change_over_bounce, friction_change, friction_factor
   use drive_law, only: foot_motion, measured_force, next_sample
   use friction_law, only: friction_t, power
   use kinds, only: wp
@@ -232,18 +231,10 @@ contains
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(in) :: state
     real(wp), intent(in) :: speed, height
-    real(wp) :: foot, stretch, bounds(2)
-    associate (effects => machine%effects, law => machine%friction)
-      call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
-      stretch = machine%restoring%free_length + foot - state%x
-      change = (effects%quadratic_drag*speed + abs(effects%asymmetric_viscous))*speed + height* &
-               (3*abs(effects%cubic)*stretch**2 + 2*effects%dahl_stiffness + steepest_by_place(effects)* &
-                (law%kinetic + law%excess + law%second_excess + abs(effects%asymmetric_coulomb) + abs(state%z)))
-      change = change + steepest_by_speed(effects)*speed
-      if (.not. effects%by_position) return
-      bounds = stretch_bounds(effects)
-      change = change + height*(bounds(1) + steepest_force(effects))
-    end associate
+    real(wp) :: foot
+    call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
+    change = change_over_bounce(machine%effects, machine%friction, state%z, machine%restoring%free_length + foot - state%x, &
+                                speed, height)
   end function effect_change
 
   !> How much the sliding friction changes between rest and `speed` [N].

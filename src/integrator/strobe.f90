@@ -12,7 +12,7 @@ module strobe
   use jointed_log, only: energy_of_jointed, log_sample, watched_state
   use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
   use jointed_section, only: coordinates_of_jointed, fits_section, free_jointed, jointed_at, jointed_point, keeps_clear, &
-    scales_of_jointed, start_of_jointed, watched_speed
+    scales_of_jointed, start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use motion, only: advance, advance_period, motion_t
@@ -44,7 +44,7 @@ module strobe
 
 contains
 
-  !> The same machine without stops, if that takes away just the first `places` coordinates, places; else 0.
+  !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
   pure subroutine without_stops(moving, free, places)
     type(motion_t), intent(in) :: moving
     type(motion_t), intent(out) :: free
@@ -52,20 +52,18 @@ contains
     logical :: found
     places = 0
     free = moving
+    if (allocated(moving%jointed)) call free_jointed(moving%jointed, free%jointed, places)
+    if (.not. allocated(moving%pair)) return
     free%machine%contact = contact_t()
-    if (allocated(moving%jointed)) then
-      call free_jointed(moving%jointed, free%jointed, places)
-    else if (allocated(moving%pair)) then
-      call free_pair(moving%pair, free%pair, found)
-      if (found) places = 1
-    end if
+    call free_pair(moving%pair, free%pair, found)
+    if (found) places = 1
   end subroutine without_stops
 
   !> Number of a coordinate that is a velocity, of machines of several bodies.
   pure integer function speed_number(moving)
     type(motion_t), intent(in) :: moving
     speed_number = 2
-    if (allocated(moving%jointed)) speed_number = watched_speed(moving%jointed)
+    if (allocated(moving%jointed)) speed_number = size(moving%jointed%directions, 2) + 1
   end function speed_number
 
   !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of two bodies, which note

@@ -10,9 +10,10 @@ module h5
   use guard, only: end_guard
   use h5_access, only: set_parallel_access
   use h5_trap, only: trap
+  use h5_types, only: find_type, h5_string_type, h5_type
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
-    h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
+    h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
     H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, h5fclose_f, &
     h5fcreate_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
@@ -22,10 +23,7 @@ module h5
     h5pset_cache_f, h5pset_sieve_buf_size_f, size_t, &
     h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
-    h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F32LE, &
-    H5T_IEEE_F64LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U32LE, &
-    H5T_STRING, h5tclose_f, h5tcopy_f, h5tequal_f, h5tis_variable_str_f, h5tset_cset_f, hid_t, &
-    hsize_t
+    h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, hid_t, hsize_t
   use kinds, only: int64, int8
   use status, only: exit_cannot_create, exit_io
   use team, only: team_t
@@ -35,8 +33,7 @@ module h5
   private
 
   public :: h5_create, h5_open, h5_close, h5_exists, h5_create_group, h5_create_dataset, &
-    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_type, h5_string_type, h5_failed, &
-    h5_version, h5_shuffles
+    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_failed, h5_version, h5_shuffles
 
   !> An open file.
   type, public :: h5_file_t
@@ -212,23 +209,6 @@ contains
     call h5pclose_f(creation, ignored)
   end subroutine h5_create_group
 
-  !> The type's identifier in the library.
-  integer(hid_t) function h5_type(type)
-    integer, intent(in) :: type
-    integer(hid_t) :: types(8)
-    types = [H5T_STD_I8LE, H5T_STD_I16LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_U32LE, H5T_IEEE_F32LE, &
-             H5T_IEEE_F64LE, H5T_STRING]
-    h5_type = types(type)
-  end function h5_type
-
-  !> A new identifier of the type of UTF-8 strings of variable length; the caller closes it.
-  subroutine h5_string_type(id, status)
-    integer(hid_t), intent(out) :: id
-    integer, intent(out) :: status
-    call h5tcopy_f(H5T_STRING, id, status)
-    if (status >= 0) call h5tset_cset_f(id, H5T_CSET_UTF8_F, status)
-  end subroutine h5_string_type
-
   !> Creates a dataset and opens it.
   subroutine h5_create_dataset(file, name, type, lengths, storage, dataset, error)
     type(h5_file_t), intent(in) :: file
@@ -318,27 +298,9 @@ contains
     if (rank > 0) call h5sget_simple_extent_dims_f(space, sizes, most, status)
     dataset%lengths = sizes(rank:1:-1)
     if (status >= 0) call h5sclose_f(space, status)
-    if (status >= 0) call find_type(dataset, status)
+    if (status >= 0) call find_type(dataset%id, dataset%type, status)
     if (h5_failed(status, 'open', name, file%path, error)) return
   end subroutine h5_open_dataset
-
-  subroutine find_type(dataset, status)
-    type(h5_dataset_t), intent(inout) :: dataset
-    integer, intent(out) :: status
-    integer(hid_t) :: found
-    logical :: equal
-    integer :: type, ignored
-    call h5dget_type_f(dataset%id, found, status)
-    if (status < 0) return
-    do type = 1, type_string - 1
-      call h5tequal_f(found, h5_type(type), equal, status)
-      if (status >= 0 .and. equal) dataset%type = type
-    end do
-    call h5tis_variable_str_f(found, equal, status)
-    if (status >= 0 .and. equal) dataset%type = type_string
-    if (dataset%type == 0) status = -1
-    call h5tclose_f(found, ignored)
-  end subroutine find_type
 
   !> Closes a dataset; one that is not open stays so.
   subroutine h5_close_dataset(dataset, error)

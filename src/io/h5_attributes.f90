@@ -8,7 +8,8 @@ module h5_attributes
   use bindings, only: c_string_length
   use errors, only: error_t
   use guard, only: end_guard
-  use h5, only: h5_dataset_t, h5_failed, h5_file_t, h5_string_type, h5_type
+  use h5, only: h5_dataset_t, h5_failed, h5_file_t
+  use h5_types, only: h5_string_type, h5_type
   use h5_stored, only: h5_check_stored
   use h5_trap, only: trap
   use h5ds, only: h5dsattach_scale_f, h5dsset_scale_f

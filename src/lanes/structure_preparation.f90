@@ -95,14 +95,16 @@ contains
     end do
   end subroutine set_panels
 
-  !> Whether the structure is one that the kernel has room and laws for.
+  !> Whether the structure is one that the kernel has room and laws for. The event loop notes by how much structures that drift
+  !> between stops miss them; lanes do not.
   pure logical function fits_lanes(moving) result(fits)
     type(jointed_motion_t), intent(in) :: moving
     integer :: j
     associate (machine => moving%machine)
       fits = machine%driven .and. machine%frequency > 0 .and. machine%linear .and. machine%n <= lane_coordinates .and. &
         moving%harmonics > 0 .and. moving%harmonics <= lane_waves .and. &
-        moving%section == 0 .and. size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
+        moving%section == 0 .and. .not. moving%drifts .and. &
+        size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
       if (.not. fits) return
       fits = count(machine%joints%kind == joint_friction) <= lane_sliders .and. &
         all(machine%joints%kind == joint_friction .or. machine%joints%kind == joint_contact)

@@ -5,7 +5,8 @@
 !> over the penetration p.
 module contact_rows
   use kinds, only: wp
-  use law_row, only: law_length, law_row_t, none_above, none_below, parameter_row_t
+  use law_row, only: any_value, law_length, law_row_t, none_above, none_below, not_negative, parameter_row_t, positive, &
+    positive_to_one, range_t, zero_to_one
   implicit none
   private
 
@@ -27,7 +28,7 @@ module contact_rows
   character(len=*), parameter :: goldsmith = 'Goldsmith, Impact (1960)'
   character(len=*), parameter :: formula_meaning = 'K p^n (1 + d p''/speed), '
 
-  type(law_row_t), parameter, public :: contact_laws(15) = [ &
+  type(law_row_t), parameter, public :: contact_laws(*) = [ &
     law_row_t('contact', 'none', 'no barrier', ''), &
     law_row_t('contact', 'newton', 'rigid barrier: v+ = -k v-', 'Lemes et al., vibro-impact system with ideal excitation'), &
     law_row_t('contact', 'newton_linear', 'rigid barrier: k = 1 - alpha v, not below 0', &
@@ -52,41 +53,38 @@ module contact_rows
               'Flores, Machado, Silva, Martins, Multibody Syst. Dyn. 25 (2011)'), &
     law_row_t('contact', 'hu_guo', formula_meaning//'d = 3(1-e)/(2e)', 'Hu, Guo, Int. J. Mech. Sci. 90 (2015)')]
 
-  type(parameter_row_t), parameter, public :: contact_parameters(72) = [ &
-    parameter_row_t('contact', 'newton', 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
+  type(parameter_row_t), parameter, public :: contact_parameters(*) = [ &
+    parameter_row_t('contact', 'newton', 'restitution', '1', zero_to_one, &
                     'k, ratio of the speeds after and before an impact'), &
-    parameter_row_t('contact', 'newton_linear', 'slope', 's/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'alpha, loss of restitution per speed'), &
-    parameter_row_t('contact', 'newton_power', 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
-                    'k up to the yield speed'), &
-    parameter_row_t('contact', 'newton_power', 'yield_speed', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('contact', 'newton_linear', 'slope', 's/m', not_negative, 'alpha, loss of restitution per speed'), &
+    parameter_row_t('contact', 'newton_power', 'restitution', '1', zero_to_one, 'k up to the yield speed'), &
+    parameter_row_t('contact', 'newton_power', 'yield_speed', 'm/s', positive, &
                     'impact speed above which the barrier yields'), &
-    parameter_row_t('contact', 'newton_power', 'falloff', '1', 0.0_wp, 1.0_wp, .false., .true., 0.25_wp, .false., &
-                    'exponent of the fall above the yield speed'), &
-    parameter_row_t('contact', 'newton_viscoelastic', 'first', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'g1, for v in m/s'), &
-    parameter_row_t('contact', 'newton_viscoelastic', 'second', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'g2, for v in m/s; spheres have g2 = 0.6 g1^2'), &
-    (parameter_row_t('contact', soft_laws(i), 'stiffness', 'N/m^n', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'K'), i=1, size(soft_laws)), &
-    (parameter_row_t('contact', power_laws(i), 'exponent', '1', 0.5_wp, 10.0_wp, .false., .true., 1.5_wp, .false., &
-                     'n: 1 for flat surfaces, 1.5 for spheres (Hertz)'), i=1, size(power_laws)), &
-    parameter_row_t('contact', 'kelvin_voigt', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'D'), &
-    parameter_row_t('contact', 'hunt_crossley', 'damping', 's/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+    parameter_row_t('contact', 'newton_power', 'falloff', '1', zero_to_one, 'exponent of the fall above the yield speed', &
+                    optional=.true., default=0.25_wp), &
+    parameter_row_t('contact', 'newton_viscoelastic', 'first', '1', not_negative, 'g1, for v in m/s'), &
+    parameter_row_t('contact', 'newton_viscoelastic', 'second', '1', not_negative, &
+                    'g2, for v in m/s; spheres have g2 = 0.6 g1^2', optional=.true.), &
+    (parameter_row_t('contact', soft_laws(i), 'stiffness', 'N/m^n', positive, 'K'), i=1, size(soft_laws)), &
+    (parameter_row_t('contact', power_laws(i), 'exponent', '1', range_t(0.5_wp, 10.0_wp), &
+                     'n: 1 for flat surfaces, 1.5 for spheres (Hertz)', optional=.true., default=1.5_wp), i=1, size(power_laws)), &
+    parameter_row_t('contact', 'kelvin_voigt', 'damping', 'N s/m', not_negative, 'D'), &
+    parameter_row_t('contact', 'hunt_crossley', 'damping', 's/m', not_negative, &
                     'a = lambda/K; 1/a bounds the speed of rebound'), &
-    parameter_row_t('contact', 'kelvin_voigt_restitution', 'restitution', '1', 0.0_wp, 1.0_wp, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('contact', 'kelvin_voigt_restitution', 'restitution', '1', positive_to_one, &
                     'e of a free body, released as `tension` says'), &
-    (parameter_row_t('contact', restitution_formulas(i), 'restitution', '1', 0.0_wp, 1.0_wp, .true., .false., 0.0_wp, .false., &
+    (parameter_row_t('contact', restitution_formulas(i), 'restitution', '1', positive_to_one, &
                      'e that the formula is asked for'), i=1, size(restitution_formulas)), &
-    (parameter_row_t('contact', restitution_formulas(i), 'speed', 'm/s', 0.0_wp, none_above, .false., .true., &
-                     0.0_wp, .false., 'impact speed at which it is asked for: a = d/speed; 0 = that of each impact'), &
+    (parameter_row_t('contact', restitution_formulas(i), 'speed', 'm/s', not_negative, &
+                     'impact speed at which it is asked for: a = d/speed; 0 = that of each impact', optional=.true.), &
                      i=1, size(restitution_formulas)), &
-    (parameter_row_t('contact', soft_laws(i), 'tension', '1', 0.0_wp, 1.0_wp, .false., .true., 1.0_wp, .false., &
-                     '1: pulls until p = 0; 0: the force is cut off at zero'), i=1, 2), &
-    (parameter_row_t('contact', barrier_laws(i), 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &
-                     'position of the barrier above the body; no barrier if absent'), i=1, size(barrier_laws)), &
-    (parameter_row_t('contact', barrier_laws(i), 'lower', 'm', none_below, none_above, .false., .true., none_below, .false., &
-                     'position of the barrier below the body; no barrier if absent'), i=1, size(barrier_laws))]
+    (parameter_row_t('contact', soft_laws(i), 'tension', '1', zero_to_one, &
+                     '1: pulls until p = 0; 0: the force is cut off at zero', optional=.true., default=1.0_wp), i=1, 2), &
+    (parameter_row_t('contact', barrier_laws(i), 'upper', 'm', any_value, &
+                     'position of the barrier above the body; no barrier if absent', optional=.true., &
+                     default=none_above), i=1, size(barrier_laws)), &
+    (parameter_row_t('contact', barrier_laws(i), 'lower', 'm', any_value, &
+                     'position of the barrier below the body; no barrier if absent', optional=.true., &
+                     default=none_below), i=1, size(barrier_laws))]
 
 end module contact_rows

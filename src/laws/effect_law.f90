@@ -3,7 +3,7 @@
 
 !> Effects added to a machine that are not one of its own laws with other numbers, and what a sensor shows. While
 !> sliding in direction s = +1 or -1 at the position x, the spring stretched by l, they add the force
-!>   F - c s v^2 - b s v + k3 l^3 + q(l) + r(x) - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
+!>   F - c s v^2 - c3 v^3 - b s v + k3 l^3 + q(l) + r(x) - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
 !> K + E being the dry friction of the machine, g_+, g_-, p, q and r functions given by tables. Free play in series with
 !> the linear spring k l makes its force k d, with d = l - (sqrt((l + g/2)^2 + e^2) - sqrt((l - g/2)^2 + e^2))/2: nothing within
 !> the play g and l -+ g/2 beyond it, with corners of the width e. Dahl's friction -h z takes the
@@ -20,18 +20,21 @@ module effect_law
 
   public :: add_to_effects, add_to_sensor, replace_friction, finish_effects, effect_force, effect_energy, &
     effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed, &
-    friction_change, steepest_by_speed, steepest_by_place, slip_in_series, stretch_force, stretch_slope, stretch_bounds, &
-    place_force, steepest_force
+    friction_change, change_over_bounce, slip_in_series, stretch_force, stretch_slope, stretch_bounds, place_force
 
   real(wp), parameter :: farthest_behind = 100
 
   type, public :: effects_t
-    !> Any force at all, and one that leaves no closed form.
-    logical :: present = .false., nonlinear = .false.
-    !> A force that only the position of body and foot sets, beside the cubic spring and the offset.
-    logical :: by_position = .false.
+    !> Any force at all, one that leaves no closed form, and one that lanes have no place for.
+    logical :: present = .false., nonlinear = .false., unknown_to_lanes = .false.
+    !> A force that only the position of body and foot sets, beside the cubic spring and the offset; any that the place changes.
+    logical :: by_position = .false., by_place = .false.
+    !> Dry friction; any force that is another one after the motion has turned round.
+    logical :: dry = .false., turns_round = .false.
     !> c [N s^2/m^2], b [N s/m], a [N], slope [1/m], k3 [N/m^3], F [N].
     real(wp) :: quadratic_drag = 0, asymmetric_viscous = 0, asymmetric_coulomb = 0, friction_slope = 0, cubic = 0, offset = 0
+    !> c3 [N s^3/m^3].
+    real(wp) :: cubic_damping = 0
     !> Dahl's friction: sigma [N/m], 0 = none, and mean sliding level [N].
     real(wp) :: dahl_stiffness = 0, dahl_sliding = 0
     !> g_+ and g_- [N] over the speed [m/s], p over the place [m]; without knots where there is none.
@@ -61,6 +64,8 @@ contains
     select case (choice%name)
     case ('quadratic_drag')
       effects%quadratic_drag = value_of(choice, 'coefficient')
+    case ('cubic_damping')
+      effects%cubic_damping = value_of(choice, 'coefficient')
     case ('asymmetric_friction')
       effects%asymmetric_coulomb = value_of(choice, 'coulomb')
       effects%asymmetric_viscous = value_of(choice, 'viscous')
@@ -121,14 +126,18 @@ contains
     if (effects%play > 0) effects%series_stiffness = stiffness
   end subroutine slip_in_series
 
-  !> What the effects together mean for the flights.
+  !> What the effects together mean for those who fly, vary or prepare a machine.
   pure subroutine finish_effects(effects)
     type(effects_t), intent(inout) :: effects
     effects%by_position = effects%play > 0 .or. effects%spring%count > 0 .or. effects%force%count > 0
-    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_position .or. &
-                        any(abs([effects%quadratic_drag, effects%asymmetric_viscous, &
-                                                                 effects%friction_slope, effects%cubic]) > 0) .or. &
-                        effects%upwards%count > 0 .or. effects%over_place%count > 0
+    effects%by_place = effects%by_position .or. any(abs([effects%cubic, effects%friction_slope]) > 0) .or. &
+                       effects%over_place%count > 0
+    effects%dry = abs(effects%asymmetric_coulomb) > 0 .or. effects%upwards%count > 0
+    effects%turns_round = effects%dry .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous]) > 0)
+    effects%unknown_to_lanes = effects%by_position .or. effects%upwards%count > 0 .or. effects%over_place%count > 0 .or. &
+                               effects%cubic_damping > 0
+    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_place .or. effects%unknown_to_lanes .or. &
+                        any(abs([effects%quadratic_drag, effects%asymmetric_viscous]) > 0)
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
   end subroutine finish_effects
 
@@ -151,8 +160,26 @@ contains
       force = force - effects%asymmetric_coulomb
     end if
     if (effects%upwards%count > 0) force = force - slip%direction*friction_change(effects, slip%direction, slip%direction*v)
+    if (effects%cubic_damping > 0) force = force - effects%cubic_damping*v**3
     if (effects%by_position) force = force + play_and_table(effects, stretch) + place_force(effects, x)
   end function effect_force
+
+  !> Bound [N] on the change of the forces over a bounce of a given `speed` [m/s] and `height` [m] from a place where Dahl's
+  !> friction is `z` [N] and the spring stretched by `stretch` [m].
+  pure real(wp) function change_over_bounce(effects, friction, z, stretch, speed, height) result(change)
+    type(effects_t), intent(in) :: effects
+    type(friction_t), intent(in) :: friction
+    real(wp), intent(in) :: z, stretch, speed, height
+    real(wp) :: bounds(2)
+    change = (effects%quadratic_drag*speed + abs(effects%asymmetric_viscous))*speed + height* &
+             (3*abs(effects%cubic)*stretch**2 + 2*effects%dahl_stiffness + &
+              (abs(effects%friction_slope) + steepest(effects%over_place))* &
+              (friction%kinetic + friction%excess + friction%second_excess + abs(effects%asymmetric_coulomb) + abs(z)))
+    change = change + max(steepest(effects%upwards), steepest(effects%downwards))*speed + effects%cubic_damping*speed**3
+    if (.not. effects%by_position) return
+    bounds = stretch_bounds(effects)
+    change = change + height*(bounds(1) + steepest(effects%force))
+  end function change_over_bounce
 
   !> Force [N] by which cubic spring, table and free play change that of the spring at a `stretch` [m].
   pure real(wp) function stretch_force(effects, stretch) result(force)
@@ -207,12 +234,6 @@ contains
     force = continued_at(effects%force, x)
   end function place_force
 
-  !> A bound on the derivative [N/m] of the force over the place.
-  pure real(wp) function steepest_force(effects) result(slope)
-    type(effects_t), intent(in) :: effects
-    slope = steepest(effects%force)
-  end function steepest_force
-
   !> Energy [J] of a body at `x` [m], the spring being stretched by `stretch` [m], in what only the position sets.
   pure real(wp) function effect_energy(effects, x, stretch) result(energy)
     type(effects_t), intent(in) :: effects
@@ -250,7 +271,7 @@ contains
                   + factor*effects%asymmetric_coulomb*v
     end if
     losses(1) = losses(1) + friction_change(effects, slip%direction, abs(v))*abs(v)
-    losses(2) = (effects%quadratic_drag*abs(v) + effects%asymmetric_viscous*slip%direction)*v**2
+    losses(2) = (effects%quadratic_drag*abs(v) + effects%asymmetric_viscous*slip%direction)*v**2 + effects%cubic_damping*v**4
   end function effect_losses
 
   !> h, by which the place `x` [m] changes dry friction.
@@ -274,17 +295,6 @@ contains
       change = continued_at(effects%downwards, speed)
     end if
   end function friction_change
-
-  !> Bounds on the derivatives of g [N s/m] and of p [1/m].
-  pure real(wp) function steepest_by_speed(effects) result(slope)
-    type(effects_t), intent(in) :: effects
-    slope = max(steepest(effects%upwards), steepest(effects%downwards))
-  end function steepest_by_speed
-
-  pure real(wp) function steepest_by_place(effects) result(slope)
-    type(effects_t), intent(in) :: effects
-    slope = abs(effects%friction_slope) + steepest(effects%over_place)
-  end function steepest_by_place
 
   !> Largest force [N] in `direction` +1 or -1 that holds no body at `x` [m].
   pure real(wp) function break_away_level(effects, friction, x, direction) result(level)

@@ -4,7 +4,8 @@
 !> Effects that may be added to a machine of one body: the rows of the catalogue. Any number of them, each once.
 module effect_rows
   use kinds, only: wp
-  use law_row, only: effect_confusion_t, effect_trait_t, law_row_t, none_above, none_below, parameter_row_t
+  use law_row, only: any_value, effect_confusion_t, effect_trait_t, law_row_t, not_negative, parameter_row_t, positive, &
+    positive_to_one, range_t
   implicit none
   private
 
@@ -13,10 +14,11 @@ module effect_rows
   character(len=*), parameter :: sum_of_laws = 'sum of two laws'
   character(len=*), parameter :: sensor = 'what a sensor shows; the motion is the same'
 
-  type(law_row_t), parameter, public :: effect_laws(26) = [ &
+  type(law_row_t), parameter, public :: effect_laws(*) = [ &
     law_row_t('effect', 'viscous', '-b v', sum_of_laws), &
     law_row_t('effect', 'coulomb', '-F sgn v; adds to sliding and to break-away friction', sum_of_laws), &
     law_row_t('effect', 'quadratic_drag', '-c v |v|', 'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
+    law_row_t('effect', 'cubic_damping', '-c v^3', 'Elliott, Tehrani, Langley, Phil. Trans. R. Soc. A 373 (2015) 20140402'), &
     law_row_t('effect', 'stribeck', '-E exp(-|v/v_s|^n) sgn v; adds E to break-away friction', &
               'Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083'), &
     law_row_t('effect', 'static_excess', 'adds to break-away friction', 'Coulomb, Theorie des machines simples (1785)'), &
@@ -55,94 +57,78 @@ module effect_rows
     law_row_t('effect', 'sensor_gain', 'a record shows (1 + gain) x', sensor), &
     law_row_t('effect', 'sensor_delay', 'a record shows x(t - delay)', sensor)]
 
-  type(parameter_row_t), parameter, public :: effect_parameters(44) = [ &
-    parameter_row_t('effect', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'b'), &
-    parameter_row_t('effect', 'coulomb', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'F'), &
-    parameter_row_t('effect', 'quadratic_drag', 'coefficient', 'N s^2/m^2', 0.0_wp, none_above, .false., .false., 0.0_wp, &
-                    .false., 'c'), &
-    parameter_row_t('effect', 'stribeck', 'excess', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+  type(parameter_row_t), parameter, public :: effect_parameters(*) = [ &
+    parameter_row_t('effect', 'viscous', 'damping', 'N s/m', not_negative, 'b'), &
+    parameter_row_t('effect', 'coulomb', 'force', 'N', not_negative, 'F'), &
+    parameter_row_t('effect', 'quadratic_drag', 'coefficient', 'N s^2/m^2', not_negative, 'c'), &
+    parameter_row_t('effect', 'cubic_damping', 'coefficient', 'N s^3/m^3', not_negative, 'c'), &
+    parameter_row_t('effect', 'stribeck', 'excess', 'N', not_negative, &
                     'E, friction at zero speed above that at high speed'), &
-    parameter_row_t('effect', 'stribeck', 'velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'v_s'), &
-    parameter_row_t('effect', 'stribeck', 'exponent', '1', 0.0_wp, none_above, .true., .true., 2.0_wp, .false., &
-                    'n'), &
-    parameter_row_t('effect', 'static_excess', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+    parameter_row_t('effect', 'stribeck', 'velocity', 'm/s', positive, 'v_s'), &
+    parameter_row_t('effect', 'stribeck', 'exponent', '1', positive, 'n', optional=.true., default=2.0_wp), &
+    parameter_row_t('effect', 'static_excess', 'force', 'N', not_negative, &
                     'friction at break-away above that of the machine'), &
-    parameter_row_t('effect', 'dahl', 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('effect', 'dahl', 'stiffness', 'N/m', positive, &
                     'sigma, stiffness of the friction before it slides'), &
-    parameter_row_t('effect', 'asymmetric_friction', 'coulomb', 'N', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'a, dry friction upwards above the mean of both directions; at most that mean'), &
-    parameter_row_t('effect', 'asymmetric_friction', 'viscous', 'N s/m', none_below, none_above, .false., .true., 0.0_wp, &
-                    .false., 'b, viscous friction upwards above the mean of both directions'), &
-    parameter_row_t('effect', 'position_dependent_friction', 'slope', '1/m', none_below, none_above, .false., .false., 0.0_wp, &
-                    .false., 'relative change of dry friction per length'), &
-    parameter_row_t('effect', 'friction_curve', 'speed', 'm/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
-                    'sliding speeds, ascending; straight on beyond the first and the last'), &
-    parameter_row_t('effect', 'friction_curve', 'upwards', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'change of the friction at these speeds upwards; at speed 0 also of break-away'), &
-    parameter_row_t('effect', 'friction_curve', 'downwards', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'the same downwards'), &
-    parameter_row_t('effect', 'friction_place_curve', 'place', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'places, ascending; straight on beyond the first and the last'), &
-    parameter_row_t('effect', 'friction_place_curve', 'change', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'relative change of dry friction at these places'), &
-    parameter_row_t('effect', 'cubic_spring', 'stiffness', 'N/m^3', none_below, none_above, .false., .false., 0.0_wp, .false., &
-                    'k3'), &
-    parameter_row_t('effect', 'spring_curve', 'stretch', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'stretches, ascending; straight on beyond the first and the last'), &
-    parameter_row_t('effect', 'spring_curve', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'force beyond that of the spring at these stretches'), &
-    parameter_row_t('effect', 'backlash', 'gap', 'm', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+    parameter_row_t('effect', 'asymmetric_friction', 'coulomb', 'N', any_value, &
+                    'a, dry friction upwards above the mean of both directions; at most that mean', optional=.true.), &
+    parameter_row_t('effect', 'asymmetric_friction', 'viscous', 'N s/m', any_value, &
+                    'b, viscous friction upwards above the mean of both directions', optional=.true.), &
+    parameter_row_t('effect', 'position_dependent_friction', 'slope', '1/m', any_value, &
+                    'relative change of dry friction per length'), &
+    parameter_row_t('effect', 'friction_curve', 'speed', 'm/s', not_negative, &
+                    'sliding speeds, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'friction_curve', 'upwards', 'N', any_value, &
+                    'change of the friction at these speeds upwards; at speed 0 also of break-away', list=.true.), &
+    parameter_row_t('effect', 'friction_curve', 'downwards', 'N', any_value, 'the same downwards', list=.true.), &
+    parameter_row_t('effect', 'friction_place_curve', 'place', 'm', any_value, &
+                    'places, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'friction_place_curve', 'change', '1', any_value, &
+                    'relative change of dry friction at these places', list=.true.), &
+    parameter_row_t('effect', 'cubic_spring', 'stiffness', 'N/m^3', any_value, 'k3'), &
+    parameter_row_t('effect', 'spring_curve', 'stretch', 'm', any_value, &
+                    'stretches, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'spring_curve', 'force', 'N', any_value, &
+                    'force beyond that of the spring at these stretches', list=.true.), &
+    parameter_row_t('effect', 'backlash', 'gap', 'm', not_negative, &
                     'g, stretch from one end of the play to the other'), &
-    parameter_row_t('effect', 'backlash', 'rounding', '1', 0.0_wp, 1.0_wp, .true., .true., 0.05_wp, .false., &
-                    'e/g, width of the corners of the force over the gap'), &
-    parameter_row_t('effect', 'force_curve', 'place', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'places, ascending; straight on beyond the first and the last'), &
-    parameter_row_t('effect', 'force_curve', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'force upwards at these places'), &
-    parameter_row_t('effect', 'offset_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .false., &
-                    'constant force upwards'), &
-    parameter_row_t('effect', 'restitution_slope', 'slope', 's/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'loss of restitution per speed'), &
-    parameter_row_t('effect', 'restitution_curve', 'speed', 'm/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
-                    'speeds of impact, ascending; constant beyond the first and the last'), &
-    parameter_row_t('effect', 'restitution_curve', 'change', '1', -1.0_wp, 1.0_wp, .false., .false., 0.0_wp, .true., &
-                    'change of the restitution at these speeds'), &
-    parameter_row_t('effect', 'compliant_contact', 'stiffness', 'N/m^n', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'K'), &
-    parameter_row_t('effect', 'compliant_contact', 'damping', 's/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'a = lambda/K; 1/a bounds the speed of rebound'), &
-    parameter_row_t('effect', 'compliant_contact', 'exponent', '1', 0.5_wp, 10.0_wp, .false., .true., 1.5_wp, .false., &
-                    'n: 1 for flat surfaces, 1.5 for spheres (Hertz)'), &
-    parameter_row_t('effect', 'kelvin_voigt_contact', 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'K'), &
-    parameter_row_t('effect', 'kelvin_voigt_contact', 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'D'), &
-    parameter_row_t('effect', 'contact_curve', 'penetration', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .true., &
-                    'penetrations above 0, ascending; straight on beyond the last'), &
-    parameter_row_t('effect', 'contact_curve', 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
-                    'force at these penetrations'), &
-    parameter_row_t('effect', 'contact_curve', 'damping', 's/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'a; 1/a bounds the speed of rebound'), &
-    parameter_row_t('effect', 'second_barrier', 'position', 'm', none_below, none_above, .false., .false., 0.0_wp, .false., &
+    parameter_row_t('effect', 'backlash', 'rounding', '1', positive_to_one, &
+                    'e/g, width of the corners of the force over the gap', optional=.true., default=0.05_wp), &
+    parameter_row_t('effect', 'force_curve', 'place', 'm', any_value, &
+                    'places, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'force_curve', 'force', 'N', any_value, 'force upwards at these places', list=.true.), &
+    parameter_row_t('effect', 'offset_force', 'force', 'N', any_value, 'constant force upwards'), &
+    parameter_row_t('effect', 'restitution_slope', 'slope', 's/m', not_negative, 'loss of restitution per speed'), &
+    parameter_row_t('effect', 'restitution_curve', 'speed', 'm/s', not_negative, &
+                    'speeds of impact, ascending; constant beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'restitution_curve', 'change', '1', range_t(-1.0_wp, 1.0_wp), &
+                    'change of the restitution at these speeds', list=.true.), &
+    parameter_row_t('effect', 'compliant_contact', 'stiffness', 'N/m^n', positive, 'K'), &
+    parameter_row_t('effect', 'compliant_contact', 'damping', 's/m', not_negative, &
+                    'a = lambda/K; 1/a bounds the speed of rebound', optional=.true.), &
+    parameter_row_t('effect', 'compliant_contact', 'exponent', '1', range_t(0.5_wp, 10.0_wp), &
+                    'n: 1 for flat surfaces, 1.5 for spheres (Hertz)', optional=.true., default=1.5_wp), &
+    parameter_row_t('effect', 'kelvin_voigt_contact', 'stiffness', 'N/m', positive, 'K'), &
+    parameter_row_t('effect', 'kelvin_voigt_contact', 'damping', 'N s/m', not_negative, 'D', optional=.true.), &
+    parameter_row_t('effect', 'contact_curve', 'penetration', 'm', positive, &
+                    'penetrations above 0, ascending; straight on beyond the last', list=.true.), &
+    parameter_row_t('effect', 'contact_curve', 'force', 'N', not_negative, 'force at these penetrations', list=.true.), &
+    parameter_row_t('effect', 'contact_curve', 'damping', 's/m', not_negative, 'a; 1/a bounds the speed of rebound', &
+                    optional=.true.), &
+    parameter_row_t('effect', 'second_barrier', 'position', 'm', any_value, &
                     'below an upper barrier, or above a lower one'), &
-    parameter_row_t('effect', 'drive_ripple', 'sine', 'rad', none_below, none_above, .false., .false., 0.0_wp, .false., &
+    parameter_row_t('effect', 'drive_ripple', 'sine', 'rad', any_value, &
                     'ripple of the crank angle in phase with sin(n phi)'), &
-    parameter_row_t('effect', 'drive_ripple', 'cosine', 'rad', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'ripple of the crank angle in phase with cos(n phi)'), &
-    parameter_row_t('effect', 'drive_ripple', 'harmonic', '1', 1.0_wp, 64.0_wp, .false., .true., 1.0_wp, .false., &
-                    'n, a whole number'), &
-    parameter_row_t('effect', 'drive_harmonics', 'cosine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'a_1, a_2, ...'), &
-    parameter_row_t('effect', 'drive_harmonics', 'sine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'b_1, b_2, ..., as many as cosine has'), &
-    parameter_row_t('effect', 'sensor_bias', 'bias', 'm', none_below, none_above, .false., .false., 0.0_wp, .false., &
-                    'added to the position'), &
-    parameter_row_t('effect', 'sensor_gain', 'gain', '1', none_below, none_above, .false., .false., 0.0_wp, .false., &
-                    'relative error of the scale'), &
-    parameter_row_t('effect', 'sensor_delay', 'delay', 's', none_below, none_above, .false., .false., 0.0_wp, .false., &
+    parameter_row_t('effect', 'drive_ripple', 'cosine', 'rad', any_value, &
+                    'ripple of the crank angle in phase with cos(n phi)', optional=.true.), &
+    parameter_row_t('effect', 'drive_ripple', 'harmonic', '1', range_t(1.0_wp, 64.0_wp), 'n, a whole number', &
+                    optional=.true., default=1.0_wp), &
+    parameter_row_t('effect', 'drive_harmonics', 'cosine', 'm', any_value, 'a_1, a_2, ...', list=.true.), &
+    parameter_row_t('effect', 'drive_harmonics', 'sine', 'm', any_value, 'b_1, b_2, ..., as many as cosine has', &
+                    list=.true.), &
+    parameter_row_t('effect', 'sensor_bias', 'bias', 'm', any_value, 'added to the position'), &
+    parameter_row_t('effect', 'sensor_gain', 'gain', '1', any_value, 'relative error of the scale'), &
+    parameter_row_t('effect', 'sensor_delay', 'delay', 's', any_value, &
                     'of the sensor behind the drive; negative if it is ahead')]
 
   character(len=*), parameter :: over_speed = 'friction over speed', over_impacts = 'restitution over impact speed', &
@@ -152,6 +138,7 @@ module effect_rows
     effect_trait_t('viscous', over_speed, 'flight', 'damping', '', ''), &
     effect_trait_t('coulomb', over_speed, 'flight', 'force', '', ''), &
     effect_trait_t('quadratic_drag', over_speed, 'flight', 'coefficient', '', ''), &
+    effect_trait_t('cubic_damping', over_speed, 'flight', 'coefficient', '', ''), &
     effect_trait_t('stribeck', over_speed, 'flight', 'excess', 'velocity', ''), &
     effect_trait_t('static_excess', over_speed, 'flight', '', 'force', ''), &
     effect_trait_t('dahl', 'friction before sliding', 'flight', '', 'stiffness', 'friction'), &
@@ -182,7 +169,7 @@ module effect_rows
   character(len=*), parameter :: scale = &
     'where friction, barrier and the scale of the drive are fitted, a gain of the sensor is a constant force'
 
-  type(effect_confusion_t), parameter, public :: effect_confusions(6) = [ &
+  type(effect_confusion_t), parameter, public :: effect_confusions(*) = [ &
     effect_confusion_t('asymmetric_friction', 'offset_force', sliding), &
     effect_confusion_t('asymmetric_friction', 'sensor_bias', shift), &
     effect_confusion_t('asymmetric_friction', 'sensor_gain', scale), &

@@ -36,20 +36,29 @@ module law_row
     character(len=112) :: reason
   end type effect_confusion_t
 
-  !> One parameter of one law. Values are in the SI unit given; bounds are closed unless open.
+  !> The values that a parameter may have, with the upper bound, and with the lower one unless it is open.
+  type, public :: range_t
+    real(wp) :: lower, upper
+    logical :: lower_open = .false.
+  end type range_t
+
+  type(range_t), parameter, public :: any_value = range_t(none_below, none_above), not_negative = range_t(0.0_wp, none_above), &
+    positive = range_t(0.0_wp, none_above, lower_open=.true.), zero_to_one = range_t(0.0_wp, 1.0_wp), &
+    positive_to_one = range_t(0.0_wp, 1.0_wp, lower_open=.true.)
+
+  !> One parameter of one law, in the SI unit given.
   type, public :: parameter_row_t
     character(len=family_length) :: family
     character(len=law_length) :: law
     character(len=20) :: name
     character(len=10) :: unit
-    real(wp) :: lower, upper
-    logical :: lower_open
-    !> An optional parameter takes its default.
-    logical :: optional
-    real(wp) :: default
-    !> A list of any length instead of one number.
-    logical :: list
+    type(range_t) :: range
     character(len=88) :: meaning
+    !> An optional parameter takes its default.
+    logical :: optional = .false.
+    real(wp) :: default = 0
+    !> A list of any length instead of one number.
+    logical :: list = .false.
   end type parameter_row_t
 
 end module law_row

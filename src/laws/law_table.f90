@@ -8,7 +8,8 @@ module law_table
   use contact_rows, only: contact_laws, contact_parameters
   use effect_rows, only: effect_laws, effect_parameters
   use kinds, only: wp
-  use law_row, only: family_length, law_length, law_row_t, none_above, none_below, parameter_row_t
+  use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive, range_t, &
+    zero_to_one
   use pair_rows, only: pair_laws, pair_parameters
   use part_rows, only: part_laws, part_parameters
   use text, only: join
@@ -50,7 +51,7 @@ module law_table
 
   character(len=*), parameter :: lemes = 'Lemes et al., vibro-impact system with ideal excitation'
 
-  type(law_row_t), parameter :: other_laws(14) = [ &
+  type(law_row_t), parameter :: other_laws(*) = [ &
     law_row_t('body', 'point_mass', 'one body on a horizontal guide', lemes), &
     law_row_t('restoring', 'linear', 'force c (l0 + x_A - x)', lemes), &
     law_row_t('restoring', 'pendulum', '-moment sin x; x is an angle, the mass an inertia', &
@@ -71,81 +72,69 @@ module law_table
     law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats as `periodic` says', &
               'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)')]
 
-  type(parameter_row_t), parameter :: other_parameters(37) = [ &
-    parameter_row_t('body', 'point_mass', 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'm'), &
-    parameter_row_t('body', 'point_mass', 'gravity', 'm/s^2', 0.0_wp, none_above, .false., .true., 9.81_wp, .false., &
-                    'g; normal force of the friction laws is m g'), &
-    parameter_row_t('restoring', 'linear', 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'c'), &
-    parameter_row_t('restoring', 'linear', 'free_length', 'm', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'l0, undeformed length of the spring'), &
-    parameter_row_t('restoring', 'pendulum', 'moment', 'N m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+  type(parameter_row_t), parameter :: other_parameters(*) = [ &
+    parameter_row_t('body', 'point_mass', 'mass', 'kg', positive, 'm'), &
+    parameter_row_t('body', 'point_mass', 'gravity', 'm/s^2', not_negative, &
+                    'g; normal force of the friction laws is m g', optional=.true., default=9.81_wp), &
+    parameter_row_t('restoring', 'linear', 'stiffness', 'N/m', positive, 'c'), &
+    parameter_row_t('restoring', 'linear', 'free_length', 'm', not_negative, 'l0, undeformed length of the spring', &
+                    optional=.true.), &
+    parameter_row_t('restoring', 'pendulum', 'moment', 'N m', positive, &
                     'm g a, weight times distance of the centre of mass'), &
-    parameter_row_t('friction', 'coulomb', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'mu while sliding'), &
-    parameter_row_t('friction', 'coulomb', 'static_coefficient', '1', 0.0_wp, none_above, .false., .true., -1.0_wp, .false., &
-                    'mu_s at break-away; the kinetic coefficient if absent, never below it'), &
-    parameter_row_t('friction', 'viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'b'), &
-    parameter_row_t('friction', 'coulomb_viscous', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, &
-                    .false., 'mu while sliding'), &
-    parameter_row_t('friction', 'coulomb_viscous', 'static_coefficient', '1', 0.0_wp, none_above, .false., .true., -1.0_wp, &
-                    .false., 'mu_s at break-away; the kinetic coefficient if absent, never below it'), &
-    parameter_row_t('friction', 'coulomb_viscous', 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'b'), &
-    parameter_row_t('friction', 'coulomb_stribeck', 'kinetic_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, &
-                    .false., 'mu at high speed'), &
-    parameter_row_t('friction', 'coulomb_stribeck', 'static_coefficient', '1', 0.0_wp, none_above, .false., .false., 0.0_wp, &
-                    .false., 'mu_s at zero speed and at break-away, never below the kinetic coefficient'), &
-    parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, &
-                    .false., 'v_s'), &
-    parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_exponent', '1', 0.0_wp, none_above, .true., .true., 1.0_wp, &
-                    .false., 'delta'), &
-    parameter_row_t('drive', 'harmonic', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('friction', 'coulomb', 'kinetic_coefficient', '1', not_negative, 'mu while sliding'), &
+    parameter_row_t('friction', 'coulomb', 'static_coefficient', '1', not_negative, &
+                    'mu_s at break-away; the kinetic coefficient if absent, never below it', optional=.true., &
+                    default=-1.0_wp), &
+    parameter_row_t('friction', 'viscous', 'damping', 'N s/m', not_negative, 'b'), &
+    parameter_row_t('friction', 'coulomb_viscous', 'kinetic_coefficient', '1', not_negative, 'mu while sliding'), &
+    parameter_row_t('friction', 'coulomb_viscous', 'static_coefficient', '1', not_negative, &
+                    'mu_s at break-away; the kinetic coefficient if absent, never below it', optional=.true., &
+                    default=-1.0_wp), &
+    parameter_row_t('friction', 'coulomb_viscous', 'damping', 'N s/m', not_negative, 'b'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'kinetic_coefficient', '1', not_negative, 'mu at high speed'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'static_coefficient', '1', not_negative, &
+                    'mu_s at zero speed and at break-away, never below the kinetic coefficient'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_velocity', 'm/s', positive, 'v_s'), &
+    parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_exponent', '1', positive, 'delta', optional=.true., &
+                    default=1.0_wp), &
+    parameter_row_t('drive', 'harmonic', 'ratio', '1', positive, &
                     'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
-    parameter_row_t('drive', 'harmonic', 'mean', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'mean position of the foot of the spring'), &
-    parameter_row_t('drive', 'harmonic', 'amplitude', 'm', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'amplitude of the foot'), &
-    parameter_row_t('drive', 'harmonic', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
-                    'offset added to the crank angle'), &
-    parameter_row_t('drive', 'fourier', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('drive', 'harmonic', 'mean', 'm', any_value, 'mean position of the foot of the spring', &
+                    optional=.true.), &
+    parameter_row_t('drive', 'harmonic', 'amplitude', 'm', not_negative, 'amplitude of the foot'), &
+    parameter_row_t('drive', 'harmonic', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
+                    'offset added to the crank angle', optional=.true.), &
+    parameter_row_t('drive', 'fourier', 'ratio', '1', positive, &
                     'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
-    parameter_row_t('drive', 'fourier', 'mean', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'mean position of the foot of the spring'), &
-    parameter_row_t('drive', 'fourier', 'cosine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'a_1, a_2, ...'), &
-    parameter_row_t('drive', 'fourier', 'sine', 'm', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'b_1, b_2, ..., as many as cosine has'), &
-    parameter_row_t('drive', 'fourier', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
-                    'offset added to the crank angle'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'ratio', '1', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('drive', 'fourier', 'mean', 'm', any_value, 'mean position of the foot of the spring', &
+                    optional=.true.), &
+    parameter_row_t('drive', 'fourier', 'cosine', 'm', any_value, 'a_1, a_2, ...', list=.true.), &
+    parameter_row_t('drive', 'fourier', 'sine', 'm', any_value, 'b_1, b_2, ..., as many as cosine has', list=.true.), &
+    parameter_row_t('drive', 'fourier', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
+                    'offset added to the crank angle', optional=.true.), &
+    parameter_row_t('drive', 'crank_lever_rod', 'ratio', '1', positive, &
                     'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'crank', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'r = OD'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'pivot_distance', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'l1 = OC, longer than the crank'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'lever', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'l2 = CE'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'rod', 'm', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'l3 = EA'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'pivot_angle', 'rad', -largest_angle, largest_angle, .false., .false., 0.0_wp, &
-                    .false., 'B, direction of O seen from C against the guide'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'guide_height', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'h, distance of the guide of A from C'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'side', '1', -1.0_wp, 1.0_wp, .false., .true., 1.0_wp, .false., &
-                    'sigma, +1 or -1: A is ahead of E or behind it'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'shift', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    's, position of C on the axis of x'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', -largest_angle, largest_angle, .false., .true., 0.0_wp, .false., &
-                    'offset added to the crank angle'), &
-    parameter_row_t('drive', 'measured_force', 'interval', 's', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
+    parameter_row_t('drive', 'crank_lever_rod', 'crank', 'm', positive, 'r = OD'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'pivot_distance', 'm', positive, 'l1 = OC, longer than the crank'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'lever', 'm', positive, 'l2 = CE'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'rod', 'm', positive, 'l3 = EA'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'pivot_angle', 'rad', range_t(-largest_angle, largest_angle), &
+                    'B, direction of O seen from C against the guide'), &
+    parameter_row_t('drive', 'crank_lever_rod', 'guide_height', 'm', any_value, &
+                    'h, distance of the guide of A from C', optional=.true.), &
+    parameter_row_t('drive', 'crank_lever_rod', 'side', '1', range_t(-1.0_wp, 1.0_wp), &
+                    'sigma, +1 or -1: A is ahead of E or behind it', optional=.true., default=1.0_wp), &
+    parameter_row_t('drive', 'crank_lever_rod', 'shift', 'm', any_value, 's, position of C on the axis of x', &
+                    optional=.true.), &
+    parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
+                    'offset added to the crank angle', optional=.true.), &
+    parameter_row_t('drive', 'measured_force', 'interval', 's', positive, &
                     'time between samples; from the file if the force is one'), &
-    parameter_row_t('drive', 'measured_force', 'force', 'N', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'samples from the start on, or the name of a CSV file with columns t and force'), &
-    parameter_row_t('drive', 'measured_force', 'periodic', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
-                    '1: samples of one period, a last step leads back to the first; 0: up to the last')]
+    parameter_row_t('drive', 'measured_force', 'force', 'N', any_value, &
+                    'samples from the start on, or the name of a CSV file with columns t and force', list=.true.), &
+    parameter_row_t('drive', 'measured_force', 'periodic', '1', zero_to_one, &
+                    '1: samples of one period, a last step leads back to the first; 0: up to the last', &
+                    optional=.true.)]
 
   type(law_row_t), parameter, public :: laws( &
     size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws)) = &

@@ -4,7 +4,7 @@
 !> Two bodies coupled by dry friction, and what drives the first of them: the rows of the catalogue.
 module pair_rows
   use kinds, only: wp
-  use law_row, only: law_length, law_row_t, none_above, none_below, parameter_row_t
+  use law_row, only: any_value, law_length, law_row_t, not_negative, parameter_row_t, positive
   implicit none
   private
 
@@ -18,7 +18,7 @@ module pair_rows
   character(len=law_length), parameter :: sines(2) = [character(len=law_length) :: 'sine', 'pid_sine']
   character(len=law_length), parameter :: controllers(2) = [character(len=law_length) :: 'pid_velocity', 'pid_sine']
 
-  type(law_row_t), parameter, public :: pair_laws(7) = [ &
+  type(law_row_t), parameter, public :: pair_laws(*) = [ &
     law_row_t('body', 'friction_pair', 'two bodies coupled by b sgn(v1 - v2) alone; barriers bound x2', source), &
     law_row_t('body', 'backlash_pair', 'the same; barriers carried by the driving body bound x2 - x1', source), &
     law_row_t('drive', 'force', 'two bodies: force mean + amplitude cos(frequency t) on the driving one', source), &
@@ -28,40 +28,32 @@ module pair_rows
     law_row_t('drive', 'pid_sine', 'two bodies: a controller moves the driving one along amplitude sin(frequency t)', &
               experiments)]
 
-  type(parameter_row_t), parameter, public :: pair_parameters(31) = [ &
-    (parameter_row_t('body', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'm1 of the driving body'), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'driven_mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'm2 of the driven body'), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'friction', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                     'b, Coulomb friction of the interface'), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'driver_x0', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'position of the driving body at the start; without effect where its motion is given'), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'driver_v0', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'velocity of the driving body at the start; without effect where its motion is given'), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'blow', 'N s', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'impulse of a hammer on the driven body'), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'blow_time', 's', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'time of the blow since the start'), i=1, 2), &
-    parameter_row_t('drive', 'force', 'mean', 'N', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'mean force'), &
-    parameter_row_t('drive', 'force', 'amplitude', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'amplitude of the force'), &
-    parameter_row_t('drive', 'force', 'frequency', 'rad/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'angular frequency'), &
-    (parameter_row_t('drive', at_speed(i), 'velocity', 'm/s', none_below, none_above, .false., .false., 0.0_wp, .false., &
-                     'V'), i=1, 2), &
-    (parameter_row_t('drive', sines(i), 'amplitude', 'm', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                     'X'), i=1, 2), &
-    (parameter_row_t('drive', sines(i), 'frequency', 'rad/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'W'), i=1, 2), &
-    (parameter_row_t('drive', controllers(i), 'proportional', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'force per error of position'), i=1, 2), &
-    (parameter_row_t('drive', controllers(i), 'integral', 'N/(ms)', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'force per integral of the error'), i=1, 2), &
-    (parameter_row_t('drive', controllers(i), 'derivative', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'force per error of velocity'), i=1, 2), &
-    (parameter_row_t('drive', controllers(i), 'sample_time', 's', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'time between samples of the controller; 0 = continuous'), i=1, 2)]
+  type(parameter_row_t), parameter, public :: pair_parameters(*) = [ &
+    (parameter_row_t('body', bodies(i), 'mass', 'kg', positive, 'm1 of the driving body'), i=1, 2), &
+    (parameter_row_t('body', bodies(i), 'driven_mass', 'kg', positive, 'm2 of the driven body'), i=1, 2), &
+    (parameter_row_t('body', bodies(i), 'friction', 'N', not_negative, 'b, Coulomb friction of the interface'), i=1, 2), &
+    (parameter_row_t('body', bodies(i), 'driver_x0', 'm', any_value, &
+                     'position of the driving body at the start; without effect where its motion is given', &
+                     optional=.true.), i=1, 2), &
+    (parameter_row_t('body', bodies(i), 'driver_v0', 'm/s', any_value, &
+                     'velocity of the driving body at the start; without effect where its motion is given', &
+                     optional=.true.), i=1, 2), &
+    (parameter_row_t('body', bodies(i), 'blow', 'N s', any_value, 'impulse of a hammer on the driven body', &
+                     optional=.true.), i=1, 2), &
+    (parameter_row_t('body', bodies(i), 'blow_time', 's', not_negative, 'time of the blow since the start', &
+                     optional=.true.), i=1, 2), &
+    parameter_row_t('drive', 'force', 'mean', 'N', any_value, 'mean force', optional=.true.), &
+    parameter_row_t('drive', 'force', 'amplitude', 'N', not_negative, 'amplitude of the force'), &
+    parameter_row_t('drive', 'force', 'frequency', 'rad/s', positive, 'angular frequency'), &
+    (parameter_row_t('drive', at_speed(i), 'velocity', 'm/s', any_value, 'V'), i=1, 2), &
+    (parameter_row_t('drive', sines(i), 'amplitude', 'm', not_negative, 'X'), i=1, 2), &
+    (parameter_row_t('drive', sines(i), 'frequency', 'rad/s', positive, 'W'), i=1, 2), &
+    (parameter_row_t('drive', controllers(i), 'proportional', 'N/m', positive, 'force per error of position'), i=1, 2), &
+    (parameter_row_t('drive', controllers(i), 'integral', 'N/(ms)', not_negative, 'force per integral of the error', &
+                     optional=.true.), i=1, 2), &
+    (parameter_row_t('drive', controllers(i), 'derivative', 'N s/m', not_negative, 'force per error of velocity', &
+                     optional=.true.), i=1, 2), &
+    (parameter_row_t('drive', controllers(i), 'sample_time', 's', not_negative, &
+                     'time between samples of the controller; 0 = continuous', optional=.true.), i=1, 2)]
 
 end module pair_rows

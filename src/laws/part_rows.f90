@@ -6,7 +6,8 @@
 module part_rows
   use contact_rows, only: contact_laws, contact_parameters
   use kinds, only: wp
-  use law_row, only: law_length, law_row_t, none_above, none_below, parameter_row_t
+  use law_row, only: any_value, law_length, law_row_t, none_above, none_below, not_negative, parameter_row_t, positive, &
+    range_t, zero_to_one
   implicit none
   private
 
@@ -30,7 +31,7 @@ module part_rows
   character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
   character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
 
-  type(law_row_t), parameter, public :: part_laws(33) = [ &
+  type(law_row_t), parameter, public :: part_laws(*) = [ &
     law_row_t('body', 'structure', 'several bodies and structures, with springs, joints and drives between them', &
               'Pfeiffer, Glocker, Multibody Dynamics with Unilateral Contacts, 1996'), &
     law_row_t('part', bodies(1), 'the body that x0, v0 and the results refer to: the first one, or watch.body', ''), &
@@ -62,104 +63,87 @@ module part_rows
 
   !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
   !> drive, one place.
-  type(parameter_row_t), parameter, public :: part_parameters(195) = [ &
-    parameter_row_t('body', 'structure', 'in_sequence', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
-                    'impacts of several contacts at once: 0 all together by one law, 1 one after the other'), &
-    (parameter_row_t('part', bodies(i), 'mass', 'kg', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                     'mass'), i=1, 2), &
-    (parameter_row_t('part', bodies(i), 'load', 'N', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'constant force, a weight for instance'), i=1, 2), &
-    parameter_row_t('part', bodies(2), 'x0', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'position at the start'), &
-    parameter_row_t('part', bodies(2), 'v0', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'velocity at the start'), &
-    parameter_row_t('part', structures(1), 'mass', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'M row by row, or the name of a Matrix Market file'), &
-    parameter_row_t('part', structures(1), 'stiffness', '1', none_below, none_above, .false., .false., 0.0_wp, .true., &
-                    'K, likewise'), &
-    parameter_row_t('part', structures(2), 'frequency', 'rad/s', 0.0_wp, none_above, .false., .false., 0.0_wp, .true., &
-                    'angular frequencies of the undamped modes; 0: rigid'), &
-    parameter_row_t('part', structures(2), 'damping_ratios', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .true., &
-                    'of each mode; 1 and more: overdamped'), &
-    (parameter_row_t('part', structures(i), 'damping', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
-                     'C row by row, of any form, in the coordinates of the law'), i=1, 2), &
-    (parameter_row_t('part', structures(i), 'damping_ratio', '1', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
-                     'of every mode, in the place of any other damping; -1: none is given'), i=1, 2), &
-    (parameter_row_t('part', structures(i), 'x0', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
-                     'coordinates at the start, before the watched point is moved'), i=1, 2), &
-    (parameter_row_t('part', structures(i), 'v0', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
-                     'their rates at the start'), i=1, 2), &
-    (parameter_row_t('part', points(i), 'structure', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the structure'), i=1, 2), &
-    (parameter_row_t('part', points(i), 'row', '1', none_below, none_above, .false., .true., 0.0_wp, .true., &
-                     'its displacement for one of each coordinate'), i=1, 2), &
-    (parameter_row_t('part', joints(i), 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the first body between'), i=1, 12), &
-    (parameter_row_t('part', joints(i), 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the second body between'), i=1, 12), &
-    (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
-                     .false., 'number of the first body between'), i=1, 12), &
-    (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, &
-                     .false., 'number of the second body between'), i=1, 12), &
-    (parameter_row_t('part', 'contact:'//kept(i)%law, kept(i)%name, kept(i)%unit, kept(i)%lower, kept(i)%upper, &
-                     kept(i)%lower_open, kept(i)%optional, kept(i)%default, kept(i)%list, kept(i)%meaning), i=1, 64), &
-    (parameter_row_t('part', springs(i), 'stiffness', 'N/m', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'k; may be negative'), i=1, 2), &
-    parameter_row_t('part', springs(2), 'quadratic', 'N/m^2', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'k2'), &
-    parameter_row_t('part', springs(2), 'cubic', 'N/m^3', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                    'k3'), &
-    parameter_row_t('part', springs(3), 'moment', 'N m', none_below, none_above, .false., .false., 0.0_wp, .false., &
+  type(parameter_row_t), parameter, public :: part_parameters(*) = [ &
+    parameter_row_t('body', 'structure', 'in_sequence', '1', zero_to_one, &
+                    'impacts of several contacts at once: 0 all together by one law, 1 one after the other', &
+                    optional=.true.), &
+    (parameter_row_t('part', bodies(i), 'mass', 'kg', positive, 'mass'), i=1, 2), &
+    (parameter_row_t('part', bodies(i), 'load', 'N', any_value, 'constant force, a weight for instance', &
+                     optional=.true.), i=1, 2), &
+    parameter_row_t('part', bodies(2), 'x0', 'm', any_value, 'position at the start', optional=.true.), &
+    parameter_row_t('part', bodies(2), 'v0', 'm/s', any_value, 'velocity at the start', optional=.true.), &
+    parameter_row_t('part', structures(1), 'mass', '1', any_value, &
+                    'M row by row, or the name of a Matrix Market file', list=.true.), &
+    parameter_row_t('part', structures(1), 'stiffness', '1', any_value, 'K, likewise', list=.true.), &
+    parameter_row_t('part', structures(2), 'frequency', 'rad/s', not_negative, &
+                    'angular frequencies of the undamped modes; 0: rigid', list=.true.), &
+    parameter_row_t('part', structures(2), 'damping_ratios', '1', not_negative, &
+                    'of each mode; 1 and more: overdamped', optional=.true., list=.true.), &
+    (parameter_row_t('part', structures(i), 'damping', '1', any_value, &
+                     'C row by row, of any form, in the coordinates of the law', optional=.true., list=.true.), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'damping_ratio', '1', range_t(-1.0_wp, none_above), &
+                     'of every mode, in the place of any other damping; -1: none is given', optional=.true., &
+                     default=-1.0_wp), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'x0', '1', any_value, &
+                     'coordinates at the start, before the watched point is moved', optional=.true., list=.true.), i=1, 2), &
+    (parameter_row_t('part', structures(i), 'v0', '1', any_value, 'their rates at the start', optional=.true., &
+                     list=.true.), i=1, 2), &
+    (parameter_row_t('part', points(i), 'structure', '1', not_negative, 'number of the structure', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', points(i), 'row', '1', any_value, 'its displacement for one of each coordinate', &
+                     optional=.true., list=.true.), i=1, 2), &
+    (parameter_row_t('part', joints(i), 'first_end', '1', not_negative, 'number of the first body between', &
+                     optional=.true.), i=1, 12), &
+    (parameter_row_t('part', joints(i), 'second_end', '1', not_negative, 'number of the second body between', &
+                     optional=.true.), i=1, 12), &
+    (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', not_negative, &
+                     'number of the first body between', optional=.true.), i=1, 12), &
+    (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', not_negative, &
+                     'number of the second body between', optional=.true.), i=1, 12), &
+    (parameter_row_t('part', 'contact:'//kept(i)%law, kept(i)%name, kept(i)%unit, kept(i)%range, kept(i)%meaning, &
+                     kept(i)%optional, kept(i)%default, kept(i)%list), i=1, 64), &
+    (parameter_row_t('part', springs(i), 'stiffness', 'N/m', any_value, 'k; may be negative', optional=.true.), i=1, 2), &
+    parameter_row_t('part', springs(2), 'quadratic', 'N/m^2', any_value, 'k2', optional=.true.), &
+    parameter_row_t('part', springs(2), 'cubic', 'N/m^3', any_value, 'k3', optional=.true.), &
+    parameter_row_t('part', springs(3), 'moment', 'N m', any_value, &
                     'weight times distance of the centre of mass; negative for an inverted pendulum'), &
-    (parameter_row_t('part', springs(i), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'c'), i=1, 3), &
-    (parameter_row_t('part', springs(i), 'free_length', 'm', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'second minus first where the spring is without force'), i=1, 3), &
-    (parameter_row_t('part', frictions(i), 'force', 'N', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
+    (parameter_row_t('part', springs(i), 'damping', 'N s/m', not_negative, 'c', optional=.true.), i=1, 3), &
+    (parameter_row_t('part', springs(i), 'free_length', 'm', any_value, &
+                     'second minus first where the spring is without force', optional=.true.), i=1, 3), &
+    (parameter_row_t('part', frictions(i), 'force', 'N', not_negative, &
                      'friction while sliding; at high speed where it depends on the speed'), i=1, 6), &
-    (parameter_row_t('part', frictions(i), 'static_force', 'N', -1.0_wp, none_above, .false., .true., -1.0_wp, .false., &
-                     'friction at break-away; that of sliding if absent, never below it'), i=1, 6), &
-    (parameter_row_t('part', frictions(i), 'velocity', 'm/s', none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'velocity of the surface of the first body or the ground: a belt'), i=1, 6), &
-    parameter_row_t('part', frictions(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'of the spring'), &
-    parameter_row_t('part', frictions(3), 'damping', 'N s/m', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'b'), &
-    parameter_row_t('part', frictions(4), 'stribeck_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'v_s'), &
-    parameter_row_t('part', frictions(4), 'stribeck_exponent', '1', 0.0_wp, none_above, .true., .true., 1.0_wp, .false., &
-                    'delta'), &
-    parameter_row_t('part', frictions(5), 'fading_velocity', 'm/s', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'v_f'), &
-    parameter_row_t('part', frictions(6), 'drag', 'N s^2/m^2', 0.0_wp, none_above, .false., .false., 0.0_wp, .false., &
-                    'd'), &
-    parameter_row_t('part', contacts(1), 'restitution', '1', 0.0_wp, 1.0_wp, .false., .false., 0.0_wp, .false., &
-                    'e'), &
-    parameter_row_t('part', contacts(2), 'stiffness', 'N/m', 0.0_wp, none_above, .true., .false., 0.0_wp, .false., &
-                    'K'), &
-    parameter_row_t('part', contacts(2), 'damping', 'N s/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'D'), &
-    parameter_row_t('part', contacts(3), 'stiffness', 'N/m', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                    'that of the modes which structure.NAME.modes leaves out, if 0'), &
-    parameter_row_t('part', contacts(2), 'tension', '1', 0.0_wp, 1.0_wp, .false., .true., 0.0_wp, .false., &
-                    '1: the force may pull, 0: it ends where it would'), &
-    (parameter_row_t('part', contacts(i), 'upper', 'm', none_below, none_above, .false., .true., none_above, .false., &
-                     'largest value of second minus first'), i=1, 3), &
-    (parameter_row_t('part', contacts(i), 'lower', 'm', none_below, none_above, .false., .true., none_below, .false., &
-                     'smallest value of second minus first'), i=1, 3), &
-    (parameter_row_t('part', drives(i), 'body', '1', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'number of the body'), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'frequency', 'rad/s', 0.0_wp, none_above, .false., .true., 0.0_wp, .false., &
-                     'angular frequency; that of the first drive if absent'), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'mean', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'mean'), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'amplitude', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .false., &
-                     'amplitude'), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'angle', 'rad', -1e4_wp, 1e4_wp, .false., .true., 0.0_wp, .false., &
-                     'added to the angle phi of the drive'), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'cosine', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .true., &
-                     'a_1, a_2, ... of cos(n phi), besides the amplitude'), i=1, 2), &
-    (parameter_row_t('part', drives(i), 'sine', drive_unit(i), none_below, none_above, .false., .true., 0.0_wp, .true., &
-                     'b_1, b_2, ... of sin(n phi)'), i=1, 2)]
+    (parameter_row_t('part', frictions(i), 'static_force', 'N', range_t(-1.0_wp, none_above), &
+                     'friction at break-away; that of sliding if absent, never below it', optional=.true., &
+                     default=-1.0_wp), i=1, 6), &
+    (parameter_row_t('part', frictions(i), 'velocity', 'm/s', any_value, &
+                     'velocity of the surface of the first body or the ground: a belt', optional=.true.), i=1, 6), &
+    parameter_row_t('part', frictions(2), 'stiffness', 'N/m', positive, 'of the spring'), &
+    parameter_row_t('part', frictions(3), 'damping', 'N s/m', not_negative, 'b'), &
+    parameter_row_t('part', frictions(4), 'stribeck_velocity', 'm/s', positive, 'v_s'), &
+    parameter_row_t('part', frictions(4), 'stribeck_exponent', '1', positive, 'delta', optional=.true., &
+                    default=1.0_wp), &
+    parameter_row_t('part', frictions(5), 'fading_velocity', 'm/s', positive, 'v_f'), &
+    parameter_row_t('part', frictions(6), 'drag', 'N s^2/m^2', not_negative, 'd'), &
+    parameter_row_t('part', contacts(1), 'restitution', '1', zero_to_one, 'e'), &
+    parameter_row_t('part', contacts(2), 'stiffness', 'N/m', positive, 'K'), &
+    parameter_row_t('part', contacts(2), 'damping', 'N s/m', not_negative, 'D', optional=.true.), &
+    parameter_row_t('part', contacts(3), 'stiffness', 'N/m', not_negative, &
+                    'that of the modes which structure.NAME.modes leaves out, if 0', optional=.true.), &
+    parameter_row_t('part', contacts(2), 'tension', '1', zero_to_one, '1: the force may pull, 0: it ends where it would', &
+                    optional=.true.), &
+    (parameter_row_t('part', contacts(i), 'upper', 'm', any_value, 'largest value of second minus first', &
+                     optional=.true., default=none_above), i=1, 3), &
+    (parameter_row_t('part', contacts(i), 'lower', 'm', any_value, 'smallest value of second minus first', &
+                     optional=.true., default=none_below), i=1, 3), &
+    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'frequency', 'rad/s', not_negative, &
+                     'angular frequency; that of the first drive if absent', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'mean', drive_unit(i), any_value, 'mean', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'amplitude', drive_unit(i), any_value, 'amplitude', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'angle', 'rad', range_t(-1e4_wp, 1e4_wp), &
+                     'added to the angle phi of the drive', optional=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'cosine', drive_unit(i), any_value, &
+                     'a_1, a_2, ... of cos(n phi), besides the amplitude', optional=.true., list=.true.), i=1, 2), &
+    (parameter_row_t('part', drives(i), 'sine', drive_unit(i), any_value, 'b_1, b_2, ... of sin(n phi)', &
+                     optional=.true., list=.true.), i=1, 2)]
 
 end module part_rows

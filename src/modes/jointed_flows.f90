@@ -3,15 +3,15 @@
 
 !> A jointed structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
 module jointed_flows
-  use jointed, only: joint_contact, joint_section, joint_t, jointed_t, most_degrees
+  use jointed, only: joint_contact, joint_section, joint_soft, joint_t, jointed_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: flight_adaptive, options_t
-  use section_directions, only: directions_of
+  use section_directions, only: directions_of, speeds_of
   implicit none
   private
 
-  public :: prepare_jointed, ready, with_matrix
+  public :: prepare_jointed, ready, with_matrix, without_contacts
 
   !> Machines with no more joints have the flows of all their modes ready.
   integer, parameter :: few_joints = 4
@@ -21,6 +21,10 @@ module jointed_flows
     type(mode_flow_t), allocatable :: flows(:)
     !> Directions (columns) of the positions that are coordinates on the section.
     real(wp), allocatable :: directions(:, :)
+    !> Those of the velocities.
+    real(wp), allocatable :: speeds(:, :)
+    !> One position counts, for the stops alone: motions without impacts are families, one at every place between them.
+    logical :: drifts = .false.
     integer :: harmonics = 0
     !> Number of the joint that is the section of a machine without a clock; 0: the section is a time.
     integer :: section = 0
@@ -42,6 +46,12 @@ contains
     moving%harmonics = harmonics_of(machine)
     call directions_of(machine, directions, places)
     moving%directions = directions(:machine%n, :places)
+    call speeds_of(machine, directions, places)
+    moving%speeds = directions(:machine%n, :places)
+    if (machine%driven .and. machine%linear .and. options%flight /= flight_adaptive .and. size(moving%directions, 2) == 1) then
+      call directions_of(without_contacts(machine), directions, places)
+      moving%drifts = places == 0
+    end if
     joints = size(machine%joints)
     if (.not. machine%driven) then
       moving%section = joints + 1
@@ -60,6 +70,21 @@ contains
       end do
     end if
   end subroutine prepare_jointed
+
+  !> The same machine without stops.
+  pure type(jointed_t) function without_contacts(machine) result(free)
+    type(jointed_t), intent(in) :: machine
+    integer :: j, k
+    free = machine
+    deallocate (free%joints)
+    allocate (free%joints(count(machine%joints%kind /= joint_contact .and. machine%joints%kind /= joint_soft)))
+    k = 0
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind == joint_contact .or. machine%joints(j)%kind == joint_soft) cycle
+      k = k + 1
+      free%joints(k) = machine%joints(j)
+    end do
+  end function without_contacts
 
   !> The section of a machine without a clock: the maxima of the watched coordinate; its minima where a rigid stop cuts the
   !> maxima off, for there the speed jumps.

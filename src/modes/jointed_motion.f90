@@ -109,6 +109,7 @@ contains
     watch%extremes = [tally%x_min, tally%x_max]
     watch%top_speed = tally%v_max
     watch%wants_speed = tally%wants_v_max
+    watch%wants_margin = moving%drifts
     associate (machine => moving%machine)
       do while (state%time < time_end .and. .not. state%at_section)
         tally%events = tally%events + 1
@@ -155,6 +156,7 @@ contains
       tally%x_min = watch%extremes(1)
       tally%x_max = watch%extremes(2)
       tally%v_max = watch%top_speed
+      tally%grazing_margin = min(tally%grazing_margin, watch%margin)
     end associate
   end subroutine advance_jointed
 

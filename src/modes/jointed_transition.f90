@@ -4,9 +4,10 @@
 !> What follows a fallen guard of a jointed structure: impacts, sticking and sliding, the completion of chatter.
 module jointed_transition
   use blow, only: strike
+  use eigen, only: modulus
   use guards, only: force_ends, force_returns, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, &
     slides_down, slides_up
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_joints
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, most_joints, offset_of
   use jointed_flows, only: jointed_motion_t
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
@@ -253,43 +254,103 @@ contains
     type(jointed_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     type(jointed_state_t) :: closed
-    real(wp) :: a(moving%machine%n), jerk(moving%machine%n), s, u, given, opening, change, last, speed(most_joints), lost, e
+    real(wp) :: speed(most_joints), lost
     integer :: j, i
-    logical :: at_rest(most_joints), ok
+    logical :: at_rest(most_joints), along(most_joints), ok
     associate (machine => moving%machine)
       j = findloc(hit /= 0, .true., 1)
       if (count(hit /= 0) /= 1 .or. state%phase(j) /= 0) return
-      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
-      call accelerations_of(machine, state, turning, a, jerk)
-      opening = -hit(j)*(sum(machine%joints(j)%row*a) + given)
-      change = abs(sum(machine%joints(j)%row*jerk)) + abs(given)*machine%frequency
-      if (.not. opening < 0 .or. .not. -hit(j)*u > 0) return
-      e = machine%joints(j)%contact%restitution
-      if (e >= 1) return
-      last = 2*abs(u)/(-opening*(1 - e))
-      if (last*change > -opening*moving%chatter_share .or. last > 1e-2_wp*machine%period) return
+      call look_ahead(moving, state, turning, j, hit(j), at_rest, along, ok)
+      if (.not. ok) return
       closed = before
       call strike(machine, closed, turning, touching, .true., speed, lost, ok)
       if (.not. ok) return
-      ! No speed goes through zero on the way.
-      at_rest = .false.
       do i = 1, size(machine%joints)
-        if (machine%joints(i)%kind /= joint_friction) cycle
-        call joint_motion(machine, i, state%q, state%v, state%time, turning, s, u, given)
-        at_rest(i) = state%phase(i) == 0
-        closed%phase(i) = state%phase(i)
-        if (state%phase(i) /= 0 .and. abs(u) <= 2*last*abs(sum(machine%joints(i)%row*a) + given)) return
+        if (machine%joints(i)%kind == joint_friction) closed%phase(i) = merge(0, state%phase(i), along(i))
       end do
-      call settle(moving, closed, turning, at_rest, touching, ok)
+      call settle(moving, closed, turning, at_rest .or. along, touching, ok)
       if (.not. ok .or. closed%phase(j) /= hit(j)) return
       do i = 1, size(machine%joints)
-        if (i /= j .and. closed%phase(i) /= state%phase(i)) return
+        if (i /= j .and. .not. along(i) .and. closed%phase(i) /= state%phase(i)) return
       end do
       state = closed
       tally%chatters = tally%chatters + 1
       call append_word(tally, merge(word_chatter_upper, word_chatter_lower, hit(j) > 0))
     end associate
   end subroutine end_chatter
+
+  !> Whether the chatter of contact `j` on `side` ends so soon that nothing changes until then. Friction `at_rest` stays so, that
+  !> `along` the contact turns with every bounce, and no other comes to rest. Bounces up with the acceleration a and down with
+  !> b <= a take u/a + u/sqrt(a b), and the speed shrinks by e sqrt(b/a).
+  pure subroutine look_ahead(moving, state, turning, j, side, at_rest, along, ends)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    integer, intent(in) :: j, side
+    logical, intent(out) :: at_rest(:), along(:), ends
+    type(jointed_state_t) :: back
+    real(wp) :: a(moving%machine%n), jerk(moving%machine%n), s, u, given, opening, closing, change, last, speed, e, shrink
+    integer :: i
+    ends = .false.
+    at_rest = .false.
+    along = .false.
+    associate (machine => moving%machine)
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
+      call accelerations_of(machine, state, turning, a, jerk)
+      opening = -side*(sum(machine%joints(j)%row*a) + given)
+      change = abs(sum(machine%joints(j)%row*jerk)) + abs(given)*machine%frequency
+      if (.not. opening < 0 .or. .not. -side*u > 0) return
+      e = machine%joints(j)%contact%restitution
+      if (e >= 1) return
+      last = 2*abs(u)/(-opening*(1 - e))
+      closing = opening
+      back = state
+      do i = 1, size(machine%joints)
+        if (machine%joints(i)%kind /= joint_friction .or. state%phase(i) == 0) cycle
+        along(i) = moves_along(machine%joints(i), machine%joints(j))
+        if (along(i)) back%phase(i) = -state%phase(i)
+      end do
+      if (any(along)) then
+        call accelerations_of(machine, back, turning, jerk)
+        closing = -side*(sum(machine%joints(j)%row*jerk) + given)
+        if (.not. (closing < 0 .and. closing >= opening)) return
+        shrink = e*sqrt(closing/opening)
+        last = max(last, (abs(u)/(-opening) + abs(u)/sqrt(closing*opening))/(1 - shrink))
+      end if
+      if (last*change > -closing*moving%chatter_share .or. last > 1e-2_wp*machine%period) return
+      ! No speed goes through zero on the way.
+      do i = 1, size(machine%joints)
+        if (machine%joints(i)%kind /= joint_friction) cycle
+        call joint_motion(machine, i, state%q, state%v, state%time, turning, s, speed, given)
+        at_rest(i) = state%phase(i) == 0
+        if (at_rest(i) .or. along(i)) cycle
+        if (abs(speed) <= 2*last*abs(sum(machine%joints(i)%row*a) + given)) return
+      end do
+    end associate
+    ends = .true.
+  end subroutine look_ahead
+
+  !> Whether friction slides at the speed of a gap, or a multiple of it.
+  pure logical function moves_along(friction, contact)
+    type(joint_t), intent(in) :: friction, contact
+    real(wp) :: ratio
+    integer :: m
+    ratio = sum(friction%row*contact%row)/sum(contact%row**2)
+    moves_along = abs(ratio) > 0 .and. all(abs(friction%row - ratio*contact%row) <= 8*epsilon(ratio)*abs(friction%row)) .and. &
+      abs(friction%offset%rate - ratio*contact%offset%rate) <= 8*epsilon(ratio)*abs(friction%offset%rate)
+    do m = 1, max(harmonics_in(friction), harmonics_in(contact))
+      associate (own => offset_of(friction, m))
+        moves_along = moves_along .and. modulus(own - ratio*offset_of(contact, m)) <= 8*epsilon(ratio)*modulus(own)
+      end associate
+    end do
+  end function moves_along
+
+  !> Number of harmonics of the given part of a joint coordinate.
+  pure integer function harmonics_in(joint)
+    type(joint_t), intent(in) :: joint
+    harmonics_in = 0
+    if (allocated(joint%offset%harmonic)) harmonics_in = size(joint%offset%harmonic)
+  end function harmonics_in
 
   !> What cannot be told apart by rounding is held, for a billionth of a period.
   pure subroutine hold(moving, state, turning, at_rest, touching)

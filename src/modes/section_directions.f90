@@ -1,7 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Positions on which the motion of a jointed structure depends: a structure that nothing ties to the ground may be anywhere.
+!> Positions and velocities on which the motion of a jointed structure depends: a structure that nothing ties to the ground may be
+!> anywhere, and looks the same from a frame that moves along.
 module section_directions
   use eigen, only: symmetric_eigen
   use jointed, only: joint_contact, joint_friction, joint_section, joint_soft, jointed_t, most_degrees
@@ -9,7 +10,7 @@ module section_directions
   implicit none
   private
 
-  public :: directions_of
+  public :: directions_of, speeds_of
 
   !> Much, as a share of the most; no ratio of small integers, so that rounding does not decide.
   real(wp), parameter :: much = 0.3_wp
@@ -23,16 +24,12 @@ contains
     type(jointed_t), intent(in) :: machine
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
-    real(wp) :: between(most_degrees, most_degrees), left(machine%n, machine%n)
-    integer :: i, count_between
+    real(wp) :: between(most_degrees, most_degrees)
+    integer :: count_between
     call directions_with(machine, .true., directions, count_directions)
     call directions_with(machine, .false., between, count_between)
     if (count_between == count_directions .or. count_between == 0) return
-    left = 0
-    do i = 1, count_between
-      left(:, i) = between(:machine%n, i)
-    end do
-    call tell_apart(directions(:machine%n, :count_directions), left(:, :count_between))
+    call tell_apart(directions(:machine%n, :count_directions), between(:machine%n, :count_between))
   end subroutine directions_of
 
   !> Turns orthonormal directions so that the last ones are `last`, which lie among them.
@@ -62,15 +59,10 @@ contains
     logical, intent(in) :: stops
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
-    real(wp), dimension(machine%n, machine%n) :: depends, vectors
-    real(wp) :: values(machine%n), least
+    real(wp) :: depends(machine%n, machine%n)
     integer :: i, j, n
     n = machine%n
-    ! Without its signs: a negative stiffness would cancel what a joint adds.
-    call symmetric_eigen(machine%stiffness/max(maxval(abs(machine%stiffness)), tiny(1.0_wp)), values, vectors)
-    do i = 1, n
-      depends(:, i) = matmul(vectors, abs(values)*vectors(i, :))
-    end do
+    depends = without_signs(machine%stiffness)
     do j = 1, size(machine%joints)
       if (any(machine%joints(j)%kind == [joint_friction, joint_section])) cycle
       if (.not. stops .and. any(machine%joints(j)%kind == [joint_contact, joint_soft])) cycle
@@ -78,19 +70,69 @@ contains
         depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
       end do
     end do
+    call span_of(depends, directions, count_directions)
+  end subroutine directions_with
+
+  !> Directions of the velocities on which anything depends, likewise: all of them, unless the whole may move along at any speed. A
+  !> motion without a clock is looked at where a body turns: there its own velocity counts.
+  pure subroutine speeds_of(machine, directions, count_directions)
+    type(jointed_t), intent(in) :: machine
+    real(wp), intent(out) :: directions(most_degrees, most_degrees)
+    integer, intent(out) :: count_directions
+    real(wp) :: depends(machine%n, machine%n)
+    integer :: i, j
+    depends = without_signs(machine%stiffness) + without_signs(machine%damping)
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind == joint_section) cycle
+      do i = 1, machine%n
+        depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
+      end do
+    end do
+    if (.not. machine%driven .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)
+    call span_of(depends, directions, count_directions)
+  end subroutine speeds_of
+
+  pure function unit(n)
+    integer, intent(in) :: n
+    real(wp) :: unit(n, n)
+    integer :: i
+    unit = 0
+    do i = 1, n
+      unit(i, i) = 1
+    end do
+  end function unit
+
+  !> A symmetric matrix by the size of its largest element, its eigenvalues without their signs: a negative stiffness would cancel
+  !> what a joint adds.
+  pure function without_signs(matrix) result(depends)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp), dimension(size(matrix, 1), size(matrix, 1)) :: depends, vectors
+    real(wp) :: values(size(matrix, 1))
+    integer :: i
+    call symmetric_eigen(matrix/max(maxval(abs(matrix)), tiny(1.0_wp)), values, vectors)
+    do i = 1, size(matrix, 1)
+      depends(:, i) = matmul(vectors, abs(values)*vectors(i, :))
+    end do
+  end function without_signs
+
+  !> Orthonormal directions (columns) that a matrix does not take to zero: the coordinates themselves if there are no others.
+  pure subroutine span_of(depends, directions, count_directions)
+    real(wp), intent(in) :: depends(:, :)
+    real(wp), intent(out) :: directions(most_degrees, most_degrees)
+    integer, intent(out) :: count_directions
+    real(wp) :: values(size(depends, 1)), vectors(size(depends, 1), size(depends, 1))
+    integer :: i, n
+    n = size(depends, 1)
     call symmetric_eigen(depends, values, vectors)
-    least = 1e-12_wp*max(maxval(abs(values)), tiny(1.0_wp))
-    count_directions = count(abs(values) > least)
+    count_directions = count(abs(values) > 1e-12_wp*maxval(abs(values)))
     directions = 0
     if (count_directions == n) then
-      do i = 1, n
-        directions(i, i) = 1
-      end do
+      directions(:n, :n) = unit(n)
     else
-      vectors(:, :n - count_directions) = vectors(:, pack([(i, i=1, n)], .not. abs(values) > least))
+      vectors(:, :n - count_directions) = vectors(:, pack([(i, i=1, n)], .not. abs(values) > 1e-12_wp*maxval(abs(values))))
       call complement_of(vectors(:, :n - count_directions), directions(:n, :count_directions))
     end if
-  end subroutine directions_with
+  end subroutine span_of
 
   !> An orthonormal basis of what is across some orthonormal columns: unit vectors less those and one another, at each step the
   !> first of which much is left.

@@ -156,8 +156,7 @@ contains
     real(wp) :: barriers(2)
     barriers = barrier_positions(machine%contact)
     turn = 0
-    if (abs(machine%effects%cubic) > 0 .or. abs(machine%effects%friction_slope) > 0 .or. &
-        machine%effects%over_place%count > 0 .or. machine%effects%by_position) return
+    if (machine%effects%by_place) return
     if (barriers(1) >= unreachable .and. barriers(2) <= -unreachable) turn = machine%restoring%turn
   end function turn_of
 

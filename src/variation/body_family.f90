@@ -164,8 +164,7 @@ contains
     integer, intent(in) :: mode
     type(event_t), intent(in) :: events(:)
     associate (friction => body%moving%machine%friction, effects => body%moving%machine%effects)
-      rests_unheld = .not. (friction%kinetic > 0 .or. friction%break_away > 0 .or. friction%excess > 0 .or. &
-                            abs(effects%asymmetric_coulomb) > 0 .or. effects%upwards%count > 0)
+      rests_unheld = .not. (friction%kinetic > 0 .or. friction%break_away > 0 .or. friction%excess > 0 .or. effects%dry)
     end associate
     rests_unheld = rests_unheld .and. any([mode, events%after] == mode_stick)
   end function rests_unheld

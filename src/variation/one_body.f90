@@ -109,8 +109,7 @@ contains
     class(one_body_t), intent(in) :: self
     associate (machine => self%moving%machine)
       turns_smoothly = .not. (machine%friction%kinetic > 0 .or. machine%friction%excess > 0 .or. machine%friction%break_away > 0)
-      if (machine%effects%present) turns_smoothly = turns_smoothly .and. .not. (abs(machine%effects%quadratic_drag) > 0 .or. &
-        abs(machine%effects%asymmetric_viscous) > 0 .or. abs(machine%effects%asymmetric_coulomb) > 0)
+      turns_smoothly = turns_smoothly .and. .not. machine%effects%turns_round
     end associate
   end function turns_smoothly
 

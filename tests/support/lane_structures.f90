@@ -81,7 +81,7 @@ contains
     end select
   end function stop_with_law
 
-  !> One, two or four bodies in a row: no spring to the ground; some with a damper there, so strong that nothing oscillates, or
+  !> Two or four bodies in a row: no spring to the ground; some with a damper there, so strong that nothing oscillates, or
   !> on a belt.
   function drifting_structure(i) result(moving)
     integer, intent(in) :: i
@@ -89,7 +89,7 @@ contains
     type(jointed_t) :: machine
     character(len=2) :: name
     integer :: n, k
-    n = 2**modulo(i, 3)
+    n = 2**(1 + modulo(i, 2))
     machine%frequency = uniform(1.0_wp, 2.5_wp)
     do k = 1, n
       write (name, '(a, i1)') 'b', k

@@ -47,6 +47,7 @@ STARTS: dict[str, Starts] = {
     "viscous": lambda s: {"damping": [0.02 * s.force / s.speed]},
     "coulomb": lambda s: {"force": [0.02 * s.force]},
     "quadratic_drag": lambda s: {"coefficient": [0.02 * s.force / s.speed**2]},
+    "cubic_damping": lambda s: {"coefficient": [0.02 * s.force / s.speed**3]},
     "stribeck": lambda s: {
         "excess": [0.05 * s.force],
         "velocity": [0.15 * s.speed, 0.04 * s.speed, 0.5 * s.speed],
