@@ -82,11 +82,14 @@ class Row:
 
     @property
     def has_peers(self) -> bool:
-        """The drivers of the peers know one body, and no table of the restitution."""
+        """The drivers of the peers know one body, and neither tables nor free play."""
         return (
             self.example == COULOMB
             and not self.bodies
-            and "restitution_curve" not in self.changes.get("effect", {})
+            and not any(
+                name.endswith("_curve") or name in ("backlash", "cubic_damping")
+                for name in self.changes.get("effect", {})
+            )
         )
 
 
@@ -206,6 +209,25 @@ ROWS = (
         sizes=Checks(1, 1, 1_000, 200),
         fast=(50, 200),
     ),
+    Row(
+        "friction_curve",
+        "friction by a table of the speed",
+        10_000,
+        effect(
+            "friction_curve",
+            speed=[0.0, 0.5, 2.0, 5.0],
+            upwards=[0.2, 0.0, 0.1, 0.4],
+            downwards=[0.1, 0.0, 0.2, 0.3],
+        ),
+    ),
+    Row(
+        "spring_curve",
+        "spring by a table",
+        10_000,
+        effect("spring_curve", stretch=[-1.0, 0.0, 1.0], force=[-5.0, 0.0, 6.0]),
+    ),
+    Row("backlash", "free play of the spring, 50 mm", 10_000, effect("backlash", gap=0.05)),
+    Row("cubic_damping", "cubic damping, 0.05 N s^3/m^3", 10_000, effect("cubic_damping", coefficient=0.05)),
     Row("stribeck", "Stribeck effect, 0.2 m/s", 10_000, effect("stribeck", excess=0.5, velocity=0.2)),
     Row(
         "chain_2",

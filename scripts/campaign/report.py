@@ -227,10 +227,22 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
             baselines(found),
         ),
         "without_term": ", ".join(f"`{name}`" for name in effects.CATALOGUE if name not in HAVE_A_TERM),
+        "leaves": table(["what is left", "names and sets", "truth in it", "wrong name"], leavings(found)),
         "undecided": table(["answer", "reason", "cases"], undecided(folders, found)),
         "failed": str(rate([one.answer == "failed" for one in found])),
     }
     return TEMPLATE.read_text().format(**fields)
+
+
+def leavings(found: list[Score]) -> list[list[str]]:
+    """Names and sets by what the machine with them leaves, which makes it an adequate one."""
+    asked = [one for one in found if one.answer in ("named", "ambiguous")]
+    rows = []
+    for name in ("noise", "little of the gap", "larger noise", ""):
+        group = [one for one in asked if one.leaves == name]
+        cells = [rate([one.contains for one in group]), rate([one.wrong_name for one in group])]
+        rows.append([name or "more: a doubted name", str(len(group)), *map(str, cells)])
+    return rows
 
 
 def mean_seconds(group: list[Score]) -> str:

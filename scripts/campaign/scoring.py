@@ -41,7 +41,14 @@ SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
 PLANE, PHASE, IMPACT = "position and velocity", "drive phase", "time since the last impact"
 IMPACT_SPEED = "impact speed"
 FAMILIES = {
-    "friction over speed": {"viscous", "coulomb", "quadratic_drag", "stribeck", "friction_curve"},
+    "friction over speed": {
+        "viscous",
+        "coulomb",
+        "quadratic_drag",
+        "cubic_damping",
+        "stribeck",
+        "friction_curve",
+    },
     "friction over place": {"position_dependent_friction", "friction_place_curve"},
     "spring over stretch": {"cubic_spring", "spring_curve"},
     "restitution over impact speed": {"restitution_slope", "restitution_curve"},
@@ -49,7 +56,7 @@ FAMILIES = {
     "drive over phase": {"drive_ripple", "drive_harmonics"},
 }
 """Closed forms and the function of a family. A function names the family of any of its laws."""
-TRENDS = ({"viscous", "quadratic_drag"}, {"stribeck"}, {"coulomb"})
+TRENDS = ({"viscous", "quadratic_drag", "cubic_damping"}, {"stribeck"}, {"coulomb"})
 """Closed forms over speed that rise, fall, and stay. Where the law that was hidden has another shape than
 that of the catalogue, a form of its trend names it too."""
 REGIONS = {
@@ -114,6 +121,8 @@ class Score:
     """The records have the small faults of a rig."""
     whole: int
     """Samples of all records together."""
+    leaves: str
+    """What the machine of the verdict leaves, where it was held to be adequate."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -219,6 +228,7 @@ def score(truth: dict, result: dict) -> Score:
         by_family=in_catalogue and right and names not in reported(verdict),
         rig=bool(truth.get("rig")),
         whole=truth.get("samples", 0),
+        leaves=verdict.get("leaves", "") if answer in ("named", "ambiguous") else "",
         seconds=result["seconds"],
         baselines=result.get("baselines", {}),
         baselines_right={

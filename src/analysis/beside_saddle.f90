@@ -1,17 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Starts beside a saddle of one body, on the two sides of its stable set: where they come to.
+!> Starts beside a saddle, on the two sides of its stable set: where they come to.
 module beside_saddle
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: family_t
+  use eigen, only: general_eigen
   use elementary, only: exponential, logarithm
   use errors, only: error_t
-  use exponents, only: lyapunov_exponents, spectrum_t
+  use exponents, only: spectrum_t
   use kinds, only: wp
-  use motion, only: advance_period, start_state
-  use motion_state, only: state_t, tally_t
-  use one_body, only: one_body_t
+  use machine_family, only: begin_walk, machine_neighbourhood, walk_on, walk_t
   use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance
+  use structure_exponents, only: exponents_from_section
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -25,7 +25,7 @@ module beside_saddle
   !> Least multiplier above 1 of a saddle whose starts leave it in a reasonable time.
   real(wp), parameter, public :: least_growth = 1e-2_wp
   integer, parameter :: longest_period = 12
-  !> Drive periods over which the exponent of a motion is taken.
+  !> Sections over which the exponent of a motion is taken.
   integer, parameter :: chaos_periods = 4096
   !> What the starts of a side do: none reaches the attractor of the other side, some, all, or it is not known.
   integer, parameter, public :: not_known = 0, none_reach = 1, some_reach = 2, all_reach = 3
@@ -33,9 +33,9 @@ module beside_saddle
   !> The starts beside the saddle at a value of the parameter.
   type, public :: beside_t
     type(neighbourhood_t) :: machines
-    type(one_body_t) :: body
     type(saddle_t) :: saddle
-    real(wp) :: direction(2) = 0, growth = 1
+    real(wp), allocatable :: direction(:)
+    real(wp) :: growth = 1
     !> Turns of the orbit in which a start leaves the saddle and settles.
     integer :: turns = 0
   end type beside_t
@@ -50,31 +50,27 @@ contains
   !> The saddle near `guess` at a value of the parameter, and its unstable direction on the side of `along`.
   subroutine set_beside(family, value, guess, periods, along, beside, ok)
     type(family_t), intent(in) :: family
-    real(wp), intent(in) :: value, guess(2), along(2)
+    real(wp), intent(in) :: value, guess(:), along(:)
     integer, intent(in) :: periods
     type(beside_t), intent(out) :: beside
     logical, intent(out) :: ok
-    type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
-    real(wp) :: first(2), second(2)
-    call body_neighbourhood(family, value, machines, error)
+    complex(wp), dimension(size(guess), size(guess)) :: vectors
+    complex(wp) :: values(size(guess)), vector(size(guess))
+    call machine_neighbourhood(family, value, beside%machines, error)
     ok = .not. allocated(error)
     if (.not. ok) return
-    select type (body => machines%centre)
-    type is (one_body_t)
-      beside%body = body
-    end select
-    beside%machines = machines
-    call find_saddle(machines, guess, periods, beside%saddle, ok)
-    if (ok) ok = distance_to_saddle(beside%body, beside%saddle, guess) < 0.1_wp
+    call find_saddle(beside%machines, guess, periods, beside%saddle, ok)
+    if (ok) ok = distance_to_saddle(beside%machines%centre, beside%saddle, guess) < 0.1_wp
     if (ok) ok = real(beside%saddle%multipliers(1)) > 1 + least_growth
+    if (ok) call general_eigen(beside%saddle%matrix, values, vectors, ok)
     if (.not. ok) return
     beside%growth = real(beside%saddle%multipliers(1), wp)
-    associate (m => beside%saddle%matrix, sizes => beside%body%size_of)
-      first = [m(1, 2), beside%growth - m(1, 1)]
-      second = [beside%growth - m(2, 2), m(2, 1)]
-      if (norm2(second/sizes) > norm2(first/sizes)) first = second
-      beside%direction = first/norm2(first/sizes)
+    associate (sizes => beside%machines%centre%size_of)
+      vector = vectors(:, maxloc(real(values), 1))/sizes
+      ! A real vector times a number that is not.
+      vector = vector/vector(maxloc(abs(vector), 1))
+      beside%direction = sizes*real(vector, wp)/norm2(real(vector, wp))
       if (sum(beside%direction*along/sizes**2) < 0) beside%direction = -beside%direction
     end associate
     beside%turns = 100 + int(-2*logarithm(first_step)/logarithm(beside%growth))
@@ -85,7 +81,7 @@ contains
     type(beside_t), intent(in) :: beside
     integer, intent(in) :: side
     real(wp), intent(in) :: place
-    real(wp) :: y(2)
+    real(wp) :: y(size(beside%direction))
     y = beside%saddle%points(:, 1) + merge(1, -1, side == 1)*first_step*exponential(place*logarithm(beside%growth))* &
       beside%direction
   end function start_beside
@@ -95,24 +91,23 @@ contains
     type(beside_t), intent(in) :: beside
     integer, intent(in) :: side
     type(cycle_points_t), intent(out) :: settles
-    type(state_t) :: state
-    type(tally_t) :: tally
-    real(wp) :: y(2), points(2, 0:2*longest_period)
-    integer :: k, n, reason
-    allocate (settles%points(2, 0))
-    y = start_beside(beside, side, 0.37_wp)
-    state = start_state(beside%body%moving, y(1), y(2), 0.0_wp)
+    type(walk_t) :: walk
+    real(wp) :: y(size(beside%direction)), points(size(y), 0:2*longest_period)
+    integer :: k, n
+    logical :: ok
+    allocate (settles%points(size(y), 0))
+    call begin_walk(beside%machines%centre, start_beside(beside, side, 0.37_wp), walk, ok)
+    if (.not. ok) return
     do k = 1, beside%turns*beside%saddle%periods + 2*longest_period
-      tally = tally_t()
-      call advance_period(beside%body%moving, state, tally, reason)
-      if (reason /= 0) return
+      call walk_on(beside%machines%centre, walk, y, ok)
+      if (.not. ok) return
       n = k - beside%turns*beside%saddle%periods
-      if (n >= 0) points(:, n) = [state%x, state%v]
+      if (n >= 0) points(:, n) = y
     end do
     do n = 1, longest_period
-      if (section_distance(beside%body, points(:, n), points(:, 0)) > settled) cycle
-      if (section_distance(beside%body, points(:, 2*n), points(:, n)) > settled) cycle
-      if (distance_to_saddle(beside%body, beside%saddle, points(:, 0)) < 10*first_step) return
+      if (section_distance(beside%machines%centre, points(:, n), points(:, 0)) > settled) cycle
+      if (section_distance(beside%machines%centre, points(:, 2*n), points(:, n)) > settled) cycle
+      if (distance_to_saddle(beside%machines%centre, beside%saddle, points(:, 0)) < 10*first_step) return
       settles%points = points(:, 1:n)
       return
     end do
@@ -124,19 +119,18 @@ contains
     integer, intent(in) :: side, turns
     type(cycle_points_t), intent(in) :: settles
     real(wp), intent(in) :: place
-    type(state_t) :: state
-    type(tally_t) :: tally
-    real(wp) :: y(2)
-    integer :: j, k, reason
+    type(walk_t) :: walk
+    real(wp) :: y(size(beside%direction))
+    integer :: j, k
+    logical :: ok
     arrives = .false.
-    y = start_beside(beside, side, place)
-    state = start_state(beside%body%moving, y(1), y(2), 0.0_wp)
+    call begin_walk(beside%machines%centre, start_beside(beside, side, place), walk, ok)
+    if (.not. ok) return
     do k = 1, turns*beside%saddle%periods
-      tally = tally_t()
-      call advance_period(beside%body%moving, state, tally, reason)
-      if (reason /= 0) return
+      call walk_on(beside%machines%centre, walk, y, ok)
+      if (.not. ok) return
       do j = 1, size(settles%points, 2)
-        arrives = section_distance(beside%body, [state%x, state%v], settles%points(:, j)) < capture
+        arrives = section_distance(beside%machines%centre, y, settles%points(:, j)) < capture
         if (arrives) return
       end do
     end do
@@ -161,11 +155,9 @@ contains
     type(beside_t), intent(in) :: beside
     integer, intent(in) :: side
     type(spectrum_t) :: spectrum
-    type(state_t) :: state
-    real(wp) :: y(2), series(1)
-    y = start_beside(beside, side, 0.37_wp)
-    state = start_state(beside%body%moving, y(1), y(2), 0.0_wp)
-    call lyapunov_exponents(beside%machines, state, beside%turns*beside%saddle%periods, chaos_periods, spectrum, series)
+    real(wp) :: series(1)
+    call exponents_from_section(beside%machines, start_beside(beside, side, 0.37_wp), beside%turns*beside%saddle%periods, &
+                                chaos_periods, spectrum, series)
     is_chaotic = spectrum%known
     if (is_chaotic) is_chaotic = spectrum%exponents(1) > 3*spectrum%errors(1)
   end function is_chaotic

@@ -6,7 +6,7 @@
 module bifurcation_curve
   use body_family, only: family_t
   use branch_point, only: label_gr, label_gr_fold, label_pd, label_sn, label_stick, no_label, point_t
-  use curve_equations, only: at_zero, beside_like, choose_monitor, correct, curve_plan_t, curve_point_t, looked_at, move, place_t, &
+  use curve_equations, only: at_zero, beside_like, correct, curve_plan_t, curve_point_t, looked_at, move, place_t, set_place, &
     set_tangent, unknowns
   use inverse_interpolation, only: weights_at_zero
   use kinds, only: wp
@@ -64,7 +64,7 @@ contains
     start%now%orbit = point%orbit
     start%now%free = value
     start%label = curve%label
-    call choose_monitor(family, plan, start, ok)
+    call set_place(family, plan, start, ok)
     if (.not. ok) return
     allocate (along(unknowns(start%now)), source=0.0_wp)
     along(size(along)) = 1
@@ -100,7 +100,7 @@ contains
       end associate
       there%label = curve%label
       there%monitor = margin_t()
-      call choose_monitor(family, plan, there, ok)
+      call set_place(family, plan, there, ok)
       if (.not. ok) cycle
       there%now%free = value
       along = [(0.0_wp, k=1, unknowns(there%now) - 1), 1.0_wp]
@@ -122,7 +122,7 @@ contains
     logical, intent(out) :: ok
     next = place
     next%now%second = no_label
-    call move(family, plan, next%now, length*place%tangent)
+    call move(next, length*place%tangent)
     call correct(family, plan, next, place%tangent, ok)
     if (ok) call set_tangent(family, plan, next, place%tangent, ok)
   end subroutine step_on
@@ -221,7 +221,7 @@ contains
     logical, intent(out) :: ok
     type(place_t) :: node
     real(wp) :: low, high, f_low, f_high, s, f, distance, value(nodes), all(unknowns(place%now), nodes), weight(nodes)
-    integer :: i, k, n
+    integer :: i, k, n, states
     low = 0
     high = step
     f_low = beside_like(family, plan, place, which, passed)
@@ -257,8 +257,9 @@ contains
     call weights_at_zero(value, weight, ok)
     if (.not. ok) return
     there = node
-    there%now%orbit%y = matmul(all(:2, :), weight)
-    there%now%orbit%events%time = matmul(all(3:n - 2, :), weight)
+    states = size(there%now%orbit%y)
+    there%now%orbit%y = matmul(all(:states, :), weight)
+    there%now%orbit%events%time = matmul(all(states + 1:n - 2, :), weight)
     there%now%orbit%parameter = sum(all(n - 1, :)*weight)
     there%now%free = sum(all(n, :)*weight)
     there%now%second = label_of(place%label, which, passed)

@@ -8,10 +8,9 @@ module branch_point
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, machine_of_family, section_sizes
-  use orbit_margins, only: margins_of, margins_t
+  use orbit_margins, only: margins_t
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
-  use structure, only: structure_t
-  use structure_margins, only: margins_of_structure
+  use structure_margins, only: margins_of_machine
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -99,12 +98,7 @@ contains
     if (allocated(trace%now%tangent)) deallocate (trace%now%tangent)
     allocate (trace%now%tangent(size(along)), source=0.0_wp)
     call tangent_of(trace%machines, trace%now%orbit, family%parameter_size, along, trace%now%tangent, ok)
-    select type (machine => trace%machines%centre)
-    type is (structure_t)
-      trace%margins = margins_of_structure(machine, trace%now%orbit)
-    class default
-      trace%margins = margins_of(trace%machines%centre, trace%now%orbit)
-    end select
+    trace%margins = margins_of_machine(trace%machines%centre, trace%now%orbit)
     trace%now%x_max = trace%margins%x_max
     trace%now%x_min = trace%margins%x_min
   end subroutine set_point

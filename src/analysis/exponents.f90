@@ -10,7 +10,7 @@ module exponents
   use kinds, only: int64, wp
   use motion, only: advance_period
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
-    event_turning_point, log_t, open_log, state_t, tally_t
+    event_touch_lower, event_touch_upper, event_turning_point, log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
   use variations, only: neighbourhood_t
   implicit none
@@ -183,6 +183,8 @@ contains
         case (event_impact_upper, event_impact_lower)
           spectrum%impacts = spectrum%impacts + 1
           if (e > 0) spectrum%sum_exact = spectrum%sum_exact + 2*logarithm(e)
+        case (event_touch_upper, event_touch_lower)
+          spectrum%impacts = spectrum%impacts + 1
         case (event_turning_point)
           before = body%slope(event%before, event%time, event%arrival(:2))
           after = body%slope(event%after, event%time, event%departure(:2))

@@ -37,14 +37,14 @@ module homoclinic
     logical :: crisis = .false.
     integer :: period = 0
     !> Section point of the saddle there.
-    real(wp) :: y(2) = 0
+    real(wp), allocatable :: y(:)
   end type contact_t
 
   !> A contact that is narrowed down: what was seen at the last value.
   type :: hunt_t
     integer :: side = 0, period = 0
     logical :: reaches = .false.
-    real(wp) :: along(2) = 0, y(2) = 0
+    real(wp), allocatable :: along(:), y(:)
   end type hunt_t
 
 contains
@@ -63,7 +63,7 @@ contains
     allocate (contacts(0))
     looks = places_to_look(line)
     allocate (verdicts(2, size(looks)), source=not_known)
-    allocate (along(2, 0:size(looks)), source=0.0_wp)
+    allocate (along(size(line(1)%orbit%y), 0:size(looks)), source=0.0_wp)
     do i = 1, size(looks)
       associate (orbit => line(looks(i))%orbit)
         call set_beside(family, orbit%parameter, orbit%y, orbit%periods, along(:, i - 1), beside, ok)
@@ -142,8 +142,7 @@ contains
   pure logical function is_directed(point)
     type(point_t), intent(in) :: point
     associate (m => point%orbit%multipliers)
-      is_directed = all(abs(aimag(m)) <= 0) .and. maxval(real(m)) > 1 + least_growth .and. maxval(real(m)) < 1e6_wp .and. &
-        minval(abs(m)) < 1
+      is_directed = abs(aimag(m(1))) <= 0 .and. real(m(1)) > 1 + least_growth .and. real(m(1)) < 1e6_wp .and. all(abs(m(2:)) < 1)
     end associate
   end function is_directed
 
@@ -169,7 +168,7 @@ contains
     type(family_t), intent(in) :: family
     type(point_t), intent(in) :: line(:)
     integer, intent(in) :: side, verdicts(2)
-    real(wp), intent(in) :: along(2)
+    real(wp), intent(in) :: along(:)
     type(contact_t), intent(out) :: contact
     logical, intent(out) :: ok
     type(hunt_t) :: hunt
@@ -268,7 +267,7 @@ contains
   pure function guess_at(line, value) result(y)
     type(point_t), intent(in) :: line(:)
     real(wp), intent(in) :: value
-    real(wp) :: y(2)
+    real(wp) :: y(size(line(1)%orbit%y))
     integer :: k
     k = index_before(line, value)
     associate (one => line(k)%orbit, next => line(k + 1)%orbit)

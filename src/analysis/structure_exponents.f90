@@ -10,15 +10,16 @@ module structure_exponents
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: int64, wp
   use motion, only: start_state
-  use motion_state, only: event_impact_lower, event_impact_upper, event_turning_point, state_t, tally_t
+  use motion_state, only: event_impact_lower, event_impact_upper, event_touch_lower, event_touch_upper, &
+    event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
   use structure, only: coordinates_of, mode_number, state_in, structure_t
-  use structure_family, only: advance_section, least_dimension, state_at_start, vary_section
+  use structure_family, only: advance_section, least_dimension, start_of_structure, state_at_start, vary_section
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: exponents_of_structure, exponents_of_machine
+  public :: exponents_of_structure, exponents_of_machine, exponents_from_section
 
   !> Section points within this share of the natural size are one; they come back within this share of their range.
   real(wp), parameter :: fixed = 1e-9_wp, same = 1e-7_wp
@@ -44,6 +45,24 @@ contains
       call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
     end select
   end subroutine exponents_of_machine
+
+  !> Exponents of the motion from a point of the section; not known for one beyond a stop.
+  subroutine exponents_from_section(machines, point, transient, sections, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:)
+    integer, intent(in) :: transient, sections
+    type(spectrum_t), intent(out) :: spectrum
+    real(wp), intent(out) :: series(:)
+    type(jointed_state_t) :: jointed
+    logical :: ok
+    select type (machine => machines%centre)
+    type is (structure_t)
+      call start_of_structure(machine, point, jointed, ok)
+      if (ok) call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
+    class default
+      call exponents_of_machine(machines, [point, 0.0_wp], transient, sections, spectrum, series)
+    end select
+  end subroutine exponents_from_section
 
   !> Exponents of the motion that starts at `state`, after `transient` sections, over `sections` (at least 32). `series` has the
   !> watched position on the section. Without a clock they are those across the motion: the trivial 0 is left out.
@@ -204,6 +223,8 @@ contains
           if (e > 0) spectrum%sum_exact = spectrum%sum_exact + 2*logarithm(e)
           if (.not. e > 0) spectrum%has_sum = .false.
           spectrum%has_sum = spectrum%has_sum .and. event%before == event%after
+        case (event_touch_upper, event_touch_lower)
+          spectrum%impacts = spectrum%impacts + 1
         case (event_turning_point)
           spectrum%sum_exact = spectrum%sum_exact &
             + logarithm(abs(slide_rate(structure, event, event%after, event%departure)/ &

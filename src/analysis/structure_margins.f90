@@ -6,13 +6,13 @@
 module structure_margins
   use guards, only: force_ends, force_returns, guards_of, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, &
     slide_ends, slides_down, slides_up, turns_round
-  use hybrid_machine, only: event_t
+  use hybrid_machine, only: event_t, hybrid_t
   use jointed, only: most_joints
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_press, of_release, of_slip, of_stick, &
-    of_turning
+  use orbit_margins, only: margin_t, margins_of, margins_t, of_gap, of_hold, of_impact, of_order, of_press, of_release, &
+    of_slip, of_stick, of_turning
   use periodic_orbit, only: closing_time, orbit_t
   use secant_bracket, only: bracket_t, narrow, next_trial
   use structure, only: mode_number, phases_in, state_in, structure_t
@@ -20,7 +20,7 @@ module structure_margins
   implicit none
   private
 
-  public :: margins_of_structure
+  public :: margins_of_machine
 
   !> Looks along a flight, per period of the section.
   integer, parameter :: looks = 96
@@ -28,10 +28,30 @@ module structure_margins
 
 contains
 
-  !> The margins of an orbit whose events have their states; all in natural units. Extremes of the watched coordinate.
-  pure function margins_of_structure(machine, orbit) result(margins)
+  !> The margins of an orbit whose events have their states, of any machine. `events_only`: those between the events of a structure,
+  !> which take longest, and its extremes are left out.
+  pure function margins_of_machine(machine, orbit, events_only) result(margins)
+    class(hybrid_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
+    logical, intent(in), optional :: events_only
+    type(margins_t) :: margins
+    logical :: looks_too
+    looks_too = .true.
+    if (present(events_only)) looks_too = .not. events_only
+    select type (machine)
+    type is (structure_t)
+      margins = margins_of_structure(machine, orbit, looks_too)
+    class default
+      margins = margins_of(machine, orbit)
+    end select
+  end function margins_of_machine
+
+  !> The margins of an orbit whose events have their states; all in natural units. With `looks_too` those within flights and the
+  !> extremes of the watched coordinate.
+  pure function margins_of_structure(machine, orbit, looks_too) result(margins)
     type(structure_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
+    logical, intent(in) :: looks_too
     type(margins_t) :: margins
     real(wp) :: y(machine%n), t, until
     integer :: k, m, mode
@@ -51,7 +71,7 @@ contains
       end if
       until = closing_time(machine, orbit)
       if (k < m) until = orbit%events(k + 1)%time
-      if (until > t) call look_along(machine, orbit, mode, t, y, until, k, margins)
+      if (looks_too .and. until > t) call look_along(machine, orbit, mode, t, y, until, k, margins)
     end do
   end function margins_of_structure
 

@@ -21,6 +21,8 @@ module structure_sequence
 
   !> A joint whose phase an event leaves as it is.
   integer, parameter :: as_it_is = 9
+  !> Events nearer to each other than this share of the period are at one instant.
+  real(wp), parameter :: one_instant = 1e-6_wp
 
   !> An event and the phases that it gives to the joints.
   type :: link_t
@@ -49,7 +51,7 @@ contains
     case (of_impact)
       call take_contact_out(machine, k, chain, known)
     case (of_gap)
-      chain = [chain(:at), contact(machine, margin), chain(at + 1:)]
+      call put_contact_in(machine, margin, at, chain)
     case (of_turning)
       chain(k)%event%kind = event_stick
       back = chain(k)%phase(margin%joint)
@@ -168,6 +170,37 @@ contains
     end associate
   end function contact
 
+  !> Puts an impact or a touch in after the event `at`. Where friction between the same bodies turns round at that instant an impact
+  !> comes in its place: it turns the slide round itself.
+  pure subroutine put_contact_in(machine, margin, at, chain)
+    type(structure_t), intent(in) :: machine
+    type(margin_t), intent(in) :: margin
+    integer, intent(in) :: at
+    type(link_t), allocatable, intent(inout) :: chain(:)
+    type(link_t), allocatable :: links(:)
+    integer :: k
+    links = contact(machine, margin)
+    do k = max(at, 1), merge(min(at + 1, size(chain)), 0, size(links) == 1)
+      if (chain(k)%event%kind /= event_turning_point .or. .not. &
+          abs(chain(k)%event%time - margin%time) <= one_instant*machine%period) cycle
+      if (.not. are_parallel(machine, chain(k)%event%joint, margin%joint)) cycle
+      links(1)%phase = chain(k)%phase
+      chain(k) = links(1)
+      return
+    end do
+    chain = [chain(:at), links, chain(at + 1:)]
+  end subroutine put_contact_in
+
+  !> Whether two joints move in proportion.
+  pure logical function are_parallel(machine, one, other)
+    type(structure_t), intent(in) :: machine
+    integer, intent(in) :: one, other
+    associate (joints => machine%frame%moving%machine%joints)
+      are_parallel = abs(sum(joints(one)%row*joints(other)%row)) >= &
+        (1 - 8*epsilon(1.0_wp))*norm2(joints(one)%row)*norm2(joints(other)%row)
+    end associate
+  end function are_parallel
+
   !> Without the impact or the touch `k`.
   pure subroutine take_contact_out(machine, k, chain, known)
     type(structure_t), intent(in) :: machine
@@ -181,8 +214,15 @@ contains
     kept(k) = .false.
     known = .not. any(chain(k)%event%kind == [event_chatter_upper, event_chatter_lower, event_separation])
     if (machine%frame%moving%machine%joints(j)%kind == joint_contact) then
-      ! What else the impact has set free stays.
-      known = known .and. all(chain(k)%phase == as_it_is)
+      i = findloc(chain(k)%phase /= as_it_is, .true., 1)
+      if (i > 0) then
+        ! What else the impact has set free stays; friction between the same bodies turns round in its place.
+        known = known .and. count(chain(k)%phase /= as_it_is) == 1 .and. abs(chain(k)%phase(i)) == 1 .and. &
+                machine%frame%moving%machine%joints(i)%kind == joint_friction .and. are_parallel(machine, i, j)
+        chain(k)%event = event_t(kind=event_turning_point, side=-chain(k)%phase(i), joint=i, time=chain(k)%event%time, &
+                                 guard=slide_ends)
+        return
+      end if
     else
       do i = k + 1, size(chain)
         if (chain(i)%event%joint /= j) cycle

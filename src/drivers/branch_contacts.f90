@@ -3,13 +3,13 @@
 
 !> Homoclinic contacts and boundary crises among the labelled points of the branches.
 module branch_contacts
-  use body_family, only: body_neighbourhood
   use branch_point, only: label_crisis, label_homoclinic, point_t
   use branch_search, only: search_t
   use errors, only: error_t
   use homoclinic, only: contact_t, find_contacts, starts_that_stay
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
+  use machine_family, only: machine_neighbourhood
   use periodic_orbit, only: correct_orbit, direct
   use session, only: session_t
   use text, only: to_text
@@ -81,13 +81,13 @@ contains
     type(error_t), allocatable :: error
     integer :: i
     ok = .false.
-    call body_neighbourhood(search%family, contact%reach, machines, error)
+    call machine_neighbourhood(search%family, contact%reach, machines, error)
     if (allocated(error)) return
     do i = 1, 2
       point = pair(i)
       point%orbit%parameter = contact%reach
       call correct_orbit(search%family, machines, point%orbit, direct(point%orbit, 1), ok)
-      if (ok) ok = norm2((point%orbit%y - contact%y)/search%family%sizes) < same_orbit
+      if (ok) ok = norm2((point%orbit%y - contact%y)/machines%centre%size_of) < same_orbit
       if (ok) exit
     end do
     point%label = merge(label_crisis, label_homoclinic, contact%crisis)

@@ -19,7 +19,7 @@ module branches_driver
   use hybrid_machine, only: hybrid_t
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
-  use machine_family, only: has_several, machine_of_family, starts_of_section
+  use machine_family, only: machine_of_family, starts_of_section
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use orbit_margins, only: is_impact
@@ -63,13 +63,7 @@ contains
     if (.not. allocated(error)) call set_free(command, session%the_case, search, curves, error)
     if (.not. allocated(error)) call prepare_search(search, command%searches, error)
     call session%stop_if(error)
-    if (curves%wanted .and. has_several(session%the_case%laws)) then
-      call fail(error, exit_bad_case, '--free: labels are followed over two parameters for machines of one body')
-    else if (command%contacts .and. has_several(session%the_case%laws)) then
-      call fail(error, exit_bad_case, '--contacts: homoclinic contacts are looked for in machines of one body')
-    else
-      call set_starts(session%the_case, search, error)
-    end if
+    call set_starts(session%the_case, search, error)
     call session%stop_if(error)
     if (command%validate .or. command%dry_run) then
       call session%journal%line('valid', command%path//' is a valid case for branches over '//search%family%path//' from '// &

@@ -8,7 +8,7 @@
 #ifndef SEPARATRIX_LANE_CONTACT_HPP
 #define SEPARATRIX_LANE_CONTACT_HPP
 
-#include "lane_series.hpp"
+#include "lane_tables.hpp"
 
 namespace {
 
@@ -288,23 +288,30 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
     mask within = m.law.edge <= 0 ? ~mask{} : g.direction * g.v <= m.law.edge;
     vec barrier = pick(upward, m.upper, m.lower);
     expansion p;
-    expand(m, g, within, p);
+    table_piece pieces[tables];
+    if (m.law.has_tables > 0)
+      find_pieces(m, g, pieces);
+    expand(m, g, pieces, within, p);
     vec length = step_length(m, p), ahead = g.until - g.time, room = speed_room(m.law, g, within);
     vec longest = room / (magnitude(p.v[1]) + 1e-290);
     put(length, longest < length, longest);
     put(length, limit < length, limit);
+    put(length, length >= ahead, ahead);
+    mask kept = ~mask{};
+    if (m.law.has_tables > 0)
+      kept = keep_in_pieces(m, g, pieces, p, flying, length);
     mask last = length >= ahead;
-    put(length, last, ahead);
     stride_of_lanes t = look_for_events(m, p, flying, within, barrier, length, g);
-    mask proven = flying & ~t.lost & positive_until(t.fall, flying, t.end);
+    mask proven = flying & kept & ~t.lost & positive_until(t.fall, flying, t.end);
     if (any(flying & (room < 1e299)))
       proven = proven & keeps_within(t.fall, t.end, room);
     // At a barrier that it moves towards, a body hits at once.
     left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
     proven = proven & ~left;
-    left =
-        left | (proven & take_series_events(m, t, proven, barrier, g)) | (flying & (g.flights >= g.budget));
-    put(limit, flying, pick(proven, m.stride, 0.5 * t.end * length));
+    left = left | (proven & take_series_events(m, pieces, t, proven, barrier, g)) |
+           (flying & (g.flights >= g.budget));
+    // A step that leaves a piece of a table may do so behind its event.
+    put(limit, flying, pick(proven, m.stride, 0.5 * pick(kept, t.end, vec(1.0)) * length));
     put(g.status, left, lane_left);
     mask there = proven & ~left & last & ~(t.turns | t.hits | t.slows);
     if (any(there))

@@ -18,9 +18,14 @@ enum { order = 18, most_root_rounds = 30 };
 // Successive terms of a step shrink by exp(-shrinking); the last is then 2e-14 of the first.
 const double shrinking = 1.75;
 
-// Coefficients of position and velocity in the time since the start of a step.
+// Coefficients of position and velocity in the time since the start of a step, and of the stretch.
 struct expansion {
-  vec x[order + 1], v[order];
+  vec x[order + 1], v[order], stretch[order];
+};
+
+// The pieces of a table that the lanes are in: see lane_tables.hpp.
+struct table_piece {
+  vec from, low, high, c[4];
 };
 
 // Sum of a(i) b(k - i), i = 0 ... k. In two parts, so that additions need not wait for each other.
@@ -98,10 +103,44 @@ LANE_DEVICE inline vec next_excess(const lane_law &l, int i, mask within, vec d,
   return e.value[k];
 }
 
+// A force that a table gives, as a series.
+struct table_series {
+  vec u[order], square[order];
+
+  // Coefficient k, from that of the variable.
+  LANE_LEAF vec next(const table_piece &piece, vec variable, int k) {
+    u[k] = k == 0 ? variable - piece.from : variable;
+    square[k] = square_of(u, k);
+    vec sum = piece.c[1] * u[k] + piece.c[2] * square[k] + piece.c[3] * product(square, u, k);
+    return k == 0 ? piece.c[0] + sum : sum;
+  }
+};
+
+// Distance from a corner of a free play at -`corner`, at least its radius, as a series.
+struct corner_series {
+  vec value[order];
+
+  // Coefficient k, from those of the stretch and of its square.
+  LANE_LEAF vec next(const lane_law &l, double corner, const vec *stretch, const vec *square, int k) {
+    vec under = square[k] + (2 * corner) * stretch[k];
+    if (k == 0)
+      value[0] = square_root(under + (corner * corner + l.corner));
+    else {
+      value[k] = {};
+      value[k] = (under - square_of(value, k)) / (2.0 * value[0]);
+    }
+    return value[k];
+  }
+};
+
 // The acceleration of a body that slips as `direction` says, by everything but a soft barrier, as a series.
 struct force_series {
-  vec stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order], factor[order];
+  vec stretch[order], square[order], sine[order], cosine[order], dry[order], behind[order], factor[order],
+      speed_square[order];
   excess_series excess[2];
+  corner_series corner[2];
+  table_series table[tables];
+  const table_piece *pieces = nullptr;
 
   // Coefficient k, from those of the foot of the spring (k alone), the position, the velocity and the rate of
   // the position in the variable of the series.
@@ -122,12 +161,25 @@ struct force_series {
       }
       a += l.pendulum * sine[k];
     }
-    if (l.cubic != 0) {
+    if (l.cubic != 0 || l.series_stiffness != 0)
       square[k] = square_of(stretch, k);
+    if (l.cubic != 0)
       a += l.cubic * product(square, stretch, k);
-    }
+    if (l.series_stiffness != 0)
+      a -= (0.5 * l.series_stiffness) * (corner[0].next(l, l.half_play, stretch, square, k) -
+                                         corner[1].next(l, -l.half_play, stretch, square, k));
+    if (l.table[over_stretch].knots > 0)
+      a += table[over_stretch].next(pieces[over_stretch], stretch[k], k);
+    if (l.table[over_place].knots > 0)
+      a += table[over_place].next(pieces[over_place], x[k], k);
+    if (l.table[over_speed].knots > 0)
+      a -= d * table[over_speed].next(pieces[over_speed], d * v[k], k);
+    if (l.quadratic != 0 || l.cubic_damping != 0)
+      speed_square[k] = square_of(v, k);
     if (l.quadratic != 0)
-      a -= l.quadratic * d * square_of(v, k);
+      a -= l.quadratic * d * speed_square[k];
+    if (l.cubic_damping != 0)
+      a -= l.cubic_damping * product(speed_square, v, k);
     dry[k] = {};
     if (l.dahl_stiffness > 0) {
       // z - level: its derivative is -(sigma/level) times itself and the rate of the position.
@@ -147,15 +199,21 @@ struct force_series {
       factor[0] += 1.0;
       a += l.offset;
     }
-    return a - (m.friction_slope != 0 ? product(factor, dry, k) : dry[k]);
+    if (l.table[factor_over_place].knots > 0)
+      factor[k] += table[factor_over_place].next(pieces[factor_over_place], x[k], k);
+    else if (!(m.friction_slope != 0))
+      return a - dry[k];
+    return a - product(factor, dry, k);
   }
 };
 
 // Expands the motion of every lane from where it is, in time.
-LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, mask within, expansion &p) {
+LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, const table_piece *pieces,
+                               mask within, expansion &p) {
   LANE_COUNT(evaluations, vec_size);
   vec foot[order];
   force_series forces;
+  forces.pieces = pieces;
   expand_foot(m, g.time, order - 1, foot);
   p.x[0] = g.x;
   p.v[0] = g.v;
@@ -164,6 +222,11 @@ LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, mask 
     p.x[k + 1] = (1.0 / (k + 1)) * p.v[k];
   }
   p.x[order] = (1.0 / order) * p.v[order - 1];
+  if (m.law.table[over_stretch].knots > 0) {
+    for (int k = 0; k < order - 1; k++)
+      p.stretch[k] = forces.stretch[k];
+    p.stretch[order - 1] = -p.x[order - 1];
+  }
 }
 
 // Length of a step over which the terms shrink so. The last few are asked, as one may happen to be small.
@@ -321,22 +384,38 @@ LANE_DEVICE inline stride_of_lanes look_for_events(const lane_machine &m, const 
   return t;
 }
 
+// Value of a table in its pieces.
+LANE_DEVICE inline vec value_in(const table_piece &piece, vec x) {
+  vec u = x - piece.from;
+  return piece.c[0] + u * (piece.c[1] + u * (piece.c[2] + u * piece.c[3]));
+}
+
 // What follows the steps `due`. Returns the lanes that the scalar code must look at.
-LANE_DEVICE inline mask take_series_events(const lane_machine &m, const stride_of_lanes &t, mask due,
-                                           vec barrier, lane_group &g) {
+LANE_DEVICE inline mask take_series_events(const lane_machine &m, const table_piece *pieces,
+                                           const stride_of_lanes &t, mask due, vec barrier, lane_group &g) {
   const bool soft = m.contact.stiffness > 0;
   vec x, scaled_v, scaled_a;
   value_at<order>(t.x, t.end, x, scaled_v, scaled_a);
   vec per_time = 1.0 / t.length, v = scaled_v * per_time, a = scaled_a * (per_time * per_time);
   vec w = g.direction * v, gap = g.direction * (barrier - x);
   put(v, t.slows, g.direction * m.law.edge);
-  vec factor = 1.0 + m.friction_slope * x, push = -g.direction * a - m.law.rest_friction * factor;
+  vec factor = 1.0 + m.friction_slope * x;
+  if (m.law.table[factor_over_place].knots > 0)
+    factor += value_in(pieces[factor_over_place], x);
+  vec push = -g.direction * a - m.law.rest_friction * factor, holds = m.break_away * factor;
+  if (m.law.table[over_speed].knots > 0) {
+    mask upward = g.direction > 0.0;
+    push -= pick(upward, vec(m.law.change_at_rest[0]), vec(m.law.change_at_rest[1]));
+    holds += pick(upward, vec(m.law.change_at_rest[1]), vec(m.law.change_at_rest[0]));
+    // Friction that is nothing at rest is left to the scalar code.
+    put(holds, holds - g.direction * m.law.asymmetric * factor <= 0.0, 1e300);
+  }
   vec restitution = m.restitution;
   if (any(due & t.hits))
     restitution = restitution_at(m, w);
   mask slow = soft ? w <= 0.0 : restitution * w <= m.slow;
-  mask rare = due & ((t.turns & (push <= m.break_away * factor)) | (t.hits & slow) |
-                     (magnitude(x) >= m.domain) | (factor <= 0.0));
+  mask rare =
+      due & ((t.turns & (push <= holds)) | (t.hits & slow) | (magnitude(x) >= m.domain) | (factor <= 0.0));
   due = due & ~rare;
   mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
   LANE_COUNT(events, count(events));

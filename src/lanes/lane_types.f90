@@ -4,6 +4,7 @@
 !> What the lanes of the C++ kernel share with their callers: the machine and the batch, member by member as `lane_types.hpp`
 !> has them.
 module lane_types
+  use curve_law, only: most_knots
   use kinds, only: wp
   use lane_curve, only: restitution_curve_t
   use structure_types, only: structure_machine_t
@@ -11,7 +12,7 @@ module lane_types
   implicit none
   private
 
-  public :: widest_lanes, lane_sizes, separatrix_fly_lanes, machine_t, mode_t, contact_series_t, region_t, regions_t
+  public :: widest_lanes, lane_sizes, separatrix_fly_lanes, law_t, machine_t, mode_t, contact_series_t, region_t, regions_t, table_t
 
   integer, parameter, public :: lane_count = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64
 
@@ -34,13 +35,28 @@ module lane_types
     real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
   end type mode_t
 
+  !> Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction over the speed
+  !> upwards and downwards.
+  integer, parameter, public :: over_stretch = 1, over_place = 2, factor_over_place = 3, over_speed = 4, over_speed_downwards = 5, &
+    tables = 5
+
+  !> Mirrors `lane_table` of lane_types.hpp.
+  type, bind(c) :: table_t
+    real(c_double) :: knots = 0
+    real(c_double), dimension(0:most_knots) :: from = 0, low = 0, high = 0
+    real(c_double) :: c(0:3, 0:most_knots) = 0
+  end type table_t
+
   !> Mirrors `lane_law` of lane_types.hpp.
   type, bind(c) :: law_t
     real(c_double) :: series = 0
-    real(c_double) :: stiffness = 0, pendulum = 0, cubic = 0, viscous = 0, asymmetric_viscous = 0, quadratic = 0, kinetic = 0, &
-      asymmetric = 0, offset = 0, length = 0
+    real(c_double) :: stiffness = 0, pendulum = 0, cubic = 0, viscous = 0, asymmetric_viscous = 0, quadratic = 0, &
+      cubic_damping = 0, kinetic = 0, asymmetric = 0, offset = 0, length = 0
     real(c_double) :: excess(2) = 0, velocity(2) = 1, exponent(2) = 1, edge = 0, rest_friction = 0
     real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
+    real(c_double) :: has_tables = 0
+    type(table_t) :: table(tables)
+    real(c_double) :: change_at_rest(2) = 0, half_play = 0, corner = 0, series_stiffness = 0
   end type law_t
 
   !> Mirrors `lane_contact` of lane_types.hpp.

@@ -13,7 +13,15 @@ enum {
   layer_nodes = 10,
   most_regions = 64,
   lane_modes_count = 6,
-  most_knots = 16
+  most_knots = 16,
+  // Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction
+  // over the speed upwards and downwards.
+  over_stretch = 0,
+  over_place = 1,
+  factor_over_place = 2,
+  over_speed = 3,
+  over_speed_downwards = 4,
+  tables = 5
 };
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
@@ -47,11 +55,19 @@ struct lane_mode {
   double cosine[most_harmonics], sine[most_harmonics];
 };
 
+// A table by its pieces: piece 0 is the line before the first knot, the last one that behind the last knot.
+// In each from `low` to `high`, which are a little beyond its knots: c0 + c1 u + c2 u^2 + c3 u^3, u the
+// distance from `from`. No table: knots 0.
+struct lane_table {
+  double knots, from[most_knots + 1], low[most_knots + 1], high[most_knots + 1], c[most_knots + 1][4];
+};
+
 // The forces of a machine without a closed form, per unit of mass, and what its series needs; see
 // `effect_law.f90`. A closed form: series 0.
 struct lane_law {
   double series;
-  double stiffness, pendulum, cubic, viscous, asymmetric_viscous, quadratic, kinetic, asymmetric, offset;
+  double stiffness, pendulum, cubic, viscous, asymmetric_viscous, quadratic, cubic_damping, kinetic,
+      asymmetric, offset;
   // Spring without stretch where the foot is at its mean [m].
   double length;
   // Stribeck excesses, and the speed above which they are nil; all dry friction at rest.
@@ -60,6 +76,14 @@ struct lane_law {
   double dahl_stiffness, dahl_level[2], inverse_mass;
   // Logarithm of the length to which errors are compared.
   double log_scale;
+  // Forces by tables, per mass; 1 if there are any. What friction over the speed is at rest, upwards and
+  // downwards.
+  double has_tables;
+  lane_table table[tables];
+  double change_at_rest[2];
+  // Free play: half of the play [m], square of the radius of its corners [m^2], stiffness of the spring in
+  // series with it. No play: stiffness 0.
+  double half_play, corner, series_stiffness;
 };
 
 // A soft barrier whose contacts are expanded in series: stiffness p^n (1 + damping p'), or stiffness p +

@@ -10,7 +10,7 @@ module curve_law
   implicit none
   private
 
-  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, is_positive, knots_problem
+  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, pieces_of, is_positive, knots_problem
 
   integer, parameter, public :: most_knots = 16
 
@@ -119,6 +119,24 @@ contains
     slope = 6*s*(1 - s)*(curve%value(i + 1) - curve%value(i))/width + (1 - s)*(1 - 3*s)*curve%slope(i) &
             - s*(2 - 3*s)*curve%slope(i + 1)
   end function slope_of
+
+  !> The curve that goes straight on beyond the knots by its pieces, 0 before the first knot to `count` behind the last:
+  !> c0 + c1 u + c2 u^2 + c3 u^3, u from the knot before, in piece 0 from the first.
+  pure function pieces_of(curve) result(c)
+    type(curve_t), intent(in) :: curve
+    real(wp) :: c(0:3, 0:curve%count), width, mean
+    integer :: i
+    c = 0
+    c(:1, 0) = [curve%value(1), curve%slope(1)]
+    do i = 1, curve%count
+      c(:1, i) = [curve%value(i), curve%slope(i)]
+      if (i == curve%count) exit
+      width = curve%at(i + 1) - curve%at(i)
+      mean = (curve%value(i + 1) - curve%value(i))/width
+      c(2:, i) = [(3*mean - 2*curve%slope(i) - curve%slope(i + 1))/width, &
+                  (curve%slope(i) + curve%slope(i + 1) - 2*mean)/width**2]
+    end do
+  end function pieces_of
 
   !> Integral from the first knot to `x` of the curve that goes straight on beyond the knots.
   pure real(wp) function integral_of(curve, x) result(total)

@@ -25,10 +25,13 @@ module effect_law
   real(wp), parameter :: farthest_behind = 100
 
   type, public :: effects_t
-    !> Any force at all, one that leaves no closed form, and one that lanes have no place for.
+    !> Any force at all, one that leaves no closed form, and one that lanes have no series for (a new effect says so until
+    !> they have).
     logical :: present = .false., nonlinear = .false., unknown_to_lanes = .false.
     !> A force that only the position of body and foot sets, beside the cubic spring and the offset; any that the place changes.
     logical :: by_position = .false., by_place = .false.
+    !> A force that a table gives.
+    logical :: by_table = .false.
     !> Dry friction; any force that is another one after the motion has turned round.
     logical :: dry = .false., turns_round = .false.
     !> c [N s^2/m^2], b [N s/m], a [N], slope [1/m], k3 [N/m^3], F [N].
@@ -134,10 +137,9 @@ contains
                        effects%over_place%count > 0
     effects%dry = abs(effects%asymmetric_coulomb) > 0 .or. effects%upwards%count > 0
     effects%turns_round = effects%dry .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous]) > 0)
-    effects%unknown_to_lanes = effects%by_position .or. effects%upwards%count > 0 .or. effects%over_place%count > 0 .or. &
-                               effects%cubic_damping > 0
-    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_place .or. effects%unknown_to_lanes .or. &
-                        any(abs([effects%quadratic_drag, effects%asymmetric_viscous]) > 0)
+    effects%by_table = any([effects%upwards%count, effects%over_place%count, effects%spring%count, effects%force%count] > 0)
+    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_place .or. effects%by_table .or. effects%unknown_to_lanes .or. &
+                        any(abs([effects%quadratic_drag, effects%cubic_damping, effects%asymmetric_viscous]) > 0)
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
   end subroutine finish_effects
 

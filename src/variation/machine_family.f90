@@ -22,14 +22,20 @@ module machine_family
   use pair_flight, only: body_state
   use structure, only: coordinates_of, structure_t
   use strobe, only: start_strobe, strobe_t
-  use structure_family, only: advance_section, fly_structure, map_of_structure, start_of_structure, state_at_start, &
-    structure_neighbourhood, structure_of_family
+  use structure_family, only: advance_section, advance_to_section, fly_structure, map_of_structure, start_of_structure, &
+    state_at_start, structure_neighbourhood, structure_of_family
   use variations, only: neighbourhood_t
   implicit none
   private
 
   public :: has_several, machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, &
-    section_sizes, nearest_copy, within_stops, watched_rows, starts_of_section, strobe_of_section
+    section_sizes, nearest_copy, within_stops, watched_rows, starts_of_section, strobe_of_section, begin_walk, walk_on
+
+  !> A motion that goes from section to section.
+  type, public :: walk_t
+    type(state_t) :: body
+    type(jointed_state_t) :: jointed
+  end type walk_t
 
 contains
 
@@ -134,6 +140,43 @@ contains
       strobe = start_strobe(moving, [point, 0.0_wp])
     end select
   end subroutine strobe_of_section
+
+  !> A motion from a point of the section. `ok` is false for one beyond a stop.
+  pure subroutine begin_walk(machine, point, walk, ok)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: point(:)
+    type(walk_t), intent(out) :: walk
+    logical, intent(out) :: ok
+    ok = .true.
+    select type (machine)
+    type is (one_body_t)
+      walk%body = start_state(machine%moving, point(1), point(2), 0.0_wp)
+    type is (structure_t)
+      call start_of_structure(machine, point, walk%jointed, ok)
+    end select
+  end subroutine begin_walk
+
+  !> Takes a motion on to the next section, where it is at `point`. `ok` is false if it had to be given up.
+  pure subroutine walk_on(machine, walk, point, ok)
+    class(hybrid_t), intent(in) :: machine
+    type(walk_t), intent(inout) :: walk
+    real(wp), intent(out) :: point(:)
+    logical, intent(out) :: ok
+    type(tally_t) :: tally
+    real(wp) :: lasted
+    integer :: reason
+    reason = 0
+    point = 0
+    select type (machine)
+    type is (one_body_t)
+      call advance_period(machine%moving, walk%body, tally, reason)
+      point = [walk%body%x, walk%body%v]
+    type is (structure_t)
+      call advance_to_section(machine, walk%jointed, lasted, tally, reason)
+      point = coordinates_of(machine, walk%jointed)
+    end select
+    ok = reason == 0
+  end subroutine walk_on
 
   !> Flies a machine from a section point over so many sections: where it then is, the mode in which it began, and the events on
   !> the way, with `collapsed` a completed chatter as one. `ok` is false if the trajectory had to be given up.

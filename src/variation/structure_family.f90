@@ -30,7 +30,7 @@ module structure_family
   private
 
   public :: structure_of_family, structure_neighbourhood, fly_structure, map_of_structure, why_not_varied, vary_section, &
-    start_of_structure, state_at_start, advance_section, least_dimension
+    start_of_structure, state_at_start, advance_section, advance_to_section, least_dimension
 
   !> A section point as near as this, in natural sizes, to what a joint holds is held.
   real(wp), parameter :: held_within = 1e-10_wp
@@ -230,6 +230,24 @@ contains
     end associate
   end function event_of
 
+  !> Flies a structure on over one section, in which time `lasted` [s] passes; `reason` is not 0 if the motion had to be given up.
+  pure subroutine advance_to_section(structure, state, lasted, tally, reason, transitions)
+    type(structure_t), intent(in) :: structure
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(out) :: lasted
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(transitions_t), intent(inout), optional :: transitions
+    associate (moving => structure%frame%moving)
+      if (structure%has_clock) then
+        call advance_jointed_period(moving, state, tally, reason, transitions=transitions)
+        lasted = moving%machine%period
+      else
+        call advance_to_turn(moving, longest_return*moving%machine%period, state, lasted, tally, reason, transitions)
+      end if
+    end associate
+  end subroutine advance_to_section
+
   !> Flies a structure on over one section: the transitions become events, whose times count on from `offset` [s], which becomes the
   !> time of the section. `ok` is false if the motion had to be given up, `certain` where a transition is not known to be smooth.
   pure subroutine advance_section(structure, state, offset, events, count_events, tally, ok, certain)
@@ -245,14 +263,7 @@ contains
     type(event_t), allocatable :: more(:)
     real(wp) :: lasted
     integer :: reason, i
-    associate (moving => structure%frame%moving)
-      if (structure%has_clock) then
-        call advance_jointed_period(moving, state, tally, reason, transitions=transitions)
-        lasted = moving%machine%period
-      else
-        call advance_to_turn(moving, longest_return*moving%machine%period, state, lasted, tally, reason, transitions)
-      end if
-    end associate
+    call advance_to_section(structure, state, lasted, tally, reason, transitions)
     ok = reason == 0
     if (.not. ok) return
     if (count_events + transitions%count > size(events)) then

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from program import run, succeed
+from program import succeed
 from separatrix.open import decode_flags, open_result
 
 
@@ -245,14 +245,94 @@ def test_spectrum_of_an_impact_damper(separatrix: Path, source_dir: Path, tmp_pa
     assert next(line for line in lines if line["event"] == "motion")["type"] == "periodic"
 
 
-def test_what_is_not_known_of_structures(separatrix: Path, source_dir: Path, tmp_path: Path):
-    """Two parameters at once are for one body; a contact whose damping each impact sets has no variation."""
-    case = source_dir / "examples" / "structure_two_masses.toml"
-    words = ("--parameter", "drive.force.frequency", "--from", 0.9, "--to", 1.2)
-    free = ("--free", "contact.stop.restitution", "--free-from", 0.5, "--free-to", 0.9)
-    ended = run(separatrix, "branches", case, *words, *free, folder=tmp_path)
-    assert (
-        ended.code == 65
-        and "--free: labels are followed over two parameters for machines of one body" in ended.err
-    )
-    assert not list(tmp_path.glob("*.h5"))
+def curves(out: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
+    """Both parameters at the points of the curves of a label."""
+    with open_result(out) as result:
+        here = decode_flags(result["curve_label"]).values == label
+        return result["curve_parameter"].values[here], result["curve_free"].values[here]
+
+
+def test_curves_of_grazes_and_folds_in_two_parameters(follow):
+    """A linear structure grazes where its amplitude is the gap; folds are those of other machines."""
+    case, name = "structure_two_masses.toml", "drive.force.frequency"
+    free = ("--free", "contact.stop.upper", "--free-from", "0.95", "--free-to", "1.2")
+    _, out = follow(case, name, 0.9, 1.2, "--searches", "3", *free)
+    frequency, gap = curves(out, "GR")
+    assert len(gap) > 20
+    assert gap.max() - gap.min() > 0.2
+    assert [amplitude(value) for value in frequency] == pytest.approx(gap, abs=1e-9)
+    frequency, gap = curves(out, "SN")
+    assert gap.max() == pytest.approx(1.2, abs=1e-12)
+    points, _ = follow(case, name, 1.1, 1.15, "--searches", "3", "--set", "contact.stop.upper=1.2", "--force")
+    fold = next(point["parameter"] for point in points if point["label"] == "SN")
+    assert frequency[gap.argmax()] == pytest.approx(fold, abs=1e-9)
+
+
+def test_curves_of_doublings_of_a_machine_without_a_clock(follow):
+    case, name = "structure_blocks_on_a_belt.toml", "friction.first.velocity"
+    free = ("--free", "spring.coupling.stiffness", "--free-from", "1.2", "--free-to", "1.25")
+    _, out = follow(case, name, 0.15, 0.3, "--searches", "2", *free)
+    velocity, stiffness = curves(out, "PD")
+    more = ("--searches", "2", "--set", "spring.coupling.stiffness=1.25", "--force")
+    points, _ = follow(case, name, 0.15, 0.3, *more)
+    doublings = {round(point["parameter"], 9) for point in points if point["label"] == "PD"}
+    reached = velocity[abs(stiffness - 1.25) < 1e-12]
+    assert sorted(reached) == pytest.approx(sorted(doublings), abs=2e-9)
+
+
+def test_onset_of_sticking_of_a_pair_scales_with_its_mass(follow):
+    """Friction over mass times acceleration of the platform is 2/sqrt(4 + pi^2)."""
+    free = ("--free", "body.driven_mass", "--free-from", "0.5", "--free-to", "2")
+    _, out = follow("sweep_pair_kappa.toml", "body.friction", 0.4, 0.7, "--searches", "2", *free)
+    friction, mass = curves(out, "stick_onset")
+    assert len(mass) > 20
+    assert friction / mass == pytest.approx(2 / np.sqrt(4 + np.pi**2), abs=1e-11)
+
+
+CRANK = """
+[body.block]
+mass = 1
+[spring.frame]
+between = ["block"]
+stiffness = {stiffness!r}
+[friction.guide]
+between = ["block"]
+force = 1.962
+[contact.stop]
+between = ["block"]
+law = "newton"
+restitution = 0.5
+upper = 0.38945
+[drive.force]
+law = "force"
+body = "block"
+frequency = 8.13
+cosine = {cosine!r}
+sine = {sine!r}
+[run]
+duration = 300
+[[axis]]
+name = "x0"
+from = -0.44
+to = -0.41
+count = 10
+[[axis]]
+name = "v0"
+from = -1.6
+to = -1.3
+count = 10
+"""
+
+
+def test_a_graze_where_friction_turns_round_with_the_impact(follow, tmp_path: Path):
+    """The machine of sweep_coulomb.toml, its crank a force: the graze is that of the one body."""
+    case, stiffness, natural = tmp_path / "crank.toml", 88.82643960980423, 3 * np.pi
+    foot = stiffness * np.array([0.09495, 0.01 + 0.02849j, -0.02003 - 0.02686j])
+    # a cos + b sin of the crank angle is the real part of (a + ib) exp(-i angle)
+    foot *= np.exp(-1j * np.radians(191.1) * np.arange(1, 4))
+    case.write_text(CRANK.format(stiffness=stiffness, cosine=foot.real.tolist(), sine=foot.imag.tolist()))
+    points, _ = follow(case, "drive.force.frequency", 0.8627 * natural, 0.8634 * natural, "--searches", "2")
+    grazes = [point["parameter"] / natural for point in points if point["label"].startswith("GR")]
+    assert grazes == pytest.approx([0.8628268060133], abs=1e-11)
+    assert {point["word"] for point in points} >= {"R....", "R.R..."}
+    assert next(point["label"] for point in points if point["label"].startswith("GR")) == "GR-fold"

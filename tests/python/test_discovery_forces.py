@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,49 @@ def test_a_force_of_the_place_is_not_taken_for_friction() -> None:
     verdict = ask("cogging", 0.005, candidates=("viscous", "quadratic_drag", "position_dependent_friction"))
     assert verdict["outcome"] in ("characterised", "not-in-catalogue")
     assert verdict["effects"] == []
+
+
+def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
+    """Each record by itself, as it warms up: no function of the place."""
+    records = records_of("nothing", 0.005)
+    for record, rate in zip(records, (0.3, -0.2, 0.5), strict=True):
+        record.force = record.force + rate * (record.t - record.t[0])
+    verdict = discover(base(), records[:2], records[2:], Options(quick=True, compare="force"))
+    assert verdict["outcome"] == "characterised"
+    assert verdict["effects"] == []
+    assert verdict["character"][0]["depends_on"] == ["slow time"]
+    assert "asked for" in verdict["not_tested"]["cubic_damping"]
+
+
+@pytest.mark.parametrize(("column", "factor"), (("force", 1e-3), ("force", 9.81), ("x", 1e3)))
+def test_wrong_units_make_no_certain_name(column: str, factor: float) -> None:
+    """Newtons that are kilonewtons or kilograms, metres that are millimetres."""
+    records = records_of("stribeck", 0.005)
+    for record in records:
+        setattr(record, column, factor * getattr(record, column))
+    verdict = discover(base(), records[:2], records[2:], Options(quick=True, compare="force"))
+    assert verdict["outcome"] != "named"
+    told = [one for one in verdict["warnings"] if "other units" in one]
+    assert told
+    factors = [float(found[1]) for one in told if (found := re.search(r"is ([\d.e-]+) times that", one))]
+    assert factors == pytest.approx([factor if column == "force" else 1 / factor] * 2, rel=0.2)
+
+
+def test_a_clipped_force_is_refused() -> None:
+    records = records_of("viscous", 0.005)
+    limit = 0.9 * np.max(np.abs(records[1].force))
+    records[1].force = np.clip(records[1].force, -limit, limit)
+    with pytest.raises(SeparatrixError, match="r1.*force stays at its largest value.*clipped"):
+        discover(base(), records[:2], records[2:], Options(quick=True, compare="force"))
+
+
+def test_a_force_without_noise_is_not_clipped() -> None:
+    """Dry friction at a constant speed is one number, time and again."""
+    t = np.arange(4000) / 500
+    x = 0.1 * np.abs(np.mod(t, 2.0) - 1.0)
+    v = np.gradient(x, t)
+    force = DRY * np.sign(np.round(v, 6)) + DAMPING * v
+    prepare_force(make_record("triangle", {"t": t, "x": x, "force": force}), base())
 
 
 def test_what_to_measure_next_makes_an_ambiguous_name_a_certain_one() -> None:

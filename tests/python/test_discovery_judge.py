@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from separatrix.discovery.decision import decide, flexible, judge, several
 from separatrix.discovery.decision.gates import foremost
-from separatrix.discovery.decision.judge import Judged, _together_clear, held_out_bounds, stable
+from separatrix.discovery.decision.judge import (
+    Judged,
+    _together_clear,
+    beyond_doubt,
+    foretells,
+    held_out_bounds,
+    stable,
+)
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free
@@ -25,7 +32,8 @@ def fit(chi2: np.ndarray, decrement: float = 0.0) -> Fit:
     ones = np.ones(chi2.size)
     flown = SimpleNamespace(steady=ones > 0, failed=ones < 0)
     starts, open_ = np.zeros((chi2.size, 2)), np.zeros(1, bool)
-    return Fit(np.ones(1), starts, flown, None, chi2, 50 * ones, decrement, 1, open_, ~open_)
+    reduced = SimpleNamespace(matrix=ones[:, None, None])
+    return Fit(np.ones(1), starts, flown, reduced, chi2, 50 * ones, decrement, 1, open_, ~open_)
 
 
 def fitted(name: str, chi2: np.ndarray) -> Fitted:
@@ -49,6 +57,44 @@ def test_an_effect_that_a_few_segments_carry_needs_the_held_out_record():
     assert stable(judged(few, even), base, OPTIONS) > OPTIONS.inclusion
     # a record that was never fitted makes no name by itself
     assert stable(judged(0.05 * few, even), base, OPTIONS) < OPTIONS.inclusion
+
+
+def test_an_effect_that_few_segments_can_show_pays_without_the_best_of_them():
+    """Break-away shows where the body starts: three of 20 segments, which a resampling may all leave out."""
+    base = fitted("", np.full(COUNT, 100.0))
+    for gains, holds in (([9.0, 8.0, 7.0], True), ([30.0, 0.5, 0.2], False)):
+        parts, told = np.zeros(COUNT), np.full(COUNT, 1e-6)
+        parts[:3], told[:3] = gains, 1.0
+        one = judged(parts, np.zeros(COUNT))
+        one.fitted.fit.reduced.matrix = told[:, None, None]
+        assert (stable(one, base, OPTIONS) > OPTIONS.inclusion) == holds
+        # what is by chance gained elsewhere is no second one
+        parts[3:] = 0.2
+        one = judged(parts, np.zeros(COUNT))
+        one.fitted.fit.reduced.matrix = told[:, None, None]
+        assert (stable(one, base, OPTIONS) > OPTIONS.inclusion) == holds
+
+
+def test_a_held_out_record_tells_an_effect_by_the_odds_of_a_name():
+    """However much its segments differ: the bounds of so few by resampling are wide."""
+    uneven = np.array([2.24, 2.17, 1.86, 1.37, 0.9, 0.4, 0.36, -0.37, -0.62, -0.79, -1.61, -1.66])
+    assert held_out_bounds(foretold(uneven, np.ones(12)), OPTIONS)[0][0] < 0
+    assert foretells(foretold(uneven, np.ones(12)), OPTIONS)
+    assert not foretells(foretold(uneven - 0.2, np.ones(12)), OPTIONS)
+    # two that are followed by neither machine, and ten that agree
+    apart = np.array([70.43, 7.58, 6.23, 5.86, 5.12, 4.71, 4.52, 3.97, 2.66, 2.62, 0.78, -62.82])
+    assert held_out_bounds(foretold(apart, np.ones(12)), OPTIONS)[0][0] < 0
+    assert foretells(foretold(apart, np.ones(12)), OPTIONS)
+    # one segment alone may be one of a wrong minimum
+    alone = np.array([7.0, *11 * [-0.1]])
+    assert not foretells(foretold(alone, np.ones(12)), OPTIONS)
+    # impacts of one speed say nothing of how restitution falls with it; a doubtful effect is not proven so
+    silent, base = foretold(np.full(12, 0.1), np.ones(12)), fitted("", np.full(COUNT, 100.0))
+    assert beyond_doubt(silent, base, OPTIONS)
+    assert not beyond_doubt(silent, replace(base, fit=fit(np.full(COUNT, 100.0), decrement=50.0)), OPTIONS)
+    assert not beyond_doubt(foretold(np.zeros(12), np.ones(12)), base, OPTIONS)
+    silent.training = 5.0
+    assert not beyond_doubt(silent, base, OPTIONS)
 
 
 def foretold(gains: np.ndarray, information: np.ndarray) -> Judged:
@@ -311,5 +357,6 @@ def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record
     best = judged(np.full(COUNT, 5.0), np.zeros(COUNT))
     best.gates = {"hold-out": foretells, "admissible": True, "converged": True}
     decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
-    bench = SimpleNamespace(options=replace(OPTIONS, adequate_chi2=2.0))
+    options, data = replace(OPTIONS, adequate_chi2=2.0), SimpleNamespace(prepared=[])
+    bench = SimpleNamespace(options=options, training=data)
     assert decide._conclude(bench, decision, best, []).outcome == outcome

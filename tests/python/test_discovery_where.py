@@ -20,8 +20,10 @@ def told_of(folder, records, drawn, louder: float = 1.0) -> list[dict]:
     records.write_case(case, folder / "truth.json", drawn)
     base = Model.read(case / records.BASE)
     prepared = [prepare(read_record(case / name), base) for name in records.TRAINING]
-    for one in prepared:
-        one.sigma *= louder
+    for one in prepared if louder > 1 else ():
+        # as if it was stated: what is measured would be the noise that there is
+        one.sigma, one.velocity_sigma = louder * one.sigma, louder * one.velocity_sigma
+        one.sigma_stated = one.velocity_sigma_stated = True
     data = gather(prepared, 1.0, None)
     mass = scales_of(data, base).mass
     return sentences(where_maps(fit_base(data, base, mass), mass, Options()))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+from program import succeed
 
 
 @pytest.fixture
@@ -147,3 +148,41 @@ def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tm
         [separatrix, "stability", tmp_path / "torn.h5"], capture_output=True, text=True, check=False
     )
     assert ended.returncode == 74
+
+
+SOFT_STOP = """
+[body.block]
+mass = 1
+[spring.frame]
+between = ["block"]
+stiffness = 1
+damping = 0.2
+[contact.stop]
+between = ["block"]
+law = "kelvin_voigt"
+stiffness = 20
+damping = 0
+upper = 0.63
+[drive.force]
+law = "force"
+body = "block"
+frequency = 1
+amplitude = 0.5
+[start]
+x0 = 0
+[run]
+duration = 300
+"""
+
+
+@pytest.mark.parametrize("structure", [False, True])
+def test_touches_of_a_soft_stop_are_impacts(separatrix: Path, source_dir: Path, tmp_path: Path, structure):
+    """A motion that touches it once a period does so as often as there are periods."""
+    case = source_dir / "examples" / "validation" / "soft_impact.toml"
+    more = ("--set", "drive.ratio=1.0")
+    if structure:
+        case, more = tmp_path / "soft.toml", ()
+        case.write_text(SOFT_STOP)
+    said = succeed(separatrix, "stability", case, *more, "--periods", 200, "--json", folder=tmp_path).out
+    motion = next(line for line in map(json.loads, said.splitlines()) if line["event"] == "motion")
+    assert (motion["type"], motion["impacts"]) == ("periodic", 200)

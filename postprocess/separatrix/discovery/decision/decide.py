@@ -8,10 +8,12 @@ import numpy as np
 
 from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
-from separatrix.discovery.decision.judge import Judged, admissible, equivalent, sizeable
+from separatrix.discovery.decision.judge import NOISE, Judged, admissible, equivalent, sizeable
 from separatrix.discovery.decision.misfit import missed
+from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, run_round
 from separatrix.discovery.decision.several import with_more
+from separatrix.discovery.decision.strange import other_units
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
@@ -26,6 +28,9 @@ _RENEWALS = 3
 _LEADERS = 3
 _LOWER = 1.0
 _LOWER_SHARE = 0.01
+# standard deviations of chi^2 by which a held-out record is missed for another effect to be tried, and the
+# share of this gap that it must close
+_CHANCE, _CLOSES = 4.0, 0.5
 # segments that may be caught in a wrong minimum
 _CAUGHT = 3
 
@@ -87,7 +92,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
             # the base itself explains what the effect did
             return _without_name(bench, decision)
     if best.gates["adequate"]:
-        return _conclude(bench, decision, best, rivals)
+        return _conclude(bench, decision, *_with_more_foretold(bench, decision, best, rivals))
     if shaped is None and found is not first:
         shaped = _shaped(bench, found, first)
     if shaped is not None and not (_of_two_directions(shaped[0]) and bench.options.most_effects > 1):
@@ -110,6 +115,39 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         fit = minimise(base.problem, base.fit.values, base.fit.starts, patient=True)
         return decide(bench, replace(base, fit=fit), settled=True)
     return _give_up(bench, decision, best)
+
+
+def _with_more_foretold(
+    bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]
+) -> tuple[Judged, list[Judged]]:
+    """An effect that leaves noise where it was fitted but misses a held-out record, and another beside it.
+
+    What two effects do together where they were fitted one may do alone, but not at another drive.
+    """
+    told = best.prediction
+    if told is None or bench.options.quick or bench.options.most_effects < 2 or best.leaves != NOISE:
+        return best, rivals
+    if not _misses(told, best.fitted.fit, bench.options):
+        return best, rivals
+    rounds = list(decision.rounds)
+    whole, others, closed = with_more(bench, rounds, best)
+    sure = closed and all(whole.gates.values())
+    if not sure or closed_share(told, whole.prediction) < _CLOSES:
+        return best, rivals
+    decision.rounds = rounds
+    return whole, others
+
+
+def _misses(told: Prediction, fitted: Fit, options: Options) -> bool:
+    """Whether held-out records are missed, by more than chance and not in a few segments alone."""
+    fit, kept = told.fit, told.good.copy()
+    caught = suspicious(fit)
+    if caught.size <= _CAUGHT:
+        kept[caught] = False
+    freedom = float((fit.counts - fit.unknowns)[kept].sum())
+    # noise that was measured too large where it was fitted was so here
+    size = fit.chi2[kept].sum() / max(1.0, freedom) / min(1.0, fitted.reduced_chi2)
+    return bool(size > max(options.adequate_chi2, 1 + _CHANCE * np.sqrt(2 / max(1.0, freedom))))
 
 
 def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
@@ -232,7 +270,9 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
     decision.accepted = [best]
     decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
-    decision.outcome = "ambiguous" if failed else "named"
+    odd = other_units(bench.training, decision.rounds[0].base.model)
+    decision.reasons += odd
+    decision.outcome = "ambiguous" if failed or odd else "named"
     decision.equivalent = bool(rivals) and all(equivalent(best, one) for one in rivals)
     return decision
 

@@ -8,8 +8,10 @@ from separatrix.discovery.decision.judge import (
     Judged,
     adequate,
     admissible,
+    beyond_doubt,
     clear_of,
     detection,
+    foretells,
     held_out_bounds,
     judged,
     sizeable,
@@ -58,7 +60,8 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
-        helps = any(low > 0 for low, _ in bounds)
+        helps = any(low > 0 for low, _ in bounds) or foretells(best, options)
+        helps |= beyond_doubt(best, base, options)
         best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
     best.gates["separate"] = not rivals
     best.gates["admissible"] = admissible(best, base, options)[0]
@@ -76,4 +79,5 @@ def _of_some_size(best: Judged, options: Options) -> bool:
 def judge_ceiling(bench: Bench, one: Judged) -> None:
     """Set the gate of the adequacy: what a flexible machine would still explain."""
     one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
-    one.gates["adequate"] = adequate(one, bench.options)
+    one.leaves = adequate(one, bench.options)
+    one.gates["adequate"] = bool(one.leaves)

@@ -117,6 +117,9 @@ def hypotheses(training: Motion) -> Iterator[Hypothesis]:
     yield from _memories(training)
     if training.problem.in_force:
         yield _after_turning(training)
+        yield Hypothesis(
+            ("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record"
+        )
     if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= _FEWEST_IMPACTS:
         yield from _at_impacts(training)
 
@@ -206,6 +209,11 @@ def _after_turning(training: Motion) -> Hypothesis:
         ("direction of motion", "way since it turned"),
         lambda m: np.sign(m.v)[:, :, None] * splines(_ways(m), knots, m.good),
     )
+
+
+def _drifts(m: Motion) -> np.ndarray:
+    """Zero and drift of a load cell in each record."""
+    return _in_records(m, np.stack([np.ones_like(m.t), m.t], axis=2))
 
 
 def _ways(m: Motion) -> np.ndarray:

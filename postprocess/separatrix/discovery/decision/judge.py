@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evidence of the candidates and the gates that a name has to pass."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
@@ -20,6 +21,10 @@ _BLOCKS = 2
 _FEW = 5
 # share of the mean information on an effect below which a segment says nothing of it
 _SILENT = 0.01
+# log-likelihood of an effect that no held-out record can show
+_DOUBTLESS = 10.0
+# p value of so many segments in which a held-out record is foretold better
+_CHANCE = 0.05
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
 _KINK_SHARE = 0.01
 
@@ -39,6 +44,8 @@ class Judged:
     ceiling: Ceiling | None = None
     # share of the gain that small faults of a rig do not explain
     own: float = 1.0
+    # what it leaves, if it is adequate
+    leaves: str = ""
 
     @property
     def name(self) -> str:
@@ -115,19 +122,57 @@ def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, flo
     return bounds
 
 
+def foretells(one: Judged, options: Options) -> bool:
+    """Whether a held-out record by itself tells an effect from nothing, by the odds of a name, and not by one
+    segment alone.
+
+    What a right base foretells is beaten by more than log(1/p) with a probability of p at most (Ville),
+    however unlike the segments are. It has to be beaten without the best segment too, or in so many of them
+    that this is no chance (sign test).
+    """
+    for number in np.unique(one.prediction.record):
+        parts = one.held_out_parts[one.prediction.record == number] / one.prediction.misfit
+        parts = parts[parts != 0]
+        if parts.sum() <= options.separation:
+            continue
+        better = int(np.sum(parts > 0))
+        if parts.sum() > parts.max() or binom.sf(better - 1, parts.size, 0.5) < _CHANCE:
+            return True
+    return False
+
+
+def beyond_doubt(one: Judged, base: Fitted, options: Options) -> bool:
+    """Whether fitted records tell an effect of which held-out ones say nothing: they are foretold alike.
+
+    Over a base that is not at its minimum they do not.
+    """
+    parts, misfit = one.held_out_parts, one.prediction.misfit
+    compared = np.count_nonzero(parts) > parts.size / 2
+    alike = compared and float(np.abs(parts).sum()) < options.separation * misfit
+    return bool(alike and base.fit.converged and one.training - one.parameters > _DOUBTLESS * misfit)
+
+
 def _telling(one: Judged) -> np.ndarray:
     """Whether both machines follow a held-out segment and it has information on what was added."""
     fitted, prediction = one.fitted, one.prediction
     shared = [i for i, free in enumerate(fitted.problem.free) if free.record is None]
-    added = [shared.index(i) for i in fitted.added if i in shared]
-    sizes = np.array([_size(fitted, shared[i]) for i in added])
-    matrix = prediction.fit.reduced.matrix[:, added, added] * sizes**2
-    information = matrix.max(axis=1, initial=0.0)
+    added = [i for i in fitted.added if i in shared]
+    places = [shared.index(i) for i in added]
+    information = _information(fitted, prediction.fit.reduced.matrix, added, places)
     tells = np.zeros(information.size, bool)
     for number in np.unique(prediction.record):
         here = prediction.record == number
         tells[here] = information[here] > _SILENT * information[here].mean()
     return tells & (one.held_out_parts != 0)
+
+
+def _information(
+    fitted: Fitted, matrix: np.ndarray, added: Sequence[int], places: Sequence[int] | None = None
+) -> np.ndarray:
+    """What each segment says of the added parameters, over their sizes; `places` of them in the matrix."""
+    sizes = np.array([_size(fitted, i) for i in added])
+    places = added if places is None else places
+    return (matrix[:, places, places] * sizes**2).max(axis=1, initial=0.0)
 
 
 def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> np.ndarray:
@@ -142,8 +187,9 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
 def stable(one: Judged, base: Fitted, options: Options) -> float:
     """Share of block bootstraps of the segments in which the effect pays for its parameters.
 
-    Held-out segments are drawn too where the training records themselves tell the effect from nothing. All
-    gains are over the misfit.
+    Only segments that have information on the effect are drawn; where they are few, it has to pay without the
+    best of them. Held-out segments are drawn too where the training records themselves tell the effect from
+    nothing. All gains are over the misfit.
     """
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
@@ -153,9 +199,17 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     gain, parts = gain / misfit, parts / misfit
     if not added.size:
         return 0.0
+    information = _information(one.fitted, fit.reduced.matrix, added)
+    tells = information > _SILENT * information.mean()
+    rest = min(0.0, float(parts[~tells].sum()))
+    proven = one.held_out_parts.size and gain - one.parameters > options.separation
+    if tells.sum() < _FEW:
+        foretold = one.held_out_parts.sum() / one.prediction.misfit if proven else 0.0
+        others = parts[tells].sum() - parts[tells].max(initial=0.0)
+        return float(others + rest + foretold > one.parameters)
     random = np.random.default_rng([options.seed, 12])
-    sums = _block_sums(parts, random, options.bootstraps)
-    if one.held_out_parts.size and gain - one.parameters > options.separation:
+    sums = rest + _block_sums(parts[tells], random, options.bootstraps)
+    if proven:
         sums = sums + _block_sums(one.held_out_parts / one.prediction.misfit, random, options.bootstraps)
     return float(np.mean(sums > one.parameters))
 
@@ -236,12 +290,16 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     return True, ""
 
 
-def adequate(one: Judged, options: Options) -> bool:
-    """Whether what is left is noise, or little of a gap that was closed nearly all.
+NOISE, LITTLE, LARGER_NOISE = "noise", "little of the gap", "larger noise"
 
-    Either it is no more than a share of the gap, however significant, or the fit is like noise and a flexible
-    force explains nothing more, or less than the effect does and nothing that is sizeable; or it explains
-    nothing more of what is somewhat more than noise. Small faults of a rig count as noise.
+
+def adequate(one: Judged, options: Options) -> str:
+    """What an adequate machine leaves; '' if it is not adequate.
+
+    `noise`: the fit is like noise and a flexible force explains nothing more, or less than the effect does
+    and nothing that is sizeable. `little of the gap`: no more than a share of it, however significant.
+    `larger noise`: somewhat more than noise, of which no force explains anything. Small faults of a rig count
+    as noise.
     """
     fit = one.ceiling.fit
     gained = max(0.0, 2 * one.training)
@@ -250,10 +308,12 @@ def adequate(one: Judged, options: Options) -> bool:
     clean = one.ceiling.p > options.detection_level or trifle
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
     if fit.sample_chi2 <= options.adequate_chi2 and (clean or closed):
-        return True
+        return NOISE
+    if _all_closed(one, options):
+        return LITTLE
     # no force explains more: the noise is larger than it was said or measured to be
     noisier = one.ceiling.p > options.detection_level and share >= options.adequate_share
-    return bool((noisier and fit.sample_chi2 <= options.missed_chi2) or _all_closed(one, options))
+    return LARGER_NOISE if noisier and fit.sample_chi2 <= options.missed_chi2 else ""
 
 
 def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None) -> bool:

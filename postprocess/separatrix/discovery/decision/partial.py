@@ -62,7 +62,8 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
     whole = over_base(bench, base, rounds[0].foretold, last)
     whole.gates, whole.p = last.gates, last.p
     whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
-    complete = adequate(whole, bench.options)
+    whole.leaves = adequate(whole, bench.options)
+    complete = bool(whole.leaves)
     whole.gates["adequate"] = complete
     return replace(
         decision,

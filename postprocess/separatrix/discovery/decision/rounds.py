@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.judge import Judged, judged
-from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import ON_REQUEST, STARTS, Candidate, Scales, candidate
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
@@ -28,6 +28,9 @@ _BAD = 1.3
 _CROSSED = 4
 _WORTH_CROSSING = 5.0
 _SHARE = 0.3
+# share of the best gain from which on an effect is tried that has no size at which it is absent: one form of
+# it says little of the others
+_CURVED = 0.05
 # behind the best by less than so many separations: fitted to the end
 _NEAR = 3.0
 
@@ -144,6 +147,9 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
             continue
         if any(path.startswith(f"effect.{name}.") for path in base.model.parameters):
             continue
+        if name in ON_REQUEST and not options.candidates:
+            absent[name] = ON_REQUEST[name]
+            continue
         if base.problem.in_force and effects()[name].acts != "flight":
             absent[name] = "it does nothing to the force along a known motion"
             continue
@@ -244,7 +250,11 @@ def choose(base: Fitted, screened: Screened, options: Options, everything: bool 
         if (place < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or place < _FEWEST))
         or (
             screened.gain[name] > _WORTH
-            and (not options.quick and any(screened.cosine(name, other) > _RELATED for other in order[:3]))
+            and not options.quick
+            and (
+                any(screened.cosine(name, other) > _RELATED for other in order[:3])
+                or (not screened.live[name].any() and screened.gain[name] > _CURVED * screened.gain[order[0]])
+            )
         )
     ]
 

@@ -7,6 +7,7 @@ from scipy.signal import get_window
 
 from separatrix.discovery.decision.misfit import record_chi2
 from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.options import Options
@@ -15,6 +16,11 @@ from separatrix.discovery.wording import number, unit_of
 # what is known of a machine before any record, and the factor by which it is not known
 _KNOWN = ("body.mass", "restoring.stiffness", "restoring.moment")
 _FACTOR = 3.0
+# likeness of a measured force to that of the case from which on they are one but for a factor, and the factor
+# from which on units are the likely reason
+_ALIKE, _UNITS = 0.8, 5.0
+# standard error of a mass over itself with which it is known
+_WELL = 0.1
 _BARRIERS = ("contact.upper", "contact.lower")
 # reduced chi^2 of a record that a wrong drive would leave
 _MISSED = 10.0
@@ -52,6 +58,54 @@ def other_machine(data: Data, fitted: Fitted, options: Options) -> list[str]:
         return []
     said = ", ".join(strange)
     return [f"the fitted machine is not that of the case: {said}: other units, or another machine"]
+
+
+def other_units(data: Data, model) -> list[str]:
+    """Measured forces that are a multiple of what the machine of the case takes along the motion.
+
+    The factor is that of the mass, where force and acceleration tell it, else that of the whole force.
+    """
+    notes = []
+    for one in data.prepared:
+        if not one.in_force:
+            continue
+        motion, at, record = one.driven, one.driven.moves, one.record
+        taken = force_needed(model, {}, motion, record.force, record.pieces)[at]
+        factor = _factor(taken, record.force[at])
+        columns = [motion.a[at], motion.v[at], np.sign(motion.v[at]), np.ones(at.sum())]
+        if "restoring.stiffness" in model.parameters:
+            columns.append(motion.x[at])
+        mass, error = _mass(np.stack(columns, axis=1), record.force[at])
+        of_mass = factor is not None and error < _WELL * abs(mass)
+        if of_mass:
+            factor = mass / one.mass
+        if factor is not None and not 1 / _UNITS < factor < _UNITS:
+            what = "the mass that force and acceleration give" if of_mass else "the force"
+            notes.append(
+                f"{record.name}: {what} is {number(factor, 2)} times that of the machine of the case: "
+                "other units of force or place, or another machine"
+            )
+    return notes
+
+
+def _factor(taken: np.ndarray, measured: np.ndarray) -> float | None:
+    """By which one force is the other, None where it is another one."""
+    product, size = float(taken @ measured), float(taken @ taken)
+    if size == 0 or product < _ALIKE * np.sqrt(size * float(measured @ measured)):
+        return None
+    return product / size
+
+
+def _mass(columns: np.ndarray, force: np.ndarray) -> tuple[float, float]:
+    """Mass that a force needs beside what else there is, and its standard error [kg]; the acceleration is the
+    first of the columns.
+    """
+    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    found, _, _, _ = np.linalg.lstsq(columns / scale, force, rcond=1e-9)
+    rest = force - columns / scale @ found
+    variance = np.linalg.pinv((columns / scale).T @ (columns / scale), rcond=1e-12)[0, 0]
+    error = np.sqrt(variance * float(rest @ rest) / max(1, force.size - columns.shape[1]))
+    return float(found[0] / scale[0]), float(error / scale[0])
 
 
 def other_drive(data: Data, base: Fitted) -> list[str]:

@@ -9,12 +9,12 @@ import numpy as np
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.decoys import decoys
 from separatrix.discovery.decision.experiments import experiments
-from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.judge import LARGER_NOISE, Judged
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
-from separatrix.discovery.decision.strange import other_drive, other_machine
+from separatrix.discovery.decision.strange import other_drive, other_machine, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.curves import function_of
 from separatrix.discovery.fitting.data import Data
@@ -46,8 +46,8 @@ def verdict_of(findings: Findings) -> dict:
     first = decision.rounds[0]
     best = decision.corrected
     final = best.fitted if best else findings.base
-    findings.maps = where_maps(findings.base, bench.scales.mass, bench.options)
     named = list(final.names) if decision.accepted else []
+    findings.maps = where_maps(findings.base, bench.scales.mass, bench.options, named)
     rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
     return {
         "outcome": decision.outcome,
@@ -68,6 +68,7 @@ def verdict_of(findings: Findings) -> dict:
         "function": _function(final),
         "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
+        "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
         "reasons": decision.reasons,
         "asked_for": None if bench.options.candidates is None else list(bench.options.candidates),
@@ -181,8 +182,16 @@ def _warnings(findings: Findings) -> list[str]:
     for _, data, fitted in fits:
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
     notes += other_machine(bench.training, fits[0][2], bench.options)
+    notes += other_units(bench.training, findings.base.model)
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(bench.training, findings.base)
+    best = findings.decision.accepted
+    if best and best[0].leaves == LARGER_NOISE:
+        size = best[0].ceiling.fit.sample_chi2
+        notes.append(
+            f"reduced chi^2 is {size:.3g} with effect.{best[0].name}, and no force explains more: the noise "
+            f"is taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
+        )
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")

@@ -9,6 +9,7 @@ projected out. Its error comes from resampling blocks of segments; flags are cor
 """
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,13 +22,30 @@ from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.options import Options
 from separatrix.discovery.wording import Units, units_of
+from separatrix.library import effects
 
 IMPACT_SPEED = "impact speed"
+_LOW, _SINCE = "low speed", "time since the last impact"
 _IMPACT_BINS, _FEWEST_IMPACTS = 4, 3
 _LEVEL = 0.01
 _BLOCK = 2
 # share of what the best map explains from which on another tells as much
 _NEARLY = 0.9
+# the same for a map of the variable of a named effect
+_MOST = 0.75
+# maps over the variable that a family of effects depends on
+_SPEED, _PLACE, _PLANE, _PHASE = "velocity", "position", "position and velocity", "drive phase"
+_OF_FAMILY = {
+    "friction over speed": (_SPEED, _LOW),
+    "friction before sliding": (_LOW, _PLANE),
+    "friction over place": (_PLANE,),
+    "spring over stretch": (_PLACE,),
+    "force over place": (_PLACE,),
+    "restitution over impact speed": (IMPACT_SPEED,),
+    "contact over penetration": (IMPACT_SPEED, _SINCE),
+    "contact over place": (_PLACE,),
+    "drive over phase": (_PHASE,),
+}
 
 
 @dataclass
@@ -44,8 +62,8 @@ class Map:
     flagged: np.ndarray
 
 
-def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
-    """Missing forces in the bins of all maps."""
+def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[str] = ()) -> list[Map]:
+    """Missing forces in the bins of all maps; of maps that tell much alike, those of `named` effects."""
     problem, fit = fitted.problem, fitted.fit
     state = scaled_motion(problem, fit)
     evaluation = fit.evaluation
@@ -54,15 +72,15 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
     units = units_of(fitted.model.parameters)
     maps = [
         *_times(problem, inside),
-        _bins("position", units.position, x, inside, 10),
-        _bins("velocity", units.velocity, v, inside, 10),
-        _bins("low speed", units.velocity, np.where(np.abs(v) < 0.2 * state["speed"], v, np.nan), inside, 6),
+        _bins(_PLACE, units.position, x, inside, 10),
+        _bins(_SPEED, units.velocity, v, inside, 10),
+        _bins(_LOW, units.velocity, np.where(np.abs(v) < 0.2 * state["speed"], v, np.nan), inside, 6),
     ]
     if state["phase"] is not None:
-        maps.append(_bins("drive phase", "rad", np.mod(state["phase"], 2 * np.pi), inside, 12))
+        maps.append(_bins(_PHASE, "rad", np.mod(state["phase"], 2 * np.pi), inside, 12))
     since = after_impacts(problem, fit)
     if np.isfinite(since).any():
-        maps.append(_bins("time since the last impact", "s", since, inside, 6))
+        maps.append(_bins(_SINCE, "s", since, inside, 6))
     maps.append(_plane(x, v, inside, 5, units))
     maps = [one for one in maps if one is not None]
     tables = [member for _, _, _, _, member in maps]
@@ -74,7 +92,9 @@ def where_maps(fitted: Fitted, mass: float, options: Options) -> list[Map]:
         columns = np.concatenate([columns, kick_columns(problem, fit, impacts[4])], axis=2)
     force, error = _forces(fitted, columns, options)
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
-    flags &= _telling(fitted, columns, [member.shape[2] for member in tables])
+    own = {name for effect in named for name in _OF_FAMILY.get(effects()[effect].family, ())}
+    gains = _gains(fitted, columns, [member.shape[2] for member in tables])
+    flags &= np.repeat(_telling(maps, gains, own), [member.shape[2] for member in tables])
     found, first = [], 0
     for name, unit, edges, other, member in maps:
         part = slice(first, first + member.shape[2])
@@ -117,7 +137,7 @@ def _plane(x: np.ndarray, v: np.ndarray, inside: np.ndarray, count: int, units: 
     if one is None or other is None:
         return None
     member = (one[4][:, :, :, None] * other[4][:, :, None, :]).reshape(*x.shape, -1)
-    return "position and velocity", f"{units.position}, {units.velocity}", one[2], other[2], member
+    return _PLANE, f"{units.position}, {units.velocity}", one[2], other[2], member
 
 
 def _impacts(problem, fit, units: Units) -> tuple | None:
@@ -173,11 +193,8 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
     return np.where(live, force, 0.0), np.where(live, np.maximum(spread, formal), np.inf)
 
 
-def _telling(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
-    """Bins of the simplest of the maps whose bins together explain nearly as much as those of any other.
-
-    Where a motion repeats itself, the place, the speed and the phase of a missing force go together.
-    """
+def _gains(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
+    """What the bins of each map together explain of chi^2, beyond chance."""
     fit = fitted.fit
     evaluation, weights = fit.evaluation, fit.evaluation.used * fit.good[:, None]
     p = evaluation.by_parameter.shape[2]
@@ -191,12 +208,24 @@ def _telling(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarra
         part = slice(first, last)
         step = solve_scaled(left[part, part], score[part], np.ones(last - first, bool))
         gains.append(float(score[part] @ step) - (last - first))
-    if max(gains) <= 0:
+    return np.array(gains)
+
+
+def _telling(maps: list[tuple], gains: np.ndarray, own: set[str]) -> np.ndarray:
+    """Which maps are told: the simplest of those that explain nearly as much as any other.
+
+    Where a motion repeats itself, the place, the speed and the phase of a missing force go together: there
+    the maps of the variable that a named effect depends on, `own`, are told if they explain most of it too.
+    """
+    if gains.max() <= 0:
         # nothing is missing, or noise is said to be more than there is
-        return np.zeros(sum(sizes), bool)
-    near = np.array(gains) >= _NEARLY * max(gains)
-    simplest = min(size for size, one in zip(sizes, near, strict=True) if one)
-    return np.repeat(near & (np.array(sizes) == simplest), sizes)
+        return np.zeros(gains.size, bool)
+    near = gains >= _NEARLY * gains.max()
+    mine = np.array([one[0] in own for one in maps]) & (gains >= _MOST * gains.max())
+    if mine.any():
+        near = mine
+    bins = np.array([one[4].shape[2] for one in maps])
+    return near & (bins == bins[near].min())
 
 
 def benjamini_hochberg(p: np.ndarray, level: float) -> np.ndarray:

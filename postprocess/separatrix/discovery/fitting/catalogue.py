@@ -43,6 +43,11 @@ def _asymmetry(scales: Scales) -> dict[str, list[float]]:
     return dry | {"viscous": [0.02 * scales.force / scales.speed]}
 
 
+ON_REQUEST = {
+    "cubic_damping": "it is tried where it is asked for: few records tell it from viscous and quadratic_drag",
+}
+"""Effects that are not tried by themselves, and why."""
+
 STARTS: dict[str, Starts] = {
     "viscous": lambda s: {"damping": [0.02 * s.force / s.speed]},
     "coulomb": lambda s: {"force": [0.02 * s.force]},

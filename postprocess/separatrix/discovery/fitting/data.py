@@ -16,6 +16,7 @@ from separatrix.discovery.measured.condense import condense, stride
 from separatrix.discovery.measured.driven import driven
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
+from separatrix.discovery.measured.signals import jumps, white_noise
 from separatrix.discovery.measured.smoother import Smoothed, smooth
 from separatrix.errors import SeparatrixError
 
@@ -28,6 +29,10 @@ _FEW = 0.25
 _MOST_SWINGS = 1.5
 # squares by which a fit is far behind another, whatever its suspicious segments may gain
 _SQUARES_BEHIND = 60.0
+# standard errors within which an impact happens when the smoother says
+_TIMES = 3.0
+# of the mean time between impacts, how far beside one nothing is compared at most
+_BESIDE = 0.03
 # standard errors of the speed within which a body may be at rest
 _SLOW = 3.0
 
@@ -119,7 +124,9 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
     period = min(one.period_samples or np.inf, _natural_samples(one), swing)
     every = stride(period, record.t.size)
     if every == 1:
-        return smooth(record.t, record.x, one.sigma, one.period_samples)
+        seen = smooth(record.t, record.x, one.sigma, one.period_samples)
+        one.samples.blind = _blind(one, seen)
+        return seen
     at = np.concatenate([np.arange(first, last, every) for first, last in record.pieces])
     seen = smooth(record.t[at], record.x[at], one.sigma, period / every)
     one.samples = condense(record, period, one.sigma, _events(record.t.size, at, seen))
@@ -127,7 +134,32 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
         f"{record.t.size} samples, {period:.0f} per period of the motion: stretches in which it is "
         f"smooth are condensed to {one.samples.t.size} values that say as much"
     )
+    one.samples.blind = _blind(one, seen)
     return seen
+
+
+def _blind(one: Prepared, seen: Smoothed) -> np.ndarray | None:
+    """Rows whose velocity is left out, because an impact lies nearer than its time is known.
+
+    A sample on the wrong side of a jump misses by hundreds of its noise, and no derivative tells which way
+    the impact would have to move. The time of an impact is known as well as place over speed.
+    """
+    samples, v = one.samples, one.samples.v
+    if v is None:
+        return None
+    blind = np.zeros(v.size, bool)
+    single = samples.size == 1
+    rows = jumps(v, max(one.velocity_sigma, white_noise(one.record.v)))
+    longest = _BESIDE * (samples.t[-1] - samples.t[0]) / max(1, rows.size)
+    for row in rows:
+        if not (single[row] and single[row + 1]):
+            continue
+        near = seen.nearest(samples.t[row : row + 1])[0]
+        late = _TIMES * np.sqrt(seen.covariance[near, 0, 0]) / np.max(np.abs(v[row : row + 2]))
+        late = min(late, longest)
+        first, last = np.searchsorted(samples.t, [samples.t[row + 1] - late, samples.t[row] + late])
+        blind[min(first, row) : max(last, row + 2)] = True
+    return blind & single
 
 
 def _known_motion(one: Prepared, swing: float) -> Smoothed:

@@ -10,6 +10,7 @@ the whole path: its state follows from Dahl's equation, which has a closed form 
 import numpy as np
 
 from separatrix.discovery.measured.driven import Driven
+from separatrix.discovery.measured.preflight import even_interval
 from separatrix.errors import SeparatrixError
 
 # time of a flight [s], and the share of the time in which the usual force would stop the body
@@ -97,3 +98,15 @@ def _value(model, values: dict[str, float], path: str) -> float:
     if path in values:
         return values[path]
     return float(model.parameters[path].value) if path in model.parameters else 0.0
+
+
+def force_argument(record, first: np.ndarray):
+    """Force of a record for segments that begin at the places `first`, in samples.
+
+    Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
+    there are leaves room for the last times, which need not be quite even.
+    """
+    if record.force is None:
+        return None
+    interval = even_interval(record)
+    return first * interval, interval, np.append(record.force, record.force[-1])

@@ -125,6 +125,8 @@ def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left
     basis, singular, _ = np.linalg.svd(columns / np.where(size > 0, size, 1), full_matrices=False)
     basis = basis * (singular > 1e-6 * singular[:, :1])[:, None, :]
     cleaned = residual * segments.inside[rows]
+    # as if the samples left out had the noise of the others
+    cleaned *= np.sqrt(counts[rows] / np.maximum(1, fit.evaluation.used[rows, part].sum(axis=1)))[:, None]
     cleaned = cleaned - np.einsum("klq,kq->kl", basis, np.einsum("klq,kl->kq", basis, cleaned))
     freedom = counts[rows] - np.sum(basis**2, axis=(1, 2))
     return _without_outliers(segments.record[rows], cleaned, freedom, basis, counts[rows])

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The short-segment likelihood: residuals of all segments and their derivatives, from the simulator."""
 
+from functools import cached_property
+
 import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
-from separatrix.discovery.fitting.forces import force_needed
+from separatrix.discovery.fitting.forces import force_argument, force_needed
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
-from separatrix.discovery.measured.preflight import Prepared, even_interval
-from separatrix.discovery.measured.segments import Segments, padded
+from separatrix.discovery.measured.preflight import Prepared
+from separatrix.discovery.measured.segments import Segments, padded, seeing
 from separatrix.errors import SeparatrixError
 
 # of the adaptive flight, relative to the place counted from the origin: a third quicker than 1e-9; the share
@@ -70,6 +72,13 @@ class Problem:
                 table[rows] = total[last] - total[first]
         return squares, freedom
 
+    @cached_property
+    def compared(self) -> np.ndarray:
+        """Samples of x and, in further columns, of v that are compared (segments, channels*length)."""
+        samples = [one.samples for one in self.prepared]
+        inside = self.segments.inside
+        return inside if self.channels == 1 else np.hstack([inside, seeing(self.segments, samples)])
+
     @property
     def channels(self) -> int:
         """How many of x and v are compared."""
@@ -113,7 +122,7 @@ class Problem:
             "x": fitted.x[samples],
             "v": None if fitted.v is None else fitted.v[samples],
             "samples": samples,
-            "force": None if self.in_force else _force_argument(record, fitted.place[first]),
+            "force": None if self.in_force else force_argument(record, fitted.place[first]),
             "tolerance": flight_tolerance(self.prepared[number]),
         }
 
@@ -182,14 +191,15 @@ class Problem:
             linked = prepared.samples.linked[self.segments.index[rows]][:, 1:]
             if self.in_force:
                 linked &= prepared.driven.moves[self.segments.index[rows]][:, :-1]
-            linked = linked.reshape(linked.shape + (1,) * (table.ndim - 2))
             for first in range(0, self.channels * length, length):
+                known = self.compared[rows, first : first + length]
+                both = linked & known[:, 1:] & known[:, :-1]
+                both = both.reshape(both.shape + (1,) * (table.ndim - 2))
                 part = table[rows, first : first + length]
                 freed = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
-                part[:, 1:] = np.where(linked, freed, part[:, 1:])
+                part[:, 1:] = np.where(both, freed, part[:, 1:])
                 table[rows, first : first + length] = part
-        used = np.tile(self.segments.inside, (1, self.channels))
-        table[:, : used.shape[1]][~used] = 0
+        table[:, : self.compared.shape[1]][~self.compared] = 0
         return table
 
     def _evaluate_record(
@@ -237,7 +247,7 @@ class Problem:
             columns = slice(channel * length, (channel + 1) * length)
             sigma = size * spread
             out.residual[rows, columns] = np.nan_to_num(_padded((measured - computed) / sigma, inside))
-            out.used[rows, columns] = inside
+            out.used[rows, columns] = self.compared[rows, columns]
             if derivatives:
                 by_start, by_parameter = jacobians[channel]
                 out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma[:, None], inside))
@@ -386,15 +396,3 @@ def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
     table = np.zeros(inside.shape + flat.shape[1:])
     table[inside] = flat
     return table
-
-
-def _force_argument(record, first: np.ndarray):
-    """Force of a record for segments that begin at the places `first`, in samples.
-
-    Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
-    there are leaves room for the last times, which need not be quite even.
-    """
-    if record.force is None:
-        return None
-    interval = even_interval(record)
-    return first * interval, interval, np.append(record.force, record.force[-1])

@@ -61,6 +61,8 @@ class Samples:
     left: np.ndarray
     left_v: np.ndarray
     products: np.ndarray
+    # rows whose velocity says nothing: an impact lies so near that the sensor may be on either side of it
+    blind: np.ndarray | None = None
     _spreads: dict[float, np.ndarray] = field(default_factory=dict, repr=False)
 
     @cached_property

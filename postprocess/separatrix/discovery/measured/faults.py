@@ -28,6 +28,8 @@ _CLIPPED_SHARE = 0.02
 # step to and from a clipped value, over the grid and over the usual step: a turning point and a place of
 # rest are reached level by level, or ever more slowly
 _ABRUPT = (1.5, 0.05)
+# noise over the grid of a force from which on it is never the same number by chance
+_STEPS_OF_NOISE, _FEWEST_INSIDE = 0.5, 20
 
 
 def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
@@ -115,18 +117,33 @@ def check_clipping(x: np.ndarray, unit: str, where: Where, warnings: list[str]) 
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself at turning points."""
     steps = np.abs(np.diff(x))
     least = max(_ABRUPT[0] * resolution_of(x), _ABRUPT[1] * float(np.median(steps[steps > 0])))
-    for name, extreme in (("largest", x.max()), ("smallest", x.min())):
+    _check_limits("x", x, unit, where, warnings, lambda first, last: _is_abrupt(x, first, last, least))
+
+
+def check_clipped_force(force: np.ndarray, unit: str, where: Where, warnings: list[str]) -> None:
+    """The same of a force, which may jump to a constant value: but not without its noise."""
+    inside = force[(force > force.min()) & (force < force.max())]
+    if inside.size > _FEWEST_INSIDE and white_noise(inside) > max(
+        _STEPS_OF_NOISE * resolution_of(force), QUIET * float(np.std(force))
+    ):
+        _check_limits("force", force, unit, where, warnings, lambda first, last: True)
+
+
+def _check_limits(
+    name: str, x: np.ndarray, unit: str, where: Where, warnings: list[str], holds: Callable[[int, int], bool]
+) -> None:
+    """Refuse a signal that stays at one of its limits for long, in runs that are no motion's."""
+    for end, extreme in (("largest", x.max()), ("smallest", x.min())):
         long = [
             (first, last)
             for first, last in runs(x == extreme)
-            if last - first >= _CLIPPED_RUN and _is_abrupt(x, first, last, least)
+            if last - first >= _CLIPPED_RUN and holds(first, last)
         ]
         if not long:
             continue
         share = sum(last - first for first, last in long) / x.size
-        message = (
-            f"{where(long[0][0])}: x stays at its {name} value {extreme:.6g} {unit} for {len(long)} stretches"
-        )
+        stays = f"{name} stays at its {end} value {extreme:.6g} {unit}"
+        message = f"{where(long[0][0])}: {stays} for {len(long)} stretches"
         if len(long) >= 2 and share > _CLIPPED_SHARE:
             raise SeparatrixError(f"{message}, {100 * share:.0f} % of the samples: clipped")
         warnings.append(f"{message}: clipped?")

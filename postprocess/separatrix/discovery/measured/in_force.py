@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from separatrix.discovery.measured.faults import check_clipped_force
 from separatrix.discovery.measured.preflight import Prepared, check_velocity, velocity_noise
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
@@ -30,10 +31,12 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
     notes = list(record.warnings)
     if record.v is not None:
         check_velocity(record, notes)
+    unit = units_of(model.parameters).force
+    force, t = record.force, record.t
+    check_clipped_force(force, unit, lambda row: f"{record.file}, at {t[row]:.6g} s", notes)
     record = _thinned(record, notes)
     if np.ptp(record.force) == 0:
         raise SeparatrixError(f"{record.file}: 'force' is constant")
-    unit = units_of(model.parameters).force
     stated = record.header.get("force_noise_sigma_n") if rest is None else _at_rest(rest)
     resolution = resolution_of(record.force)
     least = max(_EXACT * float(np.std(record.force)), resolution / np.sqrt(12))

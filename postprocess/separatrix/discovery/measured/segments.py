@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records cut into short segments, each with a start of its own.
 
-A segment starts where the motion is smooth: away from impacts, from turning points (where friction switches
-and may hold the body) and from gaps. Segments of a record follow one another without a hole.
+A segment starts where the motion is smooth: away from impacts (also those that only a velocity shows), from
+turning points (where friction switches and may hold the body) and from gaps. Segments of a record follow one
+another without a hole.
 """
 
 from dataclasses import dataclass
@@ -40,6 +41,9 @@ def cut(records: list[Samples], smoothed: list[Smoothed], lengths: list[int]) ->
     rows: list[tuple[int, int, int]] = []
     for number, (record, smooth, length) in enumerate(zip(records, smoothed, lengths, strict=True)):
         smoothness = _calm(smooth)[smooth.nearest(record.t)]
+        if record.blind is not None:
+            # an impact that only the velocity shows, as one at the beginning of the record
+            smoothness[record.blind] = 0
         for first, last in record.pieces:
             if last - first >= max(_FEWEST, min(length, FEWEST_IN_PIECE)):
                 piece = slice(first, last)
@@ -56,6 +60,16 @@ def padded(record: np.ndarray, first: np.ndarray, last: np.ndarray) -> Segments:
     inside = steps[None, :] < (last - first)[:, None]
     index = np.where(inside, first[:, None] + steps, first[:, None])
     return Segments(record, first, last, index, inside)
+
+
+def seeing(segments: Segments, records: list[Samples]) -> np.ndarray:
+    """Samples of the segments (segments, length) whose velocity says something, if it was measured."""
+    found = segments.inside.copy()
+    for number, samples in enumerate(records):
+        if samples.blind is not None:
+            rows = segments.record == number
+            found[rows] &= ~samples.blind[segments.index[rows]]
+    return found
 
 
 def _calm(smooth: Smoothed) -> np.ndarray:

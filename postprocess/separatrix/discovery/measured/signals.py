@@ -3,6 +3,7 @@
 """Noise and resolution of a sampled signal, from its values alone."""
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 # noise that is taken where none is found, over the scatter of the signal
 QUIET = 1e-6
@@ -10,6 +11,10 @@ QUIET = 1e-6
 _FOURTH = 70.0
 # deviation of a multiple of the step of a grid from a whole number
 _OFF_GRID = 0.05
+# noise that a jump exceeds, and how often what the steps beside it have beyond the noise
+_JUMP, _SUDDEN = 4.0, 3.0
+# steps whose median is that of the smooth motion
+_BESIDE = 7
 # a grid much finer than the noise is that of the digits in the file
 _FINE = 0.3
 
@@ -36,6 +41,17 @@ def resolution_of(x: np.ndarray) -> float:
     if levels.size <= 0.5 * x.size:
         return step if np.all(off < _OFF_GRID * np.maximum(1, multiple)) else 0.0
     return step if np.all(off < _OFF_GRID) and step > _FINE * white_noise(x) else 0.0
+
+
+def jumps(v: np.ndarray, noise: float) -> np.ndarray:
+    """Samples after which a velocity jumps: its step is beyond the noise, and beyond those beside it."""
+    steps = np.diff(v)
+    steps = np.abs(steps - median_filter(steps, _BESIDE))
+    chance = _JUMP * np.sqrt(2) * noise
+    beside = np.zeros(steps.size)
+    beside[1:] = steps[:-1]
+    beside[:-1] = np.maximum(beside[:-1], steps[1:])
+    return np.flatnonzero((steps > chance) & (steps > _SUDDEN * np.maximum(0, beside - chance)))
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:
