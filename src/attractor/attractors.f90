@@ -32,7 +32,7 @@ module attractors
   !> Numbers of a metric: the upper triangle of its matrix, column by column.
   integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
 
-  integer, parameter :: packed_scalars = 26 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
+  integer, parameter :: packed_scalars = 27 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
   !> Share of its size by which a box of section points is widened on each side.
   real(wp), parameter :: box_margin = 0.05_wp
   !> Fewest numbers of a packed attractor.
@@ -68,9 +68,9 @@ module attractors
     integer :: coordinates = 2
     !> The first coordinate repeats after this [rad]; 0 = never.
     real(wp) :: turn = 0
-    !> A motion of two bodies between their stops, which it does not touch: it may be anywhere. The coordinates are those
-    !> after the first.
+    !> A motion between stops, which it does not touch: it may be anywhere. The coordinates are those after the first `places`.
     logical :: any_place = .false.
+    integer :: places = 0
     !> A cycle of a machine without a clock: its section is where the watched coordinate turns round, see `turn_section`.
     logical :: by_event = .false.
     !> Time that one cycle takes [s]; 0 of what is none.
@@ -202,7 +202,7 @@ contains
       if (catalogue(k)%rests .and. regime == regime_stuck) found = k
       if (catalogue(k)%any_place) then
         do i = 1, catalogue(k)%period
-          if (squared_distance(catalogue(k), i, point(2:)) <= catalogue(k)%capture_radius**2) found = k
+          if (squared_distance(catalogue(k), i, point(catalogue(k)%places + 1:)) <= catalogue(k)%capture_radius**2) found = k
         end do
       end if
       if (found == 0 .and. in_box(catalogue(k), point)) found = k
@@ -261,8 +261,8 @@ contains
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
         f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
         merge(1.0_wp, 0.0_wp, attractor%any_place), real(attractor%kind, wp), attractor%turn, &
-        f%rotation, merge(1.0_wp, 0.0_wp, attractor%by_event), attractor%duration, attractor%scale, &
-        real(attractor%multipliers), aimag(attractor%multipliers)]
+        f%rotation, merge(1.0_wp, 0.0_wp, attractor%by_event), attractor%duration, real(attractor%places, wp), &
+        attractor%scale, real(attractor%multipliers), aimag(attractor%multipliers)]
     end associate
     if (allocated(attractor%points)) packed(packed_scalars + 1:) = &
       [reshape(attractor%points, [size(attractor%points)]), reshape(attractor%metric, [size(attractor%metric)])]
@@ -287,9 +287,10 @@ contains
     attractor%turn = packed(23)
     attractor%by_event = packed(25) > 0
     attractor%duration = packed(26)
-    attractor%scale = packed(27:26 + most_coordinates)
-    attractor%multipliers = cmplx(packed(27 + most_coordinates:26 + 2*most_coordinates), &
-                                  packed(27 + 2*most_coordinates:packed_scalars), wp)
+    attractor%places = nint(packed(27))
+    attractor%scale = packed(28:27 + most_coordinates)
+    attractor%multipliers = cmplx(packed(28 + most_coordinates:27 + 2*most_coordinates), &
+                                  packed(28 + 2*most_coordinates:packed_scalars), wp)
     count = (size(packed) - packed_scalars)/packed_per_point
     if (count == 0) return
     call make_points(attractor, count)

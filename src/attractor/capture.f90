@@ -8,7 +8,7 @@ module capture
   use machine_facts, only: rest_lasts
   use motion, only: motion_t
   use motion_state, only: tally_t
-  use strobe, only: advance_to_section, copy_of, section_point, strobe_t, turn_point
+  use strobe, only: advance_to_section, copy_of, section_point, speed_number, stays_clear, strobe_t, turn_point
   implicit none
   private
 
@@ -37,8 +37,8 @@ contains
 
   !> Whether a motion on the section, with what was counted since the last impact, has settled at one of a family of cycles, each
   !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left
-  !> of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it last
-  !> missed a stop.
+  !> of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it
+  !> misses the stops.
   pure logical function stays_in_family(moving, catalogue, strobe, tally)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -50,15 +50,15 @@ contains
     if (tally%impacts > 0 .or. .not. any(catalogue%any_place)) return
     point = section_point(moving, strobe)
     do k = 1, size(catalogue)
-      associate (attractor => catalogue(k))
+      associate (attractor => catalogue(k), after => catalogue(k)%places + 1)
         if (.not. attractor%any_place .or. attractor%multiplier >= 1) cycle
         n = attractor%coordinates
         do i = 1, attractor%period
-          if (squared_distance(attractor, i, point(2:)) > attractor%capture_radius**2) cycle
-          ! The first coordinate is a velocity.
-          drift = attractor%scale(1)*attractor%period*moving%machine%period/(1 - attractor%multiplier) &
-                  *sum(abs(point(2:n + 1) - attractor%points(:n, i))/attractor%scale(:n))
-          stays_in_family = drift < tally%grazing_margin/2
+          if (squared_distance(attractor, i, point(after:)) > attractor%capture_radius**2) cycle
+          drift = attractor%scale(speed_number(moving) - attractor%places) &
+                  *attractor%period*moving%machine%period/(1 - attractor%multiplier) &
+                  *sum(abs(point(after:after + n - 1) - attractor%points(:n, i))/attractor%scale(:n))
+          stays_in_family = stays_clear(moving, strobe, tally, attractor%period, 2*drift)
           if (stays_in_family) return
         end do
       end associate

@@ -20,7 +20,7 @@ module discover
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
   use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
-    start_strobe, strobe_t, turn_of, without_stops
+    start_strobe, strobe_at, strobe_t, turn_of, without_stops
   use trajectory, only: span_t
   use turn_section, only: has_no_clock
   implicit none
@@ -220,7 +220,7 @@ contains
   pure logical function holds(catalogue, found)
     type(attractor_t), intent(in) :: catalogue(:), found
     if (found%any_place) then
-      holds = find_box(catalogue, [0.0_wp, found%points(:, 1)], found%features%regime) > 0
+      holds = find_box(catalogue, [spread(0.0_wp, 1, found%places), found%points(:, 1)], found%features%regime) > 0
     else
       holds = find_capture(catalogue, found%points(:, 1), .not. found%rests, found%by_event) > 0
     end if
@@ -266,7 +266,7 @@ contains
     type(tally_t) :: tally
     real(wp) :: points(most_coordinates, 0:2*longest_period)
     type(motion_t) :: free
-    integer :: i, p, reason, n, first
+    integer :: i, p, reason, n, first, places
     later = strobe
     call begin_tally(moving, later, tally)
     points(:, 0) = section_point(moving, later)
@@ -291,26 +291,44 @@ contains
       found%section = section_state(moving, points(:, 0))
       return
     end if
-    first = 1
-    call without_stops(moving, free, ok)
-    ok = ok .and. tally%impacts == 0
-    if (ok) first = 2
+    places = 0
+    if (tally%impacts == 0) call without_stops(moving, free, places)
+    first = places + 1
     associate (sizes => scales_of(moving, (tally%x_max - tally%x_min)/2))
       do p = 1, max_period
         if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), turn_of(moving))) cycle
-        if (first == 1) then
+        if (places == 0) then
           call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
           if (ok) found%section = section_state(moving, found%points(:, 1))
         else
           call refine_cycle(free, points(first:n, 2*max_period), p, found, ok)
           found%any_place = .true.
-          if (ok) found%section = section_state(moving, [points(1, 2*max_period), found%points(:, 1)])
+          found%places = places
+          if (ok) ok = comes_back(moving, free, found)
+          if (ok) found%section = section_state(moving, [points(:places, 2*max_period), found%points(:, 1)])
         end if
         if (ok) return
       end do
     end associate
     ok = .false.
   end subroutine recognise
+
+  !> Whether a cycle of the machine without stops ends at the place where it began: else it drifts towards a stop.
+  pure logical function comes_back(moving, free, cycle)
+    type(motion_t), intent(in) :: moving, free
+    type(attractor_t), intent(in) :: cycle
+    type(strobe_t) :: strobe
+    type(tally_t) :: unused
+    real(wp) :: before(most_coordinates), after(most_coordinates)
+    integer :: i, reason
+    strobe = strobe_at(free, cycle%points(:cycle%coordinates, 1))
+    before = section_point(moving, strobe)
+    do i = 1, cycle%period
+      call advance_strobe_period(free, strobe, unused, reason)
+    end do
+    after = section_point(moving, strobe)
+    comes_back = all(abs(after(:cycle%places) - before(:cycle%places)) <= 1e-9_wp*maxval(cycle%scale(:cycle%coordinates)))
+  end function comes_back
 
   !> Whether every one of a run of section points comes back after `p` periods.
   pure logical function returns(points, p, size_of_motion, turn)

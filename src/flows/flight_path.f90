@@ -58,12 +58,13 @@ contains
   end subroutine begin_path
 
   !> How far apart two motions of one mode are: nothing drives their difference, which starts as `q`, `v`, under the constant
-  !> `force` on the coordinates.
-  pure subroutine begin_change(machine, flow, q, v, force, path)
+  !> `force` on the coordinates; in modes with a closed form the `surface`s of constraints may run at constant speeds [m/s].
+  pure subroutine begin_change(machine, flow, q, v, force, path, surface)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     real(wp), intent(in) :: q(:), v(:), force(:)
     type(path_t), intent(out) :: path
+    real(wp), intent(in), optional :: surface(:)
     type(jointed_state_t) :: change
     real(wp) :: still(size(machine%joints))
     change%q(:machine%n) = q
@@ -71,6 +72,7 @@ contains
     allocate (path%turning(harmonics_of(machine)), source=(0.0_wp, 0.0_wp))
     path%force(:machine%n) = force
     still = 0
+    if (present(surface)) still = surface
     if (flow%modal) then
       call begin_modal(machine, flow, change, still, path)
     else

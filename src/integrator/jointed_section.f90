@@ -4,11 +4,12 @@
 !> A jointed structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
 !> the springs of elastic friction.
 module jointed_section
-  use jointed, only: joint_contact, joint_elastic
+  use jointed, only: joint_contact, joint_elastic, joint_soft
   use jointed_flows, only: without_contacts
-  use jointed_motion, only: jointed_motion_t, prepare_jointed, start_jointed
+  use jointed_motion, only: advance_jointed_period, jointed_motion_t, prepare_jointed, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
+  use motion_state, only: tally_t
   use section_size, only: most_coordinates
   use timed_actions, only: acts_on_time
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -16,7 +17,7 @@ module jointed_section
   private
 
   public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed, &
-    watched_speed, free_jointed
+    watched_speed, free_jointed, keeps_clear
 
 contains
 
@@ -38,16 +39,55 @@ contains
     fits_section = coordinates_of_jointed(moving) <= most_coordinates .and. .not. acts_on_time(moving%machine)
   end function fits_section
 
-  !> The same machine without stops, if that takes away just the first coordinate, the one position; else nothing.
-  pure subroutine free_jointed(moving, free, found)
+  !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
+  pure subroutine free_jointed(moving, free, places)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_motion_t), intent(out) :: free
-    logical, intent(out) :: found
-    found = moving%drifts
-    if (.not. found) return
+    integer, intent(out) :: places
+    places = 0
+    if (.not. moving%machine%driven .or. .not. any(is_stop(moving%machine%joints%kind))) return
     call prepare_jointed(without_contacts(moving%machine), moving%options, free)
-    found = size(free%speeds, 2) == size(moving%speeds, 2)
+    if (size(free%speeds, 2) == size(moving%speeds, 2)) places = size(moving%directions, 2) - size(free%directions, 2)
   end subroutine free_jointed
+
+  pure elemental logical function is_stop(kind)
+    integer, intent(in) :: kind
+    is_stop = kind == joint_contact .or. kind == joint_soft
+  end function is_stop
+
+  !> Whether a structure on the section comes no nearer to a stop in the next `periods` than displacements of all places by
+  !> `distance` [m] would close.
+  pure logical function keeps_clear(moving, state, periods, distance)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: periods
+    real(wp), intent(in) :: distance
+    type(jointed_motion_t) :: narrower
+    type(jointed_state_t) :: later
+    type(tally_t) :: tally
+    complex(wp) :: turning(moving%harmonics)
+    real(wp) :: s, u, nearer
+    integer :: j, i, reason
+    keeps_clear = .false.
+    narrower = moving
+    turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
+    do j = 1, size(moving%machine%joints)
+      associate (joint => narrower%machine%joints(j))
+        if (.not. is_stop(joint%kind)) cycle
+        nearer = distance*sum(abs(joint%row))
+        if (joint%upper < huge(1.0_wp)) joint%upper = joint%upper - nearer
+        if (joint%lower > -huge(1.0_wp)) joint%lower = joint%lower + nearer
+        call joint_motion(moving%machine, j, state%q, state%v, state%time, turning, s, u)
+        if (state%phase(j) /= 0 .or. .not. (s < joint%upper .and. s > joint%lower)) return
+      end associate
+    end do
+    later = state
+    do i = 1, periods
+      call advance_jointed_period(narrower, later, tally, reason)
+      if (reason /= 0 .or. tally%impacts > 0) return
+    end do
+    keeps_clear = .true.
+  end function keeps_clear
 
   !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
   !> drive at `angle` [rad].

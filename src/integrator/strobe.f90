@@ -11,8 +11,8 @@ module strobe
   use energy, only: energy_of_body, record_with_book
   use jointed_log, only: energy_of_jointed, log_sample, watched_state
   use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
-  use jointed_section, only: coordinates_of_jointed, fits_section, free_jointed, jointed_at, jointed_point, scales_of_jointed, &
-    start_of_jointed
+  use jointed_section, only: coordinates_of_jointed, fits_section, free_jointed, jointed_at, jointed_point, keeps_clear, &
+    scales_of_jointed, start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use motion, only: advance, advance_period, motion_t
@@ -31,8 +31,8 @@ module strobe
   private
 
   public :: strobe_t, coordinates_of, has_section, section_obstacle, start_strobe, start_is_allowed, resume_strobe, strobe_at, &
-    section_point, section_state, scales_of, without_stops, advance_strobe, advance_strobe_period, advance_past_event, &
-    begin_tally, driver_now, energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
+    section_point, section_state, scales_of, without_stops, stays_clear, speed_number, advance_strobe, advance_strobe_period, &
+    advance_past_event, begin_tally, driver_now, energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
 
   !> `state` is that of the body, of the driven one of two, or of the watched one of several.
   type :: strobe_t
@@ -45,18 +45,42 @@ module strobe
 
 contains
 
-  !> The same machine without stops, if that takes away just the first coordinate, the place; else nothing.
-  pure subroutine without_stops(moving, free, found)
+  !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
+  pure subroutine without_stops(moving, free, places)
     type(motion_t), intent(in) :: moving
     type(motion_t), intent(out) :: free
-    logical, intent(out) :: found
-    found = .false.
+    integer, intent(out) :: places
+    logical :: found
+    places = 0
     free = moving
-    if (allocated(moving%jointed)) call free_jointed(moving%jointed, free%jointed, found)
+    if (allocated(moving%jointed)) call free_jointed(moving%jointed, free%jointed, places)
     if (.not. allocated(moving%pair)) return
     free%machine%contact = contact_t()
     call free_pair(moving%pair, free%pair, found)
+    if (found) places = 1
   end subroutine without_stops
+
+  !> Number of a coordinate that is a velocity, of machines of several bodies.
+  pure integer function speed_number(moving)
+    type(motion_t), intent(in) :: moving
+    speed_number = 2
+    if (allocated(moving%jointed)) speed_number = size(moving%jointed%directions, 2) + 1
+  end function speed_number
+
+  !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of two bodies, which note
+  !> by how much they miss their stops, the tally knows.
+  pure logical function stays_clear(moving, strobe, tally, periods, distance)
+    type(motion_t), intent(in) :: moving
+    class(strobe_t), intent(in) :: strobe
+    type(tally_t), intent(in) :: tally
+    integer, intent(in) :: periods
+    real(wp), intent(in) :: distance
+    if (allocated(moving%jointed)) then
+      stays_clear = keeps_clear(moving%jointed, strobe%jointed, periods, distance)
+    else
+      stays_clear = distance < tally%grazing_margin
+    end if
+  end function stays_clear
 
   !> Number of coordinates on the section.
   pure integer function coordinates_of(moving) result(n)

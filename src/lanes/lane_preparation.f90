@@ -9,8 +9,9 @@ module lane_preparation
   use elementary, only: exponential, logarithm
   use exact_flow, only: largest_damping_ratio
   use kinds, only: wp
+  use lane_curve, only: restitution_curve_of
   use lane_types, only: contact_series_t, factor_over_place, lane_flow_t, law_t, layer_nodes, machine_t, mode_t, most_harmonics, &
-    over_place, over_speed, over_speed_downwards, over_stretch, restitution_curve_t, table_t
+    over_place, over_speed, over_speed_downwards, over_stretch, table_t
   use layer_transit, only: gauss
   use motion, only: motion_t
   use motion_state, only: flight_adaptive
@@ -72,9 +73,7 @@ contains
       m%restitution = law%contact%restitution
       m%restitution_law = law%contact%kind
       m%coefficients = law%contact%coefficients
-      associate (curve => law%contact%change)
-        m%curve = restitution_curve_t(real(curve%count, wp), curve%at, curve%value, curve%slope)
-      end associate
+      m%curve = restitution_curve_of(law%contact%change)
       m%slow = chatter_speed(law)
       m%domain = moving%options%domain
       m%harmonics = size(law%drive%cosine)

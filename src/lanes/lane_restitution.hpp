@@ -32,8 +32,9 @@ LANE_DEVICE inline vec curve_at(const lane_curve &c, vec x) {
   return value;
 }
 
-// Restitution at an impact speed w; as `restitution_at` of `contact_law.f90`.
-LANE_DEVICE inline vec restitution_at(const lane_machine &m, vec w) {
+// Restitution of a machine of one body, or of a joint, at an impact speed w; as `restitution_at` of
+// `contact_law.f90`.
+template <class contact> LANE_DEVICE inline vec restitution_at(const contact &m, vec w) {
   vec k = m.restitution;
   if (m.restitution_law == linear_restitution) {
     k = m.restitution - m.coefficients[0] * w;

@@ -6,13 +6,13 @@
 module lane_types
   use curve_law, only: most_knots
   use kinds, only: wp
+  use lane_curve, only: restitution_curve_t
   use structure_types, only: structure_machine_t
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_size_t, c_sizeof
   implicit none
   private
 
-  public :: widest_lanes, lane_sizes, separatrix_fly_lanes, law_t, machine_t, mode_t, contact_series_t, restitution_curve_t, &
-    region_t, regions_t, table_t
+  public :: widest_lanes, lane_sizes, separatrix_fly_lanes, law_t, machine_t, mode_t, contact_series_t, region_t, regions_t, table_t
 
   integer, parameter, public :: lane_count = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64
 
@@ -64,11 +64,6 @@ module lane_types
     real(c_double) :: stiffness = 0, damping = 0, twice_exponent = 0, linear = 0, by_impact = 0, foot_terms = 0, foot_time = 0, &
       log_stiffness = 0, log_foot_time = 0
   end type contact_series_t
-
-  !> Mirrors `lane_curve` of lane_types.hpp.
-  type, bind(c) :: restitution_curve_t
-    real(c_double) :: count = 0, at(most_knots) = 0, value(most_knots) = 0, slope(most_knots) = 0
-  end type restitution_curve_t
 
   !> Mirrors `lane_machine` of lane_types.hpp.
   type, bind(c) :: machine_t

@@ -6,6 +6,7 @@
 #ifndef SEPARATRIX_STRUCTURE_EVENTS_HPP
 #define SEPARATRIX_STRUCTURE_EVENTS_HPP
 
+#include "lane_restitution.hpp"
 #include "structure_search.hpp"
 
 namespace {
@@ -43,11 +44,20 @@ inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh
       put(g.s.held[j], in, held);
     }
     for (int i = 0; i < z.coordinates; i++) {
-      vec still = t.still[i];
-      for (int j = 0; j < z.joints; j++)
-        if (m.joint[j].slides > 0.5)
-          still += t.still_by_joint[j][i] * pull_of(g.s, j);
-      place[i] -= still;
+      vec still[most_powers] = {};
+      still_of(m, z, t, g.s, i, still);
+      place[i] -= still[0];
+      if (z.powers > 1)
+        speed[i] -= still[1];
+    }
+    for (int d = 0; d < z.drifts; d++) {
+      vec b = {}, c = {};
+      for (int i = 0; i < z.coordinates; i++) {
+        b += t.place_from_place[i][d] * place[i] + t.place_from_speed[i][d] * speed[i];
+        c += t.pace_from_speed[i][d] * speed[i];
+      }
+      put(g.s.place[d], in, b);
+      put(g.s.pace[d], in, c);
     }
     for (int k = 0; k < z.terms; k++) {
       vec re = {}, im = {};
@@ -119,12 +129,12 @@ inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rar
   put(g.s.rising, gave_way, j + 1);
 }
 
-// Newton's impact of contact j where `at` it was found.
+// Impact of contact j where `at` it was found.
 template <class size>
 inline void strike(const structure_machine &m, const size &z, int j, mask at, mask &rare,
                    structure_group &g) {
   const structure_joint &joint = m.joint[j];
-  vec change = -(1 + joint.restitution) * g.s.end_f1[j];
+  vec change = -(1 + restitution_at(joint, magnitude(g.s.end_f1[j]))) * g.s.end_f1[j];
   for (int i = 0; i < z.coordinates; i++)
     put(g.s.v[i], at, g.s.v[i] + change * joint.kick[i]);
   for (int i = 0; i < z.joints; i++) {
@@ -153,7 +163,9 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
   }
   for (int j = 0; j < z.joints; j++)
     phase[j] = g.s.phase[j];
+  const vec moves = moves_of(m, z, g.s);
   harmonics_at(m, z, g.s.start + g.s.span, b);
+  b.elapsed = g.s.span;
   place_at(m, z, due, g.s, g.s.end_re, g.s.end_im, b, g.s.q, g.s.v);
   put(g.s.time, due, g.s.start + g.s.span);
   put(g.s.left, due, 0);
@@ -191,7 +203,7 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
     put(g.s.left, rare, left);
     put(g.s.burst, rare, burst);
   }
-  put(g.c.flights, changed & ~rare, g.c.flights + 1.0);
+  put(g.c.flights, changed & ~rare, g.c.flights + moves);
   put(g.s.sticks, stuck & ~rare, g.s.sticks + 1.0);
   struck = struck & ~rare;
   put(g.c.impacts, struck, g.c.impacts + 1.0);
@@ -226,7 +238,7 @@ inline vec captors(const size &z, const structure_batch &batch, const vec (&q)[m
 }
 
 // Lanes `there`, where they are to stop: those that need not stop at the section pass; see `stop_or_pass` of
-// lane_stops.hpp.
+// lane_stops.hpp. What does not move may be at rest, which the caller has to be asked.
 template <class size>
 inline void take_stops(const structure_machine &m, const size &z, mask there, bool complete,
                        const structure_batch &batch, structure_group &g) {
@@ -238,13 +250,14 @@ inline void take_stops(const structure_machine &m, const size &z, mask there, bo
     im[k] = g.s.re[k] * b.im[k] + g.s.im[k] * b.re[k];
   }
   place_at(m, z, there, g.s, re, im, b, g.s.q, g.s.v);
-  mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5);
+  const vec moves = moves_of(m, z, g.s);
+  mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5) & (moves > 0.5);
   for (int i = 0; i < z.coordinates; i++)
     passing = passing & (magnitude(g.s.q[i]) <= m.domain);
   passing = complete ? passing : mask{};
   vec captor = any(passing) ? captors(z, batch, g.s.q, g.s.v) : vec{};
   passing = passing & ((captor < 0.5) | (g.c.leaves < 0.5));
-  put(g.c.flights, there, g.c.flights + 1.0);
+  put(g.c.flights, there, g.c.flights + moves);
   put(g.s.time, there, pick(section, vec{}, g.c.until));
   put(g.s.left, there, 0);
   put(g.s.burst, there, 0);

@@ -74,7 +74,7 @@ template <class size> void fly_all(const structure_machine &m, lane_batch &contr
 inline void fly_structures(const structure_machine &m, lane_batch &control, structure_batch &batch) {
   const any_size z(m);
 #if defined(__AVX__)
-  const bool plain = z.joints == 2 && z.waves == 1 && z.terms == z.coordinates;
+  const bool plain = z.joints == 2 && z.waves == 1 && z.terms == z.coordinates && z.powers == 1 && !z.idle;
   if (plain && z.terms == 2)
     fly_all<fixed_size<2, 2, 2, 1>>(m, control, batch);
   else if (plain && z.terms == 4)

@@ -37,16 +37,23 @@ struct structure_control {
 
 // How much there is of everything, so that loops have their ends.
 template <int n, int t, int j, int w> struct fixed_size {
-  enum { coordinates = n, terms = t, joints = j, waves = w };
+  enum { coordinates = n, terms = t, joints = j, waves = w, powers = 1, drifts = 0, idle = 0 };
   explicit fixed_size(const structure_machine &) {}
 };
 
 struct any_size {
-  int coordinates, terms, joints, waves;
+  int coordinates, terms, joints, waves, powers, drifts;
+  // Some mode is idle.
+  bool idle;
   explicit any_size(const structure_machine &m)
-      : coordinates(int(m.coordinates)), terms(0), joints(int(m.joints)), waves(int(m.waves)) {
-    for (const structure_mode &t : m.mode)
+      : coordinates(int(m.coordinates)), terms(0), joints(int(m.joints)), waves(int(m.waves)), powers(1),
+        drifts(0), idle(false) {
+    for (const structure_mode &t : m.mode) {
       terms = t.terms > terms ? int(t.terms) : terms;
+      powers = t.powers > powers ? int(t.powers) : powers;
+      drifts = t.drifts > drifts ? int(t.drifts) : drifts;
+      idle = idle || t.idle > 0.5;
+    }
   }
 };
 
@@ -60,8 +67,9 @@ struct far_outlook {
   vec f4[most_joints], f5[most_joints];
 };
 
-// Exponentials and harmonics at an instant.
+// Exponentials and harmonics at an instant, and the time since the start of the flight.
 struct structure_bases {
+  vec elapsed;
   vec re[most_terms], im[most_terms], cosine[most_waves], sine[most_waves];
 };
 
@@ -73,9 +81,11 @@ struct structure_group {
   vec part_re[most_joints][most_terms], part_im[most_joints][most_terms];
   vec swing_re[most_joints][most_waves], swing_im[most_joints][most_waves];
   // Limits of the functions, bound on their sixth derivatives, mass that a joint feels.
-  vec constant[most_joints], low[most_joints], high[most_joints], sixth[most_joints], felt_mass[most_joints];
-  // Length of the panels [s], and what turns the exponentials and harmonics from one to the next.
-  vec panel;
+  vec power[most_powers][most_joints], low[most_joints], high[most_joints], sixth[most_joints],
+      felt_mass[most_joints];
+  // The last step of the root search is shorter. Length of the panels [s], and what turns the exponentials
+  // and harmonics from one to the next.
+  vec close, panel;
   structure_bases step;
   // The functions at the start, and the harmonics there.
   outlook first;
@@ -137,6 +147,7 @@ template <class size>
 inline void bases_at(const structure_machine &m, const size &z, const structure_group &g, vec elapsed,
                      structure_bases &b) {
   LANE_COUNT(evaluations, vec_size);
+  b.elapsed = elapsed;
   for (int k = 0; k < z.terms; k++) {
     vec sine, cosine, shrink = exponential(-g.decay[k] * elapsed);
     sine_cosine(g.turn[k] * elapsed, sine, cosine);
@@ -151,7 +162,14 @@ template <class size>
 inline void functions_at(const structure_machine &m, const size &z, const structure_group &g,
                          const structure_bases &b, outlook &o, far_outlook *more = nullptr) {
   for (int j = 0; j < z.joints; j++) {
-    vec f = g.constant[j], f1 = {}, f2 = {}, f3 = {}, f4 = {}, f5 = {};
+    vec f = g.power[0][j], f1 = {}, f2 = {}, f3 = {}, f4 = {}, f5 = {};
+    if (z.powers > 1) {
+      vec c1 = g.power[1][j], c2 = g.power[2][j], c3 = g.power[3][j], t = b.elapsed;
+      f += t * (c1 + t * (c2 + t * c3));
+      f1 = c1 + t * (2 * c2 + 3 * t * c3);
+      f2 = 2 * c2 + 6 * t * c3;
+      f3 = 6 * c3;
+    }
     for (int k = 0; k < z.terms; k++) {
       vec y = g.part_re[j][k] * b.re[k] - g.part_im[j][k] * b.im[k];
       vec across = g.part_re[j][k] * b.im[k] + g.part_im[j][k] * b.re[k];
@@ -197,6 +215,30 @@ inline vec pull_of(const structure_fields<vec> &s, int j) {
   return pick(s.phase[j] == 0.0, s.held[j], s.phase[j]);
 }
 
+// Powers of time in coordinate i that neither amplitudes nor drifts have.
+template <class size>
+inline void still_of(const structure_machine &m, const size &z, const structure_mode &t,
+                     const structure_fields<vec> &s, int i, vec (&p)[most_powers]) {
+  for (int n = 0; n < z.powers; n++) {
+    p[n] = t.still[n][i];
+    for (int j = 0; j < z.joints; j++)
+      if (m.joint[j].slides > 0.5)
+        p[n] += t.still_by_joint[n][j][i] * pull_of(s, j);
+  }
+}
+
+// 1 where lanes move at all, else 0.
+template <class size>
+inline vec moves_of(const structure_machine &m, const size &z, const structure_fields<vec> &s) {
+  vec moves = 1;
+  if (!z.idle)
+    return moves;
+  for (int key = 0; key < modes_of(m); key++)
+    if (m.mode[key].idle > 0.5)
+      put(moves, in_mode(m, z, key, ~mask{}, s), vec{});
+  return moves;
+}
+
 // The lanes of `among`, whose bases are `b`: coordinates and speeds.
 template <class size>
 inline void place_at(const structure_machine &m, const size &z, mask among, const structure_fields<vec> &s,
@@ -208,10 +250,17 @@ inline void place_at(const structure_machine &m, const size &z, mask among, cons
       continue;
     const structure_mode &t = m.mode[key];
     for (int i = 0; i < z.coordinates; i++) {
-      vec place = t.still[i], speed = {};
-      for (int j = 0; j < z.joints; j++)
-        if (m.joint[j].slides > 0.5)
-          place += t.still_by_joint[j][i] * pull_of(s, j);
+      vec p[most_powers] = {};
+      still_of(m, z, t, s, i, p);
+      for (int d = 0; d < z.drifts; d++) {
+        p[0] += t.drift[d][i] * s.place[d];
+        p[1] += t.drift[d][i] * s.pace[d];
+      }
+      vec place = p[0], speed = {};
+      if (z.powers > 1) {
+        place += b.elapsed * (p[1] + b.elapsed * (p[2] + b.elapsed * p[3]));
+        speed = p[1] + b.elapsed * (2 * p[2] + 3 * b.elapsed * p[3]);
+      }
       for (int n = 0; n < z.waves; n++) {
         place += t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
         speed -=
@@ -249,8 +298,7 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       const structure_joint &joint = m.joint[j];
       const bool slides = joint.slides > 0.5;
       mask moves = g.s.phase[j] != 0.0;
-      vec d = pick(moves, g.s.phase[j], 1), swing = t.steady[j], sixth = t.steady_sixth[j],
-          level = t.level[j];
+      vec d = pick(moves, g.s.phase[j], 1), swing = t.steady[j], sixth = t.steady_sixth[j];
       for (int k = 0; k < z.terms; k++) {
         double square = t.decay[k] * t.decay[k] + t.turn[k] * t.turn[k];
         vec share = t.part_size[k][j] * amplitude[k];
@@ -263,10 +311,19 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
         put(g.swing_re[j][n], in, d * t.swing_re[n][j]);
         put(g.swing_im[j][n], in, d * t.swing_im[n][j]);
       }
-      for (int i = 0; i < z.joints; i++)
-        if (m.joint[i].slides > 0.5)
-          level += t.level_by_joint[j][i] * pull_of(g.s, i);
-      put(g.constant[j], in, d * level);
+      for (int n = 0; n < z.powers; n++) {
+        vec level = t.level[n][j];
+        for (int i = 0; i < z.joints; i++)
+          if (m.joint[i].slides > 0.5)
+            level += t.level_by_joint[n][j][i] * pull_of(g.s, i);
+        for (int i = 0; i < z.drifts; i++) {
+          if (n == 0)
+            level += t.level_by_place[i][j] * g.s.place[i];
+          if (n < 2)
+            level += t.level_by_pace[n][i][j] * g.s.pace[i];
+        }
+        put(g.power[n][j], in, d * level);
+      }
       put(g.sixth[j], in, sixth);
       put(g.felt_mass[j], in, t.felt_mass[j]);
       put(g.low[j], in, slides ? pick(moves, 0, -joint.upper) : vec(joint.lower));
@@ -274,20 +331,21 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       vec ratio = sixth / (swing + 1e-300);
       put(steepest, ratio > steepest, ratio);
     }
+    put(g.close, in, t.close);
     // The longest that will do.
     mask fits = in;
     for (int l = panel_lengths - 1; l >= 0; l--) {
-      fits = fits & (steepest <= m.steepest[l]);
+      fits = fits & (steepest <= t.steepest[l]);
       if (!any(fits))
         break;
-      put(g.panel, fits, m.panel[l]);
+      put(g.panel, fits, t.panel[l]);
       for (int k = 0; k < z.terms; k++) {
         put(g.step.re[k], fits, t.step_re[l][k]);
         put(g.step.im[k], fits, t.step_im[l][k]);
       }
       for (int n = 0; n < z.waves; n++) {
-        put(g.step.cosine[n], fits, m.step_cosine[l][n]);
-        put(g.step.sine[n], fits, m.step_sine[l][n]);
+        put(g.step.cosine[n], fits, t.step_cosine[l][n]);
+        put(g.step.sine[n], fits, t.step_sine[l][n]);
       }
     }
   }
@@ -307,6 +365,7 @@ template <class size>
 inline void look_from_start(const structure_machine &m, const size &z, mask in, structure_bases &b,
                             structure_group &g) {
   outlook o;
+  b.elapsed = {};
   for (int k = 0; k < z.terms; k++) {
     b.re[k] = 1;
     b.im[k] = {};

@@ -1,22 +1,21 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure made ready to fly in lanes: linear, of few coordinates, with a clock, dry friction on surfaces that go
-!> nowhere and rigid contacts.
+!> A jointed structure made ready to fly in lanes: linear, of few coordinates, with a clock, dry friction and rigid contacts.
 module structure_preparation
-  use contact_law, only: contact_constant
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine
-  use flight_path, only: begin_change, force_powers, path_t
+  use flight_path, only: begin_change, force_powers, path_t, place_powers
   use friction_law, only: falls
   use jointed, only: joint_contact, joint_friction, joint_t, jointed_t
   use jointed_flows, only: jointed_motion_t
   use kinds, only: wp
+  use lane_curve, only: restitution_curve_of
   use lane_types, only: lane_flow_t
   use mode_flow, only: mode_flow_t
   use motion_state, only: flight_adaptive
-  use structure_types, only: lane_coordinates, lane_joints, lane_sliders, lane_terms, lane_waves, panel_lengths, &
-    structure_joint_t, structure_machine_t, structure_mode_t
+  use structure_types, only: lane_coordinates, lane_drifts, lane_joints, lane_powers, lane_sliders, lane_terms, lane_waves, &
+    panel_lengths, structure_joint_t, structure_machine_t, structure_mode_t
   implicit none
   private
 
@@ -40,7 +39,6 @@ contains
     type(lane_flow_t), intent(inout) :: flow
     integer, allocatable :: sliders(:)
     integer :: j, key
-    real(wp) :: fastest
     flow%available = fits_lanes(moving)
     if (.not. flow%available) return
     flow%resumes = .true.
@@ -61,60 +59,65 @@ contains
         call set_joint(machine, j, m%joint(j))
       end do
       sliders = pack([(j, j=1, size(machine%joints))], machine%joints%kind == joint_friction)
-      fastest = moving%harmonics*machine%frequency
       do key = 0, 2**size(sliders) - 1
-        call set_mode(moving, sliders, key, m%mode(key + 1), fastest)
+        call set_mode(moving, sliders, key, m%mode(key + 1))
+        if (m%mode(key + 1)%known > 0) call set_panels(moving%harmonics, machine%frequency, m%mode(key + 1))
       end do
-      m%close = taylor_span/fastest
-      call set_panels(fastest, 2**size(sliders), m)
       flow%available = m%mode(1)%known > 0
     end associate
   end subroutine prepare_structure_lanes
 
-  !> Panels over which quintics err by no more than about 2 % of what a function swings: as the fastest exponent [rad/s] asks
-  !> for, and longer.
-  pure subroutine set_panels(fastest, modes, m)
-    real(wp), intent(in) :: fastest
-    integer, intent(in) :: modes
-    type(structure_machine_t), intent(inout) :: m
-    real(wp) :: sine, cosine, shrink
-    integer :: l, k, i
+  !> Panels over which quintics err by no more than about 2 % of what a function swings: as the fastest exponent of a mode [rad/s]
+  !> asks for, and longer.
+  pure subroutine set_panels(harmonics, frequency, mode)
+    integer, intent(in) :: harmonics
+    real(wp), intent(in) :: frequency
+    type(structure_mode_t), intent(inout) :: mode
+    real(wp) :: fastest, sine, cosine, shrink
+    integer :: l, k, terms
+    terms = nint(mode%terms)
+    fastest = harmonics*frequency
+    if (terms > 0) fastest = max(fastest, maxval(hypot(mode%decay(:terms), mode%turn(:terms))))
+    mode%close = taylor_span/fastest
     do l = 1, panel_lengths
-      m%panel(l) = coarse/fastest*stretches(l)
-      m%steepest(l) = (coarse/m%panel(l))**6
-      if (l == panel_lengths) m%steepest(l) = huge(1.0_wp)
-      do k = 1, nint(m%waves)
-        call sine_cosine(k*m%drive_frequency*m%panel(l), m%step_sine(k, l), m%step_cosine(k, l))
+      mode%panel(l) = coarse/fastest*stretches(l)
+      mode%steepest(l) = (coarse/mode%panel(l))**6
+      if (l == panel_lengths) mode%steepest(l) = huge(1.0_wp)
+      do k = 1, harmonics
+        call sine_cosine(k*frequency*mode%panel(l), mode%step_sine(k, l), mode%step_cosine(k, l))
       end do
-      do i = 1, modes
-        associate (mode => m%mode(i))
-          do k = 1, nint(mode%terms)
-            call sine_cosine(mode%turn(k)*m%panel(l), sine, cosine)
-            shrink = exponential(-mode%decay(k)*m%panel(l))
-            mode%step_re(k, l) = shrink*cosine
-            mode%step_im(k, l) = shrink*sine
-          end do
-        end associate
+      do k = 1, terms
+        call sine_cosine(mode%turn(k)*mode%panel(l), sine, cosine)
+        shrink = exponential(-mode%decay(k)*mode%panel(l))
+        mode%step_re(k, l) = shrink*cosine
+        mode%step_im(k, l) = shrink*sine
       end do
     end do
   end subroutine set_panels
 
-  !> Whether the structure is one that the kernel has room and laws for.
+  !> Whether the structure is one that the kernel has room and laws for. The event loop notes by how much structures that drift
+  !> between stops miss them; lanes do not.
   pure logical function fits_lanes(moving) result(fits)
     type(jointed_motion_t), intent(in) :: moving
     integer :: j
     associate (machine => moving%machine)
+<<<<<<< HEAD
       fits = machine%driven .and. machine%linear .and. machine%n <= lane_coordinates .and. moving%harmonics <= lane_waves .and. &
         moving%section == 0 .and. size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
       fits = fits .and. .not. allocated(machine%controller) .and. .not. allocated(machine%impulses)
+=======
+      fits = machine%driven .and. machine%frequency > 0 .and. machine%linear .and. machine%n <= lane_coordinates .and. &
+        moving%harmonics > 0 .and. moving%harmonics <= lane_waves .and. &
+        moving%section == 0 .and. .not. moving%drifts .and. &
+        size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
+>>>>>>> work/lanes
       if (.not. fits) return
       fits = count(machine%joints%kind == joint_friction) <= lane_sliders .and. &
         all(machine%joints%kind == joint_friction .or. machine%joints%kind == joint_contact)
       do j = 1, size(machine%joints)
         associate (joint => machine%joints(j))
-          fits = fits .and. .not. abs(joint%offset%rate) > 0
           if (joint%kind == joint_friction) fits = fits .and. .not. falls(joint%friction) .and. has_plain_level(joint)
-          if (joint%kind == joint_contact) fits = fits .and. joint%contact%kind == contact_constant
+          if (joint%kind == joint_contact) fits = fits .and. .not. abs(joint%offset%rate) > 0
         end associate
       end do
     end associate
@@ -153,6 +156,9 @@ contains
       into%upper = joint%upper
       into%lower = joint%lower
       into%restitution = joint%contact%restitution
+      into%restitution_law = joint%contact%kind
+      into%coefficients = joint%contact%coefficients
+      into%curve = restitution_curve_of(joint%contact%change)
       into%tie = rounding*machine%length_scale
       kick = matmul(machine%mobility, joint%row)
       kick = kick/sum(joint%row*kick)
@@ -165,34 +171,37 @@ contains
     end associate
   end subroutine set_joint
 
-  !> The mode in which the friction joints whose bits are set in `key` stick. `fastest` [rad/s] grows to its largest exponent.
-  pure subroutine set_mode(moving, sliders, key, mode, fastest)
+  !> The mode in which the friction joints whose bits are set in `key` stick.
+  pure subroutine set_mode(moving, sliders, key, mode)
     type(jointed_motion_t), intent(in) :: moving
     integer, intent(in) :: sliders(:), key
     type(structure_mode_t), intent(inout) :: mode
-    real(wp), intent(inout) :: fastest
     integer :: i, j, k, bits, terms
     bits = 0
     do i = 1, size(sliders)
       if (btest(key, i - 1)) bits = ibset(bits, sliders(i) - 1)
     end do
     associate (machine => moving%machine, flow => moving%flows(bits + 1))
-      if (.not. flow%modal .or. flow%damped + flow%rigid > 0) return
+      if (.not. flow%modal) return
       terms = size(flow%exponent)
-      if (terms == 0 .or. terms > lane_terms) return
+      if (terms > lane_terms .or. flow%damped + flow%rigid > lane_drifts) return
       ! What grows has no bounds.
       if (any(real(flow%exponent) > rounding*modulus(flow%exponent))) return
+      ! The event loop tells whether what is held by surfaces that move stands still.
+      if (size(flow%basis, 2) == 0 .and. any([(goes_anywhere(machine%joints(flow%held(i))), i=1, size(flow%held))])) return
       mode%known = 1
       mode%terms = terms
+      mode%drifts = flow%damped + flow%rigid
+      mode%idle = merge(1, 0, size(flow%basis, 2) == 0)
       mode%decay(:terms) = -real(flow%exponent)
       mode%turn(:terms) = aimag(flow%exponent)
-      fastest = max(fastest, maxval(modulus(flow%exponent)))
       call set_amplitudes(machine, flow, mode)
       do j = 1, size(machine%joints)
         k = findloc(flow%held, j, 1)
         call set_function(machine, flow, j, k, mode)
       end do
       call set_statics(machine, flow, mode)
+      call set_drifts(machine, flow, mode)
       do i = 1, size(sliders)
         if (btest(bits, sliders(i) - 1)) cycle
         associate (holding => moving%flows(ibset(bits, sliders(i) - 1) + 1))
@@ -206,7 +215,13 @@ contains
     end associate
   end subroutine set_mode
 
-  !> From the state to the amplitudes, and back.
+  !> Whether the surface of a joint moves.
+  pure logical function goes_anywhere(joint)
+    type(joint_t), intent(in) :: joint
+    goes_anywhere = abs(joint%offset%rate) > 0 .or. allocated(joint%offset%harmonic)
+  end function goes_anywhere
+
+  !> From the state to the amplitudes and what is along the directions without a spring, and back.
   pure subroutine set_amplitudes(machine, flow, mode)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -216,12 +231,19 @@ contains
     integer :: i, k, m, f
     f = flow%flexible
     project = matmul(transpose(flow%basis), machine%mass)
-    associate (n => machine%n)
+    associate (n => machine%n, d => flow%damped)
+      do i = 1, d + flow%rigid
+        mode%drift(:n, i) = flow%basis(:, f + i)
+        mode%place_from_place(i, :n) = project(f + i, :)
+        if (i > d) mode%pace_from_speed(i, :n) = project(f + i, :)
+      end do
       do k = 1, size(flow%exponent)
         by_place = 0
         by_speed = 0
         do i = 1, f
           by_place = by_place + flow%left(k, i)*flow%frequency(i)*project(i, :)
+        end do
+        do i = 1, f + d
           by_speed = by_speed + flow%left(k, f + i)*project(i, :)
         end do
         mode%from_place_re(k, :n) = real(by_place)
@@ -230,6 +252,11 @@ contains
         mode%from_speed_im(k, :n) = aimag(by_speed)
         mode%shape_re(:n, k) = real(flow%shape(:, k))
         mode%shape_im(:n, k) = aimag(flow%shape(:, k))
+        ! The exponentials carry a part of the damped directions.
+        do i = 1, d
+          mode%place_from_place(i, :n) = mode%place_from_place(i, :n) - real(flow%drift(i, k)*by_place)
+          mode%place_from_speed(i, :n) = mode%place_from_speed(i, :n) - real(flow%drift(i, k)*by_speed)
+        end do
       end do
       do m = 1, size(flow%response, 2)
         mode%wave_re(:n, m) = real(flow%response(:, m))
@@ -273,20 +300,22 @@ contains
     end do
   end subroutine set_function
 
-  !> Where the structure would be at rest under its load, and what each joint adds to that: friction in its direction, or the
-  !> place where it is held.
+  !> Where the load and the surfaces would take the structure, by powers of time, and what each joint adds to that: friction in
+  !> its direction, or the place where it is held.
   pure subroutine set_statics(machine, flow, mode)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(structure_mode_t), intent(inout) :: mode
     real(wp), dimension(machine%n) :: none, force, place
     type(path_t) :: path
+    logical :: drifts
     integer :: j, i
     none = 0
     associate (n => machine%n)
-      call begin_change(machine, flow, none, none, machine%load, path)
-      mode%still(:n) = path%powers(:n, 0)
-      call set_levels(path, .true., mode%level)
+      call begin_change(machine, flow, none, none, machine%load, path, -machine%joints%offset%rate)
+      mode%still(:n, :) = path%powers(:n, :)
+      call set_levels(machine, flow, path, .true., mode%level)
+      drifts = mode%drifts > 0 .or. any(abs(path%powers(:n, 1:)) > 0)
       do j = 1, size(machine%joints)
         if (machine%joints(j)%kind /= joint_friction) cycle
         i = findloc(flow%held, j, 1)
@@ -295,33 +324,56 @@ contains
         if (i > 0) place = flow%carried(:, i)
         if (i == 0) force = -machine%joints(j)%friction%kinetic*machine%joints(j)%row
         call begin_change(machine, flow, place, none, force, path)
-        mode%still_by_joint(:n, j) = path%powers(:n, 0)
-        call set_levels(path, .false., mode%level_by_joint(j, :))
+        mode%still_by_joint(:n, j, :) = path%powers(:n, :)
+        call set_levels(machine, flow, path, .false., mode%level_by_joint(j, :, :))
+        drifts = drifts .or. any(abs(path%powers(:n, 1:)) > 0)
       end do
     end associate
-
-  contains
-
-    !> Constant parts of the functions of the joints.
-    pure subroutine set_levels(path, with_offset, level)
-      type(path_t), intent(in) :: path
-      logical, intent(in) :: with_offset
-      real(wp), intent(inout) :: level(:)
-      real(wp) :: powers(0:3)
-      integer :: k, held
-      do k = 1, size(machine%joints)
-        held = findloc(flow%held, k, 1)
-        level(k) = 0
-        if (held > 0) then
-          powers = force_powers(machine, flow, path, held)
-          level(k) = powers(0)
-        else if (machine%joints(k)%kind == joint_contact) then
-          level(k) = sum(machine%joints(k)%row*path%powers(:machine%n, 0))
-          if (with_offset) level(k) = level(k) + machine%joints(k)%offset%mean
-        end if
-      end do
-    end subroutine set_levels
-
+    mode%powers = merge(lane_powers, 1, drifts)
   end subroutine set_statics
+
+  !> What a place and a pace along each direction without a spring add to the functions.
+  pure subroutine set_drifts(machine, flow, mode)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(structure_mode_t), intent(inout) :: mode
+    real(wp) :: level(lane_joints, lane_powers)
+    type(path_t) :: path
+    integer :: d
+    do d = 1, nint(mode%drifts)
+      path%powers = 0
+      path%powers(:machine%n, 0) = mode%drift(:machine%n, d)
+      level = 0
+      call set_levels(machine, flow, path, .false., level)
+      mode%level_by_place(:, d) = level(:, 1)
+      path%powers = 0
+      path%powers(:machine%n, 1) = mode%drift(:machine%n, d)
+      level = 0
+      call set_levels(machine, flow, path, .false., level)
+      mode%level_by_pace(:, d, :) = level(:, :2)
+    end do
+  end subroutine set_drifts
+
+  !> Powers of time in the functions of the joints (rows) along a path, with the given part of their coordinates or without.
+  pure subroutine set_levels(machine, flow, path, with_offset, level)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    logical, intent(in) :: with_offset
+    real(wp), intent(inout) :: level(:, :)
+    real(wp) :: powers(0:3)
+    integer :: k, held
+    do k = 1, size(machine%joints)
+      held = findloc(flow%held, k, 1)
+      if (held > 0) then
+        level(k, :) = force_powers(machine, flow, path, held)
+        cycle
+      end if
+      powers = matmul(machine%joints(k)%row, path%powers(:machine%n, :))
+      if (with_offset) powers = place_powers(machine, path, k)
+      if (machine%joints(k)%kind == joint_friction) powers = [powers(1), 2*powers(2), 3*powers(3), 0.0_wp]
+      level(k, :) = powers
+    end do
+  end subroutine set_levels
 
 end module structure_preparation

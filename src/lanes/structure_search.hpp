@@ -206,6 +206,7 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
                  structure_group &g) {
   while (any(walking)) {
     structure_bases next;
+    next.elapsed = p.t + g.panel;
     for (int k = 0; k < z.terms; k++) {
       next.re[k] = p.b.re[k] * g.step.re[k] - p.b.im[k] * g.step.im[k];
       next.im[k] = p.b.re[k] * g.step.im[k] + p.b.im[k] * g.step.re[k];
@@ -269,12 +270,12 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
     vec step = -w * (w1 * w1 - 0.5 * w * w2) / (w1 * (w1 * w1 - w * w2) + (1.0 / 6) * w * w * c.w3);
     // Where the step is short Taylor's polynomial is the function: its zero, by one step of Newton's method
     // where the slope hardly changes on the way.
-    mask near = (magnitude(step) <= m.close) & (magnitude(step * w2) <= -straight * w1);
+    mask near = (magnitude(step) <= g.close) & (magnitude(step * w2) <= -straight * w1);
     vec zero = zero_nearby(z, p.target, c, far, step);
     step = pick(near, zero, step);
     vec next = s + step;
     mask guided = (w1 < 0.0) & (next >= low) & (next <= high) & (next > p.t);
-    mask close = asked & guided & near & (magnitude(step) <= m.close) & (magnitude(w) <= -2 * m.close * w1);
+    mask close = asked & guided & near & (magnitude(step) <= g.close) & (magnitude(w) <= -2 * g.close * w1);
     if (any(close)) {
       for (int k = 0; k < z.terms; k++) {
         vec re = b.re[k], im = b.im[k];

@@ -6,6 +6,8 @@
 #ifndef SEPARATRIX_STRUCTURE_TYPES_HPP
 #define SEPARATRIX_STRUCTURE_TYPES_HPP
 
+#include "lane_types.hpp"
+
 enum {
   lanes_of_structures = 16,
   most_coordinates = 8,
@@ -15,6 +17,9 @@ enum {
   most_sliders = 2,
   most_structure_modes = 4,
   most_waves = 8,
+  // Directions without a spring, and the powers of time that motions have along them.
+  most_drifts = 4,
+  most_powers = 4,
   panel_lengths = 4,
   most_section = 2 * most_coordinates,
   metric_numbers = most_section * (most_section + 1) / 2,
@@ -22,29 +27,41 @@ enum {
 };
 
 // One mode of a structure: which of its friction joints stick. With E(k) = exp((-decay + i turn) t), complex
-// amplitudes a(k) and W(m) = exp(i m Omega t)
-//   q = still + Re sum shape a E + Re sum wave W,
+// amplitudes a(k), W(m) = exp(i m Omega t), places b(d) and paces c(d) along the directions without a spring
+//   q = sum still(p) t^p + sum drift (b + c t) + Re sum shape a E + Re sum wave W,
 // and of every joint one function: its coordinate (an open contact), its sliding speed, the force that holds
 // it,
-//   f = level + Re sum part a E + Re sum swing W.
+//   f = sum level(p) t^p + Re sum part a E + Re sum swing W.
 // `still` and `level` are sums over the directions of the sliding joints and the coordinates of those held.
 struct structure_mode {
-  double known, terms;
+  // How many powers of time it has, 1 where nothing drifts; `idle`: nothing moves at all.
+  double known, terms, drifts, powers, idle;
   double decay[most_terms], turn[most_terms];
   // Amplitudes from q - still - Re sum wave W and its rate.
   double from_place_re[most_coordinates][most_terms], from_place_im[most_coordinates][most_terms];
   double from_speed_re[most_coordinates][most_terms], from_speed_im[most_coordinates][most_terms];
   double shape_re[most_terms][most_coordinates], shape_im[most_terms][most_coordinates];
   double wave_re[most_waves][most_coordinates], wave_im[most_waves][most_coordinates];
-  double still[most_coordinates], still_by_joint[most_joints][most_coordinates];
+  double still[most_powers][most_coordinates], still_by_joint[most_powers][most_joints][most_coordinates];
+  // Along the directions without a spring: places and paces from what amplitudes are made from, shapes, and
+  // what places and paces add to the levels.
+  double place_from_place[most_coordinates][most_drifts], place_from_speed[most_coordinates][most_drifts],
+      pace_from_speed[most_coordinates][most_drifts];
+  double drift[most_drifts][most_coordinates];
+  double level_by_place[most_drifts][most_joints], level_by_pace[2][most_drifts][most_joints];
   double part_re[most_terms][most_joints], part_im[most_terms][most_joints],
       part_size[most_terms][most_joints];
   double swing_re[most_waves][most_joints], swing_im[most_waves][most_joints];
-  double level[most_joints], level_by_joint[most_joints][most_joints];
+  double level[most_powers][most_joints], level_by_joint[most_powers][most_joints][most_joints];
   // Bounds on what the waves have in the functions and their sixth derivatives.
   double steady[most_joints], steady_sixth[most_joints];
-  // The exponentials over panels.
+  // A step of the root search shorter than this [s] is the last.
+  double close;
+  // Lengths of panels, longest first [s]; how large the sixth derivative of a function may be, in its own
+  // size [1/s^6]; the exponentials and the harmonics over them.
+  double panel[panel_lengths], steepest[panel_lengths];
   double step_re[panel_lengths][most_terms], step_im[panel_lengths][most_terms];
+  double step_cosine[panel_lengths][most_waves], step_sine[panel_lengths][most_waves];
   // Mass that a sliding joint feels with the others as they are [kg].
   double felt_mass[most_joints];
 };
@@ -60,7 +77,9 @@ struct structure_joint {
   double tie;
   // Sliding takes no less force than holding.
   double even;
-  double restitution;
+  // As `lane_machine` has them.
+  double restitution, restitution_law, coefficients[2];
+  lane_curve curve;
   double row[most_coordinates];
   // Change of the speeds, and of the sliding speeds of the joints, per impulse that changes its own speed by
   // 1 m/s.
@@ -70,12 +89,6 @@ struct structure_joint {
 struct structure_machine {
   double coordinates, joints, waves;
   double drive_frequency, period, domain;
-  // A step of the root search shorter than this [s] is the last.
-  double close;
-  // Lengths of panels, longest first [s]; how large the sixth derivative of a function may be, in its own
-  // size [1/s^6]; the harmonics over them.
-  double panel[panel_lengths], steepest[panel_lengths];
-  double step_cosine[panel_lengths][most_waves], step_sine[panel_lengths][most_waves];
   // Sliding speeds below this are left to the scalar code [m/s].
   double slowest;
   // Share of the change of a gap's acceleration up to which its chatter is completed, and the longest end of
@@ -98,6 +111,8 @@ template <class T> struct structure_fields {
   T phase[most_joints];
   // The flight: start [s after the section], amplitudes, coordinates of the joints held.
   T start, re[most_terms], im[most_terms], held[most_joints];
+  // Places and paces along the directions without a spring.
+  T place[most_drifts], pace[most_drifts];
   // What ends it: 1 = found, when, joint (1, ...; 0 = none, the flight goes on), side; amplitudes then;
   // functions of the joints and their rates then.
   T found, span, joint, side, end_re[most_terms], end_im[most_terms], end_f[most_joints], end_f1[most_joints];

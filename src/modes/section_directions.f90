@@ -5,7 +5,7 @@
 !> anywhere, and looks the same from a frame that moves along.
 module section_directions
   use eigen, only: symmetric_eigen
-  use jointed, only: joint_friction, joint_section, jointed_t, most_degrees
+  use jointed, only: joint_contact, joint_friction, joint_section, joint_soft, jointed_t, most_degrees
   use kinds, only: wp
   implicit none
   private
@@ -17,10 +17,46 @@ module section_directions
 
 contains
 
-  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. What is
-  !> tied to what tells them, not how strongly: machines of one build have the same.
+  !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. Where
+  !> fewer count between the stops, those that count only for the stops come first. What is tied to what tells them, not how
+  !> strongly: machines of one build have the same.
   pure subroutine directions_of(machine, directions, count_directions)
     type(jointed_t), intent(in) :: machine
+    real(wp), intent(out) :: directions(most_degrees, most_degrees)
+    integer, intent(out) :: count_directions
+    real(wp) :: between(most_degrees, most_degrees)
+    integer :: count_between
+    call directions_with(machine, .true., directions, count_directions)
+    call directions_with(machine, .false., between, count_between)
+    if (count_between == count_directions .or. count_between == 0) return
+    call tell_apart(directions(:machine%n, :count_directions), between(:machine%n, :count_between))
+  end subroutine directions_of
+
+  !> Turns orthonormal directions so that the last ones are `last`, which lie among them.
+  pure subroutine tell_apart(directions, last)
+    real(wp), intent(inout) :: directions(:, :)
+    real(wp), intent(in) :: last(:, :)
+    real(wp) :: rest(size(directions, 1), size(directions, 2))
+    integer :: i, k, first
+    first = size(directions, 2) - size(last, 2)
+    rest = directions
+    do k = 1, size(last, 2)
+      call take_out(last(:, k), rest)
+    end do
+    do k = 1, first
+      associate (left => norm2(rest, 1))
+        i = findloc(left > much*maxval(left), .true., 1)
+      end associate
+      directions(:, k) = rest(:, i)/norm2(rest(:, i))
+      call take_out(directions(:, k), rest)
+    end do
+    directions(:, first + 1:) = last
+  end subroutine tell_apart
+
+  !> The same, with the stops or without.
+  pure subroutine directions_with(machine, stops, directions, count_directions)
+    type(jointed_t), intent(in) :: machine
+    logical, intent(in) :: stops
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
     real(wp) :: depends(machine%n, machine%n)
@@ -28,13 +64,14 @@ contains
     n = machine%n
     depends = without_signs(machine%stiffness)
     do j = 1, size(machine%joints)
-      if (machine%joints(j)%kind == joint_friction .or. machine%joints(j)%kind == joint_section) cycle
+      if (any(machine%joints(j)%kind == [joint_friction, joint_section])) cycle
+      if (.not. stops .and. any(machine%joints(j)%kind == [joint_contact, joint_soft])) cycle
       do i = 1, n
         depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
       end do
     end do
     call span_of(depends, directions, count_directions)
-  end subroutine directions_of
+  end subroutine directions_with
 
   !> Directions of the velocities on which anything depends, likewise: all of them, unless the whole may move along at any speed. A
   !> motion without a clock is looked at where a body turns: there its own velocity counts.
