@@ -101,16 +101,11 @@ contains
     type(jointed_motion_t), intent(in) :: moving
     integer :: j
     associate (machine => moving%machine)
-<<<<<<< HEAD
-      fits = machine%driven .and. machine%linear .and. machine%n <= lane_coordinates .and. moving%harmonics <= lane_waves .and. &
-        moving%section == 0 .and. size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
-      fits = fits .and. .not. allocated(machine%controller) .and. .not. allocated(machine%impulses)
-=======
       fits = machine%driven .and. machine%frequency > 0 .and. machine%linear .and. machine%n <= lane_coordinates .and. &
         moving%harmonics > 0 .and. moving%harmonics <= lane_waves .and. &
         moving%section == 0 .and. .not. moving%drifts .and. &
         size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
->>>>>>> work/lanes
+      fits = fits .and. .not. allocated(machine%controller) .and. .not. allocated(machine%impulses)
       if (.not. fits) return
       fits = count(machine%joints%kind == joint_friction) <= lane_sliders .and. &
         all(machine%joints%kind == joint_friction .or. machine%joints%kind == joint_contact)
