@@ -314,6 +314,7 @@ contains
       length = 1
       if (law%restoring%stiffness > 0) length = law%force_scale/law%restoring%stiffness
       if (length > 0) l%log_scale = logarithm(length)
+      l%log_speed = l%log_scale + logarithm(law%drive_frequency)
       l%half_play = effects%play/2
       l%corner = effects%corner**2
       l%series_stiffness = effects%series_stiffness/law%mass

@@ -236,6 +236,12 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
   for (int k = order - 3; k <= order; k++) {
     vec length = (1.0 / k) * (m.law.log_scale - logarithm(magnitude(p.x[k]) + smallest));
     put(least, length < least, length);
+    if (m.law.series_stiffness == 0)
+      continue;
+    // Beside a corner of a free play steps are so short that the speed is what rounding shows in first.
+    length = (1.0 / (k - 1)) *
+             (m.law.log_speed - logarithm(double(k) * magnitude(p.x[k]) + smallest) - shrinking);
+    put(least, length < least, length);
   }
   return exponential(least - shrinking);
 }

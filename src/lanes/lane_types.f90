@@ -56,7 +56,7 @@ module lane_types
     real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
     real(c_double) :: has_tables = 0
     type(table_t) :: table(tables)
-    real(c_double) :: change_at_rest(2) = 0, half_play = 0, corner = 0, series_stiffness = 0
+    real(c_double) :: change_at_rest(2) = 0, half_play = 0, corner = 0, series_stiffness = 0, log_speed = 0
   end type law_t
 
   !> Mirrors `lane_contact` of lane_types.hpp.

@@ -82,8 +82,8 @@ struct lane_law {
   lane_table table[tables];
   double change_at_rest[2];
   // Free play: half of the play [m], square of the radius of its corners [m^2], stiffness of the spring in
-  // series with it. No play: stiffness 0.
-  double half_play, corner, series_stiffness;
+  // series with it. No play: stiffness 0. Logarithm of the speed to which errors beside it are compared.
+  double half_play, corner, series_stiffness, log_speed;
 };
 
 // A soft barrier whose contacts are expanded in series: stiffness p^n (1 + damping p'), or stiffness p +
