@@ -35,7 +35,7 @@ contains
     if (reason == 0) found = find_capture(catalogue, turn_point(moving, later), .true., by_event=.true.)
   end function captor_of
 
-  !> Whether a motion on the section, with what was counted since the last impact, has settled at one of a family of cycles, each
+  !> Whether a motion on the section, with what was counted since its window began, has settled at one of a family of cycles, each
   !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left
   !> of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it
   !> misses the stops.

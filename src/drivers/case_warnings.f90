@@ -43,7 +43,7 @@ contains
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
     if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
-    call warn_about_blow(the_case, journal)
+    call warn_about_blow(the_case, moving, journal)
     obstacle = section_obstacle(moving)
     if ((command == 'basin' .or. command == 'sweep') .and. len(obstacle) > 0) then
       call journal%line('warning', 'warning: no attractors are looked for: '//obstacle//'. Points get the regime at the end of '// &
@@ -53,11 +53,23 @@ contains
     if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
-  !> Says if a blow falls after the end.
-  subroutine warn_about_blow(the_case, journal)
+  !> Says if a blow, or an impulse of a structure, falls after the end.
+  subroutine warn_about_blow(the_case, moving, journal)
     type(case_t), intent(in) :: the_case
+    type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
     real(wp) :: time
+    integer :: i
+    if (allocated(moving%jointed)) then
+      if (.not. allocated(moving%jointed%machine%impulses)) return
+      do i = 1, size(moving%jointed%machine%impulses)
+        time = moving%jointed%machine%impulses(i)%time
+        if (time <= the_case%run%duration) cycle
+        call journal%line('warning', 'warning: the impulse at '//to_text(time)//' s is after the end, run.duration = '// &
+          to_text(the_case%run%duration)//' s: it does not fall')
+      end do
+      return
+    end if
     if (.not. abs(parameter_value(the_case%laws, 'body.blow', 0.0_wp)) > 0) return
     time = parameter_value(the_case%laws, 'body.blow_time', 0.0_wp)
     if (time <= the_case%run%duration) return

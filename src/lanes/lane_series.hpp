@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Machines without a closed form, by Taylor series over the lanes: cubic springs and pendulums, drag,
-// friction that depends on speed or place, Dahl's friction. Every step expands the motion to a fixed order by
-// recurrences; its length follows from the last coefficients (Jorba & Zou 2005). Events are roots of the
-// polynomials; that nothing comes before them is proven by the Bernstein coefficients of the velocity.
+// Machines without a closed form, by Taylor series over the lanes: cubic springs, free play and pendulums,
+// drag, friction that depends on speed or place, Dahl's friction, tables. Every step expands the motion to a
+// fixed order by recurrences; its length follows from the last coefficients (Jorba & Zou 2005). Events are
+// roots of the polynomials; that nothing comes before them is proven by the Bernstein coefficients of the
+// velocity.
 #ifndef SEPARATRIX_LANE_SERIES_HPP
 #define SEPARATRIX_LANE_SERIES_HPP
 
@@ -18,9 +19,10 @@ enum { order = 18, most_root_rounds = 30 };
 // Successive terms of a step shrink by exp(-shrinking); the last is then 2e-14 of the first.
 const double shrinking = 1.75;
 
-// Coefficients of position and velocity in the time since the start of a step, and of the stretch.
+// Coefficients of position and velocity in the time since the start of a step, with tables those of the
+// stretch and of the factor of dry friction, too.
 struct expansion {
-  vec x[order + 1], v[order], stretch[order];
+  vec x[order + 1], v[order], stretch[order], factor[order];
 };
 
 // The pieces of a table that the lanes are in: see lane_tables.hpp.
@@ -227,6 +229,11 @@ LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, const
       p.stretch[k] = forces.stretch[k];
     p.stretch[order - 1] = -p.x[order - 1];
   }
+  if (m.law.table[factor_over_place].knots > 0) {
+    for (int k = 0; k < order - 1; k++)
+      p.factor[k] = forces.factor[k];
+    p.factor[order - 1] = {};
+  }
 }
 
 // Length of a step over which the terms shrink so. The last few are asked, as one may happen to be small.
@@ -239,8 +246,8 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
     if (m.law.series_stiffness == 0)
       continue;
     // Beside a corner of a free play steps are so short that the speed is what rounding shows in first.
-    length = (1.0 / (k - 1)) *
-             (m.law.log_speed - logarithm(double(k) * magnitude(p.x[k]) + smallest) - shrinking);
+    length =
+        (1.0 / (k - 1)) * (m.law.log_speed - logarithm(double(k) * magnitude(p.x[k]) + smallest) - shrinking);
     put(least, length < least, length);
   }
   return exponential(least - shrinking);
@@ -420,8 +427,8 @@ LANE_DEVICE inline mask take_series_events(const lane_machine &m, const table_pi
   if (any(due & t.hits))
     restitution = restitution_at(m, w);
   mask slow = soft ? w <= 0.0 : restitution * w <= m.slow;
-  mask rare =
-      due & ((t.turns & (push <= holds)) | (t.hits & slow) | (magnitude(x) >= m.domain) | (factor <= 0.0));
+  mask rare = due & ((t.turns & (push <= holds)) | (t.hits & slow) | (magnitude(x) >= m.domain) |
+                     (factor <= 0.0) | (1.0 + m.friction_slope * g.x <= 0.0));
   due = due & ~rare;
   mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
   LANE_COUNT(events, count(events));

@@ -77,7 +77,7 @@ LANE_DEVICE inline mask keep_in_piece(const vec *c, const table_piece &piece, ma
 }
 
 // The same for every table: the steps `length` end where the first piece is left. Returns the lanes that are
-// proven to keep within their pieces until then.
+// proven to keep within their pieces until then, with dry friction above zero.
 LANE_DEVICE inline mask keep_in_pieces(const lane_machine &m, const lane_group &g, const table_piece *pieces,
                                        const expansion &p, mask asked, vec &length) {
   mask kept = ~mask{};
@@ -85,8 +85,16 @@ LANE_DEVICE inline mask keep_in_pieces(const lane_machine &m, const lane_group &
     kept = kept & keep_in_piece(p.stretch, pieces[over_stretch], asked, length);
   if (m.law.table[over_place].knots > 0)
     kept = kept & keep_in_piece(p.x, pieces[over_place], asked, length);
-  if (m.law.table[factor_over_place].knots > 0)
+  if (m.law.table[factor_over_place].knots > 0) {
     kept = kept & keep_in_piece(p.x, pieces[factor_over_place], asked, length);
+    // A factor that has fallen to zero stays there: another law.
+    vec factor[order], power = 1.0;
+    for (int k = 0; k < order; k++) {
+      factor[k] = p.factor[k] * power;
+      power *= length;
+    }
+    kept = kept & positive_until(factor, asked, 1.0);
+  }
   if (m.law.table[over_speed].knots > 0) {
     vec speed[order];
     for (int k = 0; k < order; k++)

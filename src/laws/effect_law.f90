@@ -24,9 +24,13 @@ module effect_law
 
   real(wp), parameter :: farthest_behind = 100
 
+  !> The effects whose force lanes have a series for (`lane_preparation`): machines with others fly in the event loop.
+  character(len=*), parameter :: with_series(12) = [character(len=27) :: 'quadratic_drag', 'cubic_damping', 'asymmetric_friction', &
+    'position_dependent_friction', 'cubic_spring', 'offset_force', 'dahl', 'friction_curve', 'friction_place_curve', &
+    'spring_curve', 'force_curve', 'backlash']
+
   type, public :: effects_t
-    !> Any force at all, one that leaves no closed form, and one that lanes have no series for (a new effect says so until
-    !> they have).
+    !> Any force at all, one that leaves no closed form, and one that lanes have no series for.
     logical :: present = .false., nonlinear = .false., unknown_to_lanes = .false.
     !> A force that only the position of body and foot sets, beside the cubic spring and the offset; any that the place changes.
     logical :: by_position = .false., by_place = .false.
@@ -96,7 +100,10 @@ contains
     case ('backlash')
       effects%play = value_of(choice, 'gap')
       effects%corner = value_of(choice, 'rounding')*effects%play
+    case default
+      return
     end select
+    effects%unknown_to_lanes = effects%unknown_to_lanes .or. .not. any(choice%name == with_series)
   end subroutine add_to_effects
 
   !> The same for what a sensor shows.

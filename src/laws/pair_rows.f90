@@ -49,7 +49,7 @@ module pair_rows
     (parameter_row_t('drive', sines(i), 'amplitude', 'm', not_negative, 'X'), i=1, 2), &
     (parameter_row_t('drive', sines(i), 'frequency', 'rad/s', positive, 'W'), i=1, 2), &
     (parameter_row_t('drive', controllers(i), 'proportional', 'N/m', positive, 'force per error of position'), i=1, 2), &
-    (parameter_row_t('drive', controllers(i), 'integral', 'N/(ms)', not_negative, 'force per integral of the error', &
+    (parameter_row_t('drive', controllers(i), 'integral', 'N/(m s)', not_negative, 'force per integral of the error', &
                      optional=.true.), i=1, 2), &
     (parameter_row_t('drive', controllers(i), 'derivative', 'N s/m', not_negative, 'force per error of velocity', &
                      optional=.true.), i=1, 2), &

@@ -149,7 +149,7 @@ module part_rows
     (parameter_row_t('part', drives(i), 'sine', drive_unit(i), any_value, 'b_1, b_2, ... of sin(n phi)', &
                      optional=.true., list=.true.), i=1, 3), &
     parameter_row_t('part', drives(3), 'proportional', 'N/m', not_negative, 'P', optional=.true.), &
-    parameter_row_t('part', drives(3), 'integral', 'N/(ms)', not_negative, 'I', optional=.true.), &
+    parameter_row_t('part', drives(3), 'integral', 'N/(m s)', not_negative, 'I', optional=.true.), &
     parameter_row_t('part', drives(3), 'derivative', 'N s/m', not_negative, 'D', optional=.true.), &
     parameter_row_t('part', drives(3), 'sample_time', 's', not_negative, &
                     'time between samples, the force being held in between; 0: continuous', optional=.true.), &

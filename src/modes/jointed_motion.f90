@@ -7,7 +7,8 @@ module jointed_motion
   use control, only: error_of
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up, &
     turns_round
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, &
+    most_joints
   use jointed_flight, only: fly
   use jointed_flows, only: jointed_motion_t, prepare_jointed, ready, with_matrix
   use jointed_log, only: book_change, log_event
@@ -132,7 +133,9 @@ contains
         if (timed) then
           until = min(until, next_action(machine, state))
           if (until <= state%time) then
+            start = state
             call act(moving, state, ok, log)
+            if (present(log) .and. ok) call log_action(moving, start, state, log)
             if (.not. ok) reason = reason_step_failed
             if (.not. ok) exit
             cycle
@@ -263,12 +266,42 @@ contains
         end if
       end do
       ! What an impact or a cascade does to other joints.
-      do j = 1, size(machine%joints)
-        if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
-        call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, struck, log)
-      end do
+      call log_friction(machine, before, struck, stood, stands, told, log)
     end associate
   end subroutine log_transition
+
+  !> Friction that holds from here on, or no longer, where that is not `told` yet.
+  pure subroutine log_friction(machine, before, after, stood, stands, told, log)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before, after
+    logical, intent(in) :: stood(:), stands(:), told(:)
+    type(log_t), intent(inout) :: log
+    integer :: j
+    do j = 1, size(machine%joints)
+      if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
+      call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, after, log)
+    end do
+  end subroutine log_friction
+
+  !> What the sample of a controller or an impulse does to joints: friction holds or lets go, contacts open.
+  pure subroutine log_action(moving, before, after, log)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: before, after
+    type(log_t), intent(inout) :: log
+    complex(wp) :: turning(moving%harmonics)
+    logical :: told(size(moving%machine%joints))
+    integer :: j
+    associate (machine => moving%machine)
+      turning = turning_at(machine%frequency, before%time, moving%harmonics)
+      told = .false.
+      call log_friction(machine, before, after, stand_still(machine, before, turning), stand_still(machine, after, turning), &
+                        told, log)
+      do j = 1, size(machine%joints)
+        if (machine%joints(j)%kind /= joint_contact .or. before%phase(j) == 0 .or. after%phase(j) /= 0) cycle
+        call log_event(machine, event_barrier_release, j, before, after, log)
+      end do
+    end associate
+  end subroutine log_action
 
   !> Moves to the next section and starts the clock anew.
   pure subroutine advance_jointed_period(moving, state, tally, reason, log, transitions)

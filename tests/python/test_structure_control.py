@@ -134,6 +134,22 @@ axis = [{ name = "x0", from = -0.5, to = 0.5, count = 5 }, { name = "v0", from =
     assert largest == pytest.approx(pair["catalogue_multiplier"].values, abs=1e-6) and largest < 0.9
 
 
+def test_a_release_by_a_sample_is_an_event(separatrix: Path, tmp_path: Path):
+    """A block at rest slides from the sample on at which the force that is held exceeds its friction."""
+    block = "[body.block]\nmass = 1\n[friction.ground]\nbetween = ['block']\nforce = 2.5\n"
+    servo = SERVO.replace("frame", "block") + "sample_time = 0.05\n"
+    (tmp_path / "case.toml").write_text("run = { duration = 8 }\n" + block + servo)
+    succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path)
+    with open_result(tmp_path / "out.h5") as result:
+        names = result["event_kind"].attrs["flag_meanings"].split()
+        kinds = [names[number - 1] for number in result["event_kind"].values]
+        times = result["event_time"].values
+    # 2.7 sin 2t + 1.2 cos 2t: above 2.5 from t = 0.2983 on
+    assert kinds[0] == "release" and times[0] == pytest.approx(0.3)
+    assert set(kinds) == {"release", "stick"}
+    assert all(one != other for one, other in zip(kinds[:-1], kinds[1:], strict=True))
+
+
 @pytest.mark.parametrize(
     ("parts", "said"),
     [

@@ -83,21 +83,23 @@ contains
     moving = build(laws)
   end function machine_of_series
 
-  !> Machine number i with a force that a table gives, or two, or free play, or damping by the cube of the speed.
+  !> Machine number i with a force that a table gives, or two, or free play, or damping by the cube of the speed, or friction that
+  !> falls to zero on the way.
   function machine_of_tables(i) result(moving)
     integer, intent(in) :: i
     type(motion_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
-    character(len=*), parameter :: effects(0:7) = [character(len=130) :: &
+    character(len=*), parameter :: effects(0:9) = [character(len=130) :: &
       'friction_curve speed=0,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3', &
       'friction_curve speed=0.2,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3; effect asymmetric_friction coulomb=0.2', &
       'spring_curve stretch=-0.4,0,0.3,0.6 force=-5,0,2,9', 'force_curve place=0,0.3,0.5,1 force=1,-1,2,0', &
       'friction_place_curve place=0,0.5,1 change=0.3,-0.2,0.4', &
       'friction_place_curve place=0,0.5,1 change=0.3,-0.2,0.4; effect stribeck excess=1 velocity=0.2', &
-      'backlash gap=0.1 rounding=0.2', 'cubic_damping coefficient=0.1; effect spring_curve stretch=-0.4,0,0.3 force=-5,0,2']
+      'backlash gap=0.1 rounding=0.2', 'cubic_damping coefficient=0.1; effect spring_curve stretch=-0.4,0,0.3 force=-5,0,2', &
+      'friction_place_curve place=0.1,0.4,0.8,1.1 change=0.5,-1.2,-1.2,0.5', 'position_dependent_friction slope=-1.5']
     laws = laws_from('body point_mass mass=1 gravity=9.81; restoring linear stiffness=88.8 free_length=0.4; contact newton '// &
       'restitution=0.7 upper=1.1; friction coulomb kinetic_coefficient=0.1; drive fourier ratio=1 mean=0.31 '// &
-      'cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 8))))
+      'cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 10))))
     call set_parameter(laws, 'drive.ratio', uniform(0.4_wp, 2.3_wp))
     if (modulo(i, 5) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
     moving = build(laws)

@@ -132,7 +132,8 @@ def _with_more_foretold(
     rounds = list(decision.rounds)
     whole, others, closed = with_more(bench, rounds, best)
     sure = closed and all(whole.gates.values())
-    if not sure or closed_share(told, whole.prediction) < _CLOSES:
+    share = closed_share(told, whole.prediction)
+    if not sure or share is None or share < _CLOSES:
         return best, rivals
     decision.rounds = rounds
     return whole, others

@@ -130,10 +130,13 @@ def foretells(one: Judged, options: Options) -> bool:
     however unlike the segments are. It has to be beaten without the best segment too, or in so many of them
     that this is no chance (sign test).
     """
-    for number in np.unique(one.prediction.record):
+    records = np.unique(one.prediction.record)
+    # any of several records may be the one
+    least = options.separation + np.log(records.size)
+    for number in records:
         parts = one.held_out_parts[one.prediction.record == number] / one.prediction.misfit
         parts = parts[parts != 0]
-        if parts.sum() <= options.separation:
+        if parts.sum() <= least:
             continue
         better = int(np.sum(parts > 0))
         if parts.sum() > parts.max() or binom.sf(better - 1, parts.size, 0.5) < _CHANCE:
