@@ -432,7 +432,7 @@ def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
     ended = run(separatrix, "basin", "case.toml", "--validate", "--set", axes, folder=tmp_path)
     assert ended.code == 65
     assert "'axis.count': found 64000000" in ended.err
-    assert "allowed at most 28256363" in ended.err
+    assert "allowed at most 27889398" in ended.err
 
 
 def boundary(separatrix, folder):

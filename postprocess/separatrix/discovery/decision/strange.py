@@ -21,6 +21,8 @@ _FACTOR = 3.0
 _ALIKE, _UNITS = 0.8, 5.0
 # standard error of a mass over itself with which it is known
 _WELL = 0.1
+# share of a force that may be missed where its mass tells its units
+_LITTLE = 0.1
 _BARRIERS = ("contact.upper", "contact.lower")
 # reduced chi^2 of a record that a wrong drive would leave
 _MISSED = 10.0
@@ -75,8 +77,9 @@ def other_units(data: Data, model) -> list[str]:
         columns = [motion.a[at], motion.v[at], np.sign(motion.v[at]), np.ones(at.sum())]
         if "restoring.stiffness" in model.parameters:
             columns.append(motion.x[at])
-        mass, error = _mass(np.stack(columns, axis=1), record.force[at])
-        of_mass = factor is not None and error < _WELL * abs(mass)
+        mass, error, missed = _mass(np.stack(columns, axis=1), record.force[at])
+        # a force that is missing leans on the acceleration, too
+        of_mass = factor is not None and error < _WELL * mass and missed < _LITTLE
         if of_mass:
             factor = mass / one.mass
         if factor is not None and not 1 / _UNITS < factor < _UNITS:
@@ -96,16 +99,17 @@ def _factor(taken: np.ndarray, measured: np.ndarray) -> float | None:
     return product / size
 
 
-def _mass(columns: np.ndarray, force: np.ndarray) -> tuple[float, float]:
-    """Mass that a force needs beside what else there is, and its standard error [kg]; the acceleration is the
-    first of the columns.
+def _mass(columns: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
+    """Mass that a force needs beside what else there is, its standard error [kg], and the share of the force
+    that all of it misses; the acceleration is the first of the columns.
     """
     scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     found, _, _, _ = np.linalg.lstsq(columns / scale, force, rcond=1e-9)
     rest = force - columns / scale @ found
     variance = np.linalg.pinv((columns / scale).T @ (columns / scale), rcond=1e-12)[0, 0]
     error = np.sqrt(variance * float(rest @ rest) / max(1, force.size - columns.shape[1]))
-    return float(found[0] / scale[0]), float(error / scale[0])
+    missed = np.linalg.norm(rest) / max(np.linalg.norm(force - force.mean()), 1e-300)
+    return float(found[0] / scale[0]), float(error / scale[0]), float(missed)
 
 
 def other_drive(data: Data, base: Fitted) -> list[str]:
