@@ -43,39 +43,45 @@ contains
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
     if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
-    call warn_about_blow(the_case, moving, journal)
+    call warn_about_blow(the_case, journal)
     obstacle = section_obstacle(moving)
     if ((command == 'basin' .or. command == 'sweep') .and. len(obstacle) > 0) then
       call journal%line('warning', 'warning: no attractors are looked for: '//obstacle//'. Points get the regime at the end of '// &
         'their run')
     end if
     if (any(index(the_case%laws%name, 'structure:') == 1)) call warn_about_modes(the_case, journal)
+    call warn_about_impulses(the_case, journal)
     if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
-  !> Says if a blow, or an impulse of a structure, falls after the end.
-  subroutine warn_about_blow(the_case, moving, journal)
+  !> Says if a blow falls after the end.
+  subroutine warn_about_blow(the_case, journal)
     type(case_t), intent(in) :: the_case
-    type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
     real(wp) :: time
-    integer :: i
-    if (allocated(moving%jointed)) then
-      if (.not. allocated(moving%jointed%machine%impulses)) return
-      do i = 1, size(moving%jointed%machine%impulses)
-        time = moving%jointed%machine%impulses(i)%time
-        if (time <= the_case%run%duration) cycle
-        call journal%line('warning', 'warning: the impulse at '//to_text(time)//' s is after the end, run.duration = '// &
-          to_text(the_case%run%duration)//' s: it does not fall')
-      end do
-      return
-    end if
     if (.not. abs(parameter_value(the_case%laws, 'body.blow', 0.0_wp)) > 0) return
     time = parameter_value(the_case%laws, 'body.blow_time', 0.0_wp)
     if (time <= the_case%run%duration) return
     call journal%line('warning', 'warning: body.blow_time = '//to_text(time)//' s is after the end, run.duration = '// &
       to_text(the_case%run%duration)//' s: no blow falls')
   end subroutine warn_about_blow
+
+  !> Says which impulses of a structure fall after the end.
+  subroutine warn_about_impulses(the_case, journal)
+    type(case_t), intent(in) :: the_case
+    type(journal_t), intent(inout) :: journal
+    type(jointed_t) :: machine
+    type(error_t), allocatable :: error
+    integer :: i
+    if (.not. any(the_case%laws%family == 'body' .and. the_case%laws%name == 'structure')) return
+    call jointed_of(the_case%laws, machine, error)
+    if (allocated(error) .or. .not. allocated(machine%impulses)) return
+    do i = 1, size(machine%impulses)
+      if (machine%impulses(i)%time <= the_case%run%duration) cycle
+      call journal%line('warning', 'warning: the impulse at '//to_text(machine%impulses(i)%time)//' s is after the end, '// &
+        'run.duration = '//to_text(the_case%run%duration)//' s: it does not fall')
+    end do
+  end subroutine warn_about_impulses
 
   !> Says where a restitution is one of a flexible structure: it then depends on the number of modes.
   subroutine warn_about_modes(the_case, journal)
