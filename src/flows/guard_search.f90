@@ -27,18 +27,18 @@ contains
 
   !> The first falls within `duration` [s]: `time` is that of the first, `fallen` all guards that fall with it by no more than
   !> rounding; time = duration and none fallen if there is none. `extremes` are those of the watched coordinate on the way,
-  !> `top_speed` the largest of its speeds if `wants_speed`; `margin`, where it is asked for, the smallest gap at which a stop was
-  !> missed [m].
-  pure subroutine find_first(search, list, origin, duration, wants_speed, time, fallen, extremes, top_speed, evaluations, margin)
+  !> `top_speed` the largest of its speeds if `wants_speed`; `margin` the smallest gap at which a stop was missed [m] if
+  !> `wants_margin`.
+  pure subroutine find_first(search, list, origin, duration, wants_speed, wants_margin, time, fallen, extremes, top_speed, &
+                             margin, evaluations)
     type(search_t), intent(in) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: origin, duration
-    logical, intent(in) :: wants_speed
+    logical, intent(in) :: wants_speed, wants_margin
     real(wp), intent(out) :: time
     logical, intent(out) :: fallen(:)
-    real(wp), intent(inout) :: extremes(2), top_speed
+    real(wp), intent(inout) :: extremes(2), top_speed, margin
     integer, intent(out) :: evaluations
-    real(wp), intent(inout), optional :: margin
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp), dimension(0:3, search%functions) :: here, there
     real(wp), dimension(most_guards) :: certified, root
@@ -73,12 +73,12 @@ contains
         fallen(:search%guards) = root(:search%guards) <= time + tie
         call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
                    top_speed, evaluations)
-        if (present(margin)) call note_misses(search, list, a, time, here, fallen, margin, evaluations)
+        if (wants_margin) call note_misses(search, list, a, time, here, fallen, margin, evaluations)
         return
       end if
       call watch(search, a, b, here(:, search%functions), there(:, search%functions), .false., wants_speed, extremes, &
                  top_speed, evaluations)
-      if (present(margin)) call note_misses(search, list, a, b, here, fallen, margin, evaluations)
+      if (wants_margin) call note_misses(search, list, a, b, here, fallen, margin, evaluations)
       a = b
       here = there
       panels = panels + 1

@@ -51,13 +51,8 @@ contains
     call begin_path(machine, flow, state, path)
     if (flow%modal) then
       call prepare_search(machine, flow, path, list, count_guards, machine%watched, search)
-      if (watch%wants_margin) then
-        call find_first(search, list, path%start, until - path%start, watch%wants_speed, time, fallen, watch%extremes, &
-                        watch%top_speed, evaluations, watch%margin)
-      else
-        call find_first(search, list, path%start, until - path%start, watch%wants_speed, time, fallen, watch%extremes, &
-                        watch%top_speed, evaluations)
-      end if
+      call find_first(search, list, path%start, until - path%start, watch%wants_speed, watch%wants_margin, time, fallen, &
+                      watch%extremes, watch%top_speed, watch%margin, evaluations)
       watch%evaluations = watch%evaluations + evaluations
       call path_at(machine, flow, path, time, state%q, state%v)
     else

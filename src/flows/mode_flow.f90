@@ -8,7 +8,7 @@
 module mode_flow
   use boxed_forces, only: dependent, shared_inverse
   use eigen, only: general_eigen, modulus, solve_complex, symmetric_eigen, undamped_modes
-  use jointed, only: joint_contact, joint_soft, jointed_t, offset_of
+  use jointed, only: integral_of, joint_contact, joint_soft, jointed_t, offset_of
   use jointed_state, only: is_held
   use kinds, only: wp
   use matrices, only: solve
@@ -61,20 +61,11 @@ contains
     harmonics = harmonics_of(machine)
     call set_constraints(machine, flow)
     call set_forcing(machine, flow, harmonics, forcing, surface)
-    if (adds_up(machine)) then
-      flow%modal = .false.
-    else
-      call set_modes(machine, flow, forcing, surface)
-    end if
+    ! An integral makes the stiffness unsymmetric, which has no undamped modes.
+    flow%modal = integral_of(machine) == 0
+    if (flow%modal) call set_modes(machine, flow, forcing, surface)
     if (with_matrix .or. .not. flow%modal) call set_matrix(machine, flow, forcing, surface)
   end subroutine build_flow
-
-  !> Whether a controller adds up what it sees: its integral makes the stiffness unsymmetric, which has no undamped modes.
-  pure logical function adds_up(machine)
-    type(jointed_t), intent(in) :: machine
-    adds_up = .false.
-    if (allocated(machine%controller)) adds_up = machine%controller%integral_at > 0
-  end function adds_up
 
   pure subroutine stiffen(flow, row, stiffness, damping)
     type(mode_flow_t), intent(inout) :: flow

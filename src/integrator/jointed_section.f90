@@ -4,7 +4,7 @@
 !> A jointed structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
 !> the springs of elastic friction.
 module jointed_section
-  use jointed, only: joint_contact, joint_elastic, joint_soft
+  use jointed, only: is_stop, joint_contact, joint_elastic
   use jointed_flows, only: without_contacts
   use jointed_motion, only: advance_jointed_period, jointed_motion_t, prepare_jointed, start_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
@@ -49,11 +49,6 @@ contains
     call prepare_jointed(without_contacts(moving%machine), moving%options, free)
     if (size(free%speeds, 2) == size(moving%speeds, 2)) places = size(moving%directions, 2) - size(free%directions, 2)
   end subroutine free_jointed
-
-  pure elemental logical function is_stop(kind)
-    integer, intent(in) :: kind
-    is_stop = kind == joint_contact .or. kind == joint_soft
-  end function is_stop
 
   !> Whether a structure on the section comes no nearer to a stop in the next `periods` than displacements of all places by
   !> `distance` [m] would close.

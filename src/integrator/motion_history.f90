@@ -5,6 +5,7 @@
 module motion_history
   use contact_law, only: contact_at_speed, force_on_body
   use drive_law, only: foot_motion
+  use jointed, only: integral_of
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: log_t
@@ -52,9 +53,7 @@ contains
       associate (machine => moving%jointed%machine)
         do i = 1, log%samples
           velocity = log%sample_coordinates(machine%n + 1:, i)
-          if (allocated(machine%controller)) then
-            if (machine%controller%integral_at > 0) velocity(machine%controller%integral_at) = 0
-          end if
+          if (integral_of(machine) > 0) velocity(integral_of(machine)) = 0
           kinetic(i) = 0.5_wp*sum(velocity*matmul(machine%mass, velocity))
         end do
       end associate

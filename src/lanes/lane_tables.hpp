@@ -64,16 +64,15 @@ LANE_DEVICE inline mask keep_in_piece(const vec *c, const table_piece &piece, ma
     room[0] += side * pick(above, piece.high, piece.low);
     lost = fall<order - 1>(room, leaves, vec(1.0), end);
   }
-  mask within = ~doubtful;
+  mask within = ~lost;
   for (int s = -1; s <= 1; s += 2) {
     for (int k = 0; k < order; k++)
       room[k] = -double(s) * scaled[k];
     room[0] += s > 0 ? piece.high : -piece.low;
-    mask positive = positive_until(room, doubtful, end);
-    within = s < 0 ? within | positive : within & (positive | ~doubtful);
+    within = within & (~doubtful | positive_until(room, doubtful, end));
   }
   put(length, leaves & ~lost, end * length);
-  return within & ~lost;
+  return within;
 }
 
 // The same for every table: the steps `length` end where the first piece is left. Returns the lanes that are

@@ -8,8 +8,8 @@ module assembly
   use eigen, only: symmetric_eigen, undamped_modes
   use errors, only: error_t, fail
   use friction_law, only: same_shape
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, most_degrees, most_joints, &
-    name_length, wave_t
+  use jointed, only: is_stop, joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, most_degrees, &
+    most_joints, name_length, wave_t
   use jointed_state, only: is_curved
   use kinds, only: wp
   use matrices, only: solve
@@ -384,7 +384,7 @@ contains
     do i = 1, size(machine%joints)
       associate (joint => machine%joints(i))
         if (joint%kind == joint_friction .or. joint%kind == joint_elastic) largest = largest + joint%friction%break_away
-        if (joint%kind == joint_contact .or. joint%kind == joint_soft) then
+        if (is_stop(joint%kind)) then
           if (joint%upper < huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%upper))
           if (joint%lower > -huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%lower))
         end if

@@ -5,7 +5,7 @@
 module control
   use assembly, only: add_body, add_force
   use errors, only: error_t, fail
-  use jointed, only: controller_t, impulse_t, jointed_t, wave_value
+  use jointed, only: controller_t, impulse_t, integral_of, jointed_t, wave_value
   use jointed_state, only: jointed_state_t, running_control
   use kinds, only: wp
   use status, only: exit_bad_case
@@ -123,12 +123,9 @@ contains
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
     bodies = state
-    if (.not. allocated(machine%controller)) return
-    associate (at => machine%controller%integral_at)
-      if (at == 0) return
-      bodies%q(at) = 0
-      bodies%v(at) = 0
-    end associate
+    if (integral_of(machine) == 0) return
+    bodies%q(integral_of(machine)) = 0
+    bodies%v(integral_of(machine)) = 0
   end function bodies_of
 
 end module control

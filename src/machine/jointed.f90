@@ -12,7 +12,7 @@ module jointed
   implicit none
   private
 
-  public :: wave_value, offset_of
+  public :: wave_value, offset_of, is_stop, integral_of
 
   !> One joint more than a machine may have: the section of a motion without a clock.
   integer, parameter, public :: most_degrees = 16, most_joints = 13
@@ -129,6 +129,19 @@ contains
       if (present(curvature)) curvature = curvature - w**2*real(now)
     end do
   end subroutine wave_value
+
+  !> Whether a joint is a stop, rigid or soft.
+  pure elemental logical function is_stop(kind)
+    integer, intent(in) :: kind
+    is_stop = kind == joint_contact .or. kind == joint_soft
+  end function is_stop
+
+  !> Number of the coordinate that is the integral of what a controller sees, 0 without one.
+  pure integer function integral_of(machine) result(at)
+    type(jointed_t), intent(in) :: machine
+    at = 0
+    if (allocated(machine%controller)) at = machine%controller%integral_at
+  end function integral_of
 
   !> Harmonic m of the offset of a joint, 0 if it has none.
   pure complex(wp) function offset_of(joint, m) result(amplitude)

@@ -3,7 +3,7 @@
 
 !> A jointed structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
 module jointed_flows
-  use jointed, only: joint_contact, joint_section, joint_soft, joint_t, jointed_t, most_degrees
+  use jointed, only: is_stop, joint_contact, joint_section, joint_t, jointed_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: flight_adaptive, options_t
@@ -74,16 +74,9 @@ contains
   !> The same machine without stops.
   pure type(jointed_t) function without_contacts(machine) result(free)
     type(jointed_t), intent(in) :: machine
-    integer :: j, k
+    integer :: j
     free = machine
-    deallocate (free%joints)
-    allocate (free%joints(count(machine%joints%kind /= joint_contact .and. machine%joints%kind /= joint_soft)))
-    k = 0
-    do j = 1, size(machine%joints)
-      if (machine%joints(j)%kind == joint_contact .or. machine%joints(j)%kind == joint_soft) cycle
-      k = k + 1
-      free%joints(k) = machine%joints(j)
-    end do
+    free%joints = machine%joints(pack([(j, j=1, size(machine%joints))], .not. is_stop(machine%joints%kind)))
   end function without_contacts
 
   !> The section of a machine without a clock: the maxima of the watched coordinate; its minima where a rigid stop cuts the

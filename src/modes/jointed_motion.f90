@@ -7,8 +7,7 @@ module jointed_motion
   use control, only: error_of
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up, &
     turns_round
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, &
-    most_joints
+  use jointed, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, most_joints
   use jointed_flight, only: fly
   use jointed_flows, only: jointed_motion_t, prepare_jointed, ready, with_matrix
   use jointed_log, only: book_change, log_event
@@ -81,12 +80,8 @@ contains
           end select
         end associate
       end do
-      if (allocated(machine%controller)) then
-        ! Its integral grows by what it sees.
-        associate (at => machine%controller%integral_at)
-          if (at > 0) call error_of(machine, state, turning, state%v(at), u)
-        end associate
-      end if
+      ! The integral of a controller grows by what that sees.
+      if (integral_of(machine) > 0) call error_of(machine, state, turning, state%v(integral_of(machine)), u)
       call settle(moving, state, turning, at_rest, touching, ok)
     end associate
   end subroutine start_jointed

@@ -289,7 +289,8 @@ contains
     integer, intent(in) :: j, side
     logical, intent(out) :: at_rest(:), along(:), ends
     type(jointed_state_t) :: back
-    real(wp) :: a(moving%machine%n), jerk(moving%machine%n), s, u, given, opening, closing, change, last, speed, e, shrink
+    real(wp), dimension(moving%machine%n) :: a, jerk, a_back
+    real(wp) :: s, u, given, opening, closing, change, last, speed, e, shrink
     integer :: i
     ends = .false.
     at_rest = .false.
@@ -311,8 +312,8 @@ contains
         if (along(i)) back%phase(i) = -state%phase(i)
       end do
       if (any(along)) then
-        call accelerations_of(machine, back, turning, jerk)
-        closing = -side*(sum(machine%joints(j)%row*jerk) + given)
+        call accelerations_of(machine, back, turning, a_back)
+        closing = -side*(sum(machine%joints(j)%row*a_back) + given)
         if (.not. (closing < 0 .and. closing >= opening)) return
         shrink = e*sqrt(closing/opening)
         last = max(last, (abs(u)/(-opening) + abs(u)/sqrt(closing*opening))/(1 - shrink))

@@ -5,7 +5,7 @@
 !> anywhere, and looks the same from a frame that moves along.
 module section_directions
   use eigen, only: symmetric_eigen
-  use jointed, only: joint_contact, joint_friction, joint_section, joint_soft, jointed_t, most_degrees
+  use jointed, only: integral_of, is_stop, joint_friction, joint_section, jointed_t, most_degrees
   use kinds, only: wp
   implicit none
   private
@@ -65,7 +65,7 @@ contains
     depends = without_signs(machine%stiffness)
     do j = 1, size(machine%joints)
       if (any(machine%joints(j)%kind == [joint_friction, joint_section])) cycle
-      if (.not. stops .and. any(machine%joints(j)%kind == [joint_contact, joint_soft])) cycle
+      if (.not. stops .and. is_stop(machine%joints(j)%kind)) cycle
       do i = 1, n
         depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
       end do
@@ -89,12 +89,10 @@ contains
       end do
     end do
     if (.not. (machine%driven .or. machine%section_time > 0) .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)
-    if (allocated(machine%controller)) then
+    if (integral_of(machine) > 0) then
       ! What a controller sees tells how its integral grows.
-      associate (at => machine%controller%integral_at)
-        if (at > 0) depends(:, at) = 0
-        if (at > 0) depends(at, :) = 0
-      end associate
+      depends(:, integral_of(machine)) = 0
+      depends(integral_of(machine), :) = 0
     end if
     call span_of(depends, directions, count_directions)
   end subroutine speeds_of

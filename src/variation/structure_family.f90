@@ -10,7 +10,8 @@ module structure_family
   use guarded_march, only: most_equations
   use guards, only: leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
   use hybrid_machine, only: event_t, most_states
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, most_joints
+  use jointed, only: integral_of, is_stop, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, &
+    most_joints
   use jointed_motion, only: advance_jointed_period, advance_to_turn, jointed_motion_t, prepare_jointed, start_jointed
   use jointed_section, only: start_of_jointed
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
@@ -51,13 +52,11 @@ contains
       why = 'it has too many coordinates for a law that is not linear'
     end if
     if (acts_on_time(moving%machine)) why = 'impulses, or samples of a controller, come at times of their own'
-    if (allocated(moving%machine%controller)) then
-      if (moving%machine%controller%integral_at > 0) why = 'a controller adds up what it sees'
-    end if
+    if (integral_of(moving%machine) > 0) why = 'a controller adds up what it sees'
     do j = 1, count_joints(moving%machine)
       associate (joint => moving%machine%joints(j))
         if (joint%contact%by_impact .and. joint%kind == joint_soft) why = 'the damping of a contact is set by each impact'
-        if (abs(joint%offset%rate) > 0 .and. any(joint%kind == [joint_contact, joint_soft, joint_spring])) then
+        if (abs(joint%offset%rate) > 0 .and. (is_stop(joint%kind) .or. joint%kind == joint_spring)) then
           why = 'a stop or a spring runs on with its surface'
         end if
         if (joint%kind /= joint_friction) cycle
