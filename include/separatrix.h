@@ -107,6 +107,37 @@ int separatrix_segments(const separatrix_model *model, int chosen_count, const i
                         int *impacts, int *steady, int *reason, int impact_capacity, int *impact_count,
                         int *impact_segment, double *impact, char *message, size_t message_size);
 
+/* Name of coordinate `index`, from 0, of a structure: a body, or a point or an inner coordinate of one of its
+ * parts. Code 64 beyond the last; other machines have none. */
+int separatrix_coordinate(const separatrix_model *model, int index, char *name, size_t name_size,
+                          char *message, size_t message_size);
+
+/* Name of contact `index`, from 0, of a structure. Code 64 beyond the last. */
+int separatrix_contact(const separatrix_model *model, int index, char *name, size_t name_size, char *message,
+                       size_t message_size);
+
+/* As separatrix_segments, of a structure with coordinate_count coordinates. What differs:
+ *
+ * In:
+ *   start [segment_count][2*coordinate_count + 1]
+ *     places [m], then velocities [m/s] of all coordinates, crank angle [rad]; springs of elastic friction
+ *     start without stretch
+ * Out:
+ *   motion [m][2*coordinate_count]
+ *     places, then velocities at the samples
+ *   jacobian [m][2*coordinate_count][direction_count + 2*coordinate_count + 1]
+ *     their derivatives along the directions, then by places, velocities and crank angle of the start
+ *   impact [impact_capacity][5]
+ *     time since the start of the segment [s], number of the contact from 0, speed of its ends against each
+ *     other before and after [m/s], +1 upper or -1 lower stop */
+int separatrix_coordinate_segments(const separatrix_model *model, int chosen_count, const int *chosen,
+                                   const double *values, int direction_count, const double *directions,
+                                   int segment_count, int coordinate_count, const double *start,
+                                   const int *first, const double *times, int derivatives, double tolerance,
+                                   double *motion, double *jacobian, int *impacts, int *steady, int *reason,
+                                   int impact_capacity, int *impact_count, int *impact_segment,
+                                   double *impact, char *message, size_t message_size);
+
 /* Numbers of a sample, an event and the summary of a trajectory, and of an attractor and a label. */
 enum {
   separatrix_sample_numbers = 13,

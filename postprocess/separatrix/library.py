@@ -17,11 +17,21 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.errors import CaseError
+from separatrix.errors import USAGE, CaseError
 from separatrix.program import NATIVE, SOURCE_TREE
 from separatrix.structures.inline import inlined
 
-__all__ = ["CaseError", "Effect", "Impacts", "Model", "Parameter", "Segments", "effects", "library_path"]
+__all__ = [
+    "CaseError",
+    "CoordinateSegments",
+    "Effect",
+    "Impacts",
+    "Model",
+    "Parameter",
+    "Segments",
+    "effects",
+    "library_path",
+]
 
 _NONE = 1e308  # bounds beyond this mean that there is none
 _TEXT = 4096
@@ -86,6 +96,24 @@ class Segments:
     velocity_jacobian: np.ndarray | None
     impacts: np.ndarray
     impact: Impacts
+    steady: np.ndarray
+    reason: np.ndarray
+
+
+@dataclass(frozen=True)
+class CoordinateSegments:
+    """Samples of all segments of a structure, one after the other.
+
+    `motion` (samples, 2 n): places, then velocities of the n coordinates. `jacobian` (samples, 2 n, columns):
+    by the directions, then by places, velocities and crank angle of the start. The `side` of an impact is
+    that of `contact`, which is counted from 0. All else is as in `Segments`.
+    """
+
+    motion: np.ndarray
+    jacobian: np.ndarray | None
+    impacts: np.ndarray
+    impact: Impacts
+    contact: np.ndarray
     steady: np.ndarray
     reason: np.ndarray
 
@@ -239,6 +267,88 @@ class Model:
         time, before, after, side = impact[: found.value].T
         impacts = Impacts(impact_segment[: found.value], time, before, after, side.astype(int))
         return Segments(x, v, *slopes, report[0], impacts, report[1].astype(bool), report[2])
+
+    @functools.cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of a structure; none for other machines."""
+        return self._names("separatrix_coordinate")
+
+    @functools.cached_property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts of a structure; none for other machines."""
+        return self._names("separatrix_contact")
+
+    def _names(self, function: str) -> tuple[str, ...]:
+        found: list[str] = []
+        name = ctypes.create_string_buffer(_TEXT)
+        while True:
+            try:
+                _call(function, self._handle, len(found), name, _size(name))
+            except CaseError as reason:
+                if reason.code != USAGE:
+                    raise
+                return tuple(found)
+            found.append(name.value.decode())
+
+    def coordinate_segments(
+        self,
+        active: Sequence[str],
+        values: np.ndarray,
+        start: np.ndarray,
+        first: np.ndarray,
+        times: np.ndarray,
+        derivatives: bool = True,
+        tolerance: float = 1e-10,
+        directions: np.ndarray | None = None,
+    ) -> CoordinateSegments:
+        """Fly many segments of a structure; `start` (segments, 2 n + 1): places, velocities, crank angle.
+
+        All else is as for `segments`.
+        """
+        n = len(self.coordinates)
+        chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
+        start = _array(start, (len(start), 2 * n + 1), "start")
+        if directions is None:
+            directions = np.eye(len(active))
+        if not derivatives:
+            directions = np.zeros((0, len(active)))
+        directions = _array(directions, (len(directions), len(active)), "directions")
+        count = len(start)
+        first = np.ascontiguousarray(first, np.int32)
+        if first.shape != (count + 1,):
+            raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
+        times = _array(times, (int(first[-1]),), "times")
+        motion = np.empty((times.size, 2 * n))
+        slopes = np.empty((times.size, 2 * n, len(directions) + 2 * n + 1)) if derivatives else None
+        report = np.zeros((3, count), np.int32)
+        room = 4 * count + 64
+        while True:
+            found = ctypes.c_int()
+            impact_segment, impact = np.empty(room, np.int32), np.empty((room, 5))
+            _call(
+                "separatrix_coordinate_segments",
+                self._handle,
+                *chosen,
+                len(directions),
+                _pointer(directions),
+                count,
+                n,
+                *(_pointer(array) for array in (start, first, times)),
+                int(derivatives),
+                ctypes.c_double(tolerance),
+                *(_pointer(array) for array in (motion, slopes, *report)),
+                room,
+                ctypes.byref(found),
+                _pointer(impact_segment),
+                _pointer(impact),
+            )
+            if found.value <= room:
+                break
+            room = found.value
+        time, contact, before, after, side = impact[: found.value].T
+        impacts = Impacts(impact_segment[: found.value], time, before, after, side.astype(int))
+        done = (report[1].astype(bool), report[2])
+        return CoordinateSegments(motion, slopes, report[0], impacts, contact.astype(int), *done)
 
     def _parameter(self, index: int) -> tuple[str, Parameter]:
         path, unit = ctypes.create_string_buffer(_TEXT), ctypes.create_string_buffer(_TEXT)

@@ -8,16 +8,17 @@ module c_segments
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
+  use machine_facts, only: is_one_body
   use model_type, only: check_values, laws_with_force, model_options, model_t
   use segments, only: propagate, report_t, samples_t
-  use status, only: exit_usage
+  use status, only: exit_bad_case, exit_usage
   use text, only: to_text
   use variants, only: family_t, prepare_family
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none
   private
 
-  public :: separatrix_segments
+  public :: separatrix_segments, check_directions, check_length, check_samples, check_tolerance
 
   !> Drive periods that a segment may last.
   real(wp), parameter :: most_periods = 1e5_wp
@@ -91,17 +92,28 @@ contains
     if (allocated(error)) return
     call check_directions(directions, derivatives, error)
     if (allocated(error)) return
-    if (.not. (tolerance >= 1e-15_wp .and. tolerance <= 1e-3_wp)) then
-      call fail(error, exit_usage, 'tolerance: found '//to_text(tolerance)//', allowed from 1e-15 to 1e-3')
-      return
-    end if
+    call check_tolerance(tolerance, error)
+    if (allocated(error)) return
     call laws_with_force(self, interval, force, laws, error)
     if (allocated(error)) return
     call prepare_family(laws, model_options(self, tolerance), self%parameters(chosen), values, directions, derivatives, &
                         family, error)
-    if (.not. allocated(error)) call check_length(family, times, error)
+    if (allocated(error)) return
+    if (.not. is_one_body(family%moving)) then
+      call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
+      return
+    end if
+    call check_length(family%moving%machine%period, times, error)
     if (.not. allocated(error)) call propagate(family, start, first, times, derivatives, samples, report)
   end subroutine fly
+
+  !> Code 64 beyond the tolerances of an adaptive flight.
+  subroutine check_tolerance(tolerance, error)
+    real(wp), intent(in) :: tolerance
+    type(error_t), allocatable, intent(out) :: error
+    if (tolerance >= 1e-15_wp .and. tolerance <= 1e-3_wp) return
+    call fail(error, exit_usage, 'tolerance: found '//to_text(tolerance)//', allowed from 1e-15 to 1e-3')
+  end subroutine check_tolerance
 
   !> Directions are finite, and asked for only with derivatives. Code 64.
   subroutine check_directions(directions, derivatives, error)
@@ -148,14 +160,14 @@ contains
     end do
   end subroutine check_samples
 
-  subroutine check_length(family, times, error)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: times(:)
+  !> Samples lie within so many drive periods of `period` [s]. Code 64.
+  subroutine check_length(period, times, error)
+    real(wp), intent(in) :: period, times(:)
     type(error_t), allocatable, intent(out) :: error
     if (size(times) == 0) return
-    if (maxval(times) > most_periods*family%moving%machine%period) then
+    if (maxval(times) > most_periods*period) then
       call fail(error, exit_usage, 'times: found '//to_text(maxval(times))//' s, allowed at most '// &
-                to_text(most_periods)//' drive periods of '//to_text(family%moving%machine%period)//' s')
+                to_text(most_periods)//' drive periods of '//to_text(period)//' s')
     end if
   end subroutine check_length
 

@@ -12,10 +12,9 @@ module variants
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
-  use machine_facts, only: is_one_body
   use motion, only: motion_t
   use motion_state, only: flight_adaptive, options_t
-  use natural_scale, only: natural_size, scales_of, scales_t
+  use natural_scale, only: natural_size, scales_of, scales_of_structure, scales_t
   use parameter_list, only: parameter_t, put_values
   use status, only: exit_bad_case
   implicit none
@@ -57,7 +56,7 @@ module variants
     type(variant_t), allocatable :: further(:), back(:)
     !> Components of the directions along bias, gain and delay of the sensor, by column.
     real(wp), allocatable :: of_sensor(:, :)
-    !> Steps of x [m], v [m/s] and crank angle [rad] of a start.
+    !> Steps of places [m], velocities [m/s] and crank angle [rad] of a start.
     real(wp) :: start_step(3) = 0
     !> Distance to a barrier [m] and speed of an impact [m/s] below which a motion grazes: there a step changes the speed of
     !> the impact by more than a hundredth.
@@ -77,7 +76,7 @@ contains
 
   !> Builds the machine of `laws` with `values` in the parameters `chosen`, and if `derivatives` its neighbours: column j of
   !> `directions` is direction j, its change of each chosen parameter (in the unit of that) per unit of the way along it.
-  !> Code 65 if a machine cannot be built or has two bodies.
+  !> Code 65 if a machine cannot be built.
   pure subroutine prepare_family(laws, options, chosen, values, directions, derivatives, family, error)
     type(law_choice_t), intent(in) :: laws(:)
     type(options_t), intent(in) :: options
@@ -92,12 +91,12 @@ contains
     plan = plan_t(laws, options, chosen, values, directions)
     call build(plan, values, .false., family%moving, error)
     if (allocated(error)) return
-    if (.not. is_one_body(family%moving)) then
-      call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
-      return
-    end if
     if (.not. derivatives) return
-    plan%scales = scales_of(family%moving%machine)
+    if (allocated(family%moving%jointed)) then
+      plan%scales = scales_of_structure(family%moving%jointed%machine)
+    else
+      plan%scales = scales_of(family%moving%machine)
+    end if
     share = share_of(options, all_exact(family%moving))
     family%start_step = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
     family%least_clearance = 10*family%start_step(1)
@@ -124,7 +123,11 @@ contains
   !> Whether no mode of a machine is flown adaptively.
   pure logical function all_exact(moving)
     type(motion_t), intent(in) :: moving
-    all_exact = moving%exact .and. .not. moving%layer > 0 .and. .not. moving%machine%contact%soft
+    if (allocated(moving%jointed)) then
+      all_exact = moving%jointed%machine%linear .and. moving%jointed%options%flight /= flight_adaptive
+    else
+      all_exact = moving%exact .and. .not. moving%layer > 0 .and. .not. moving%machine%contact%soft
+    end if
   end function all_exact
 
   !> Step relative to the size of a quantity.

@@ -137,7 +137,9 @@ def test_what_was_not_tested_is_in_the_order_of_the_catalogue(monkeypatch):
     names = ["viscous", "dahl", "cubic_spring", "offset_force", "sensor_delay"]
     fits = SimpleNamespace(values=[], reduced_chi2=1.0, like_noise=lambda _: False)
     monkeypatch.setattr(
-        rounds, "candidate", lambda *words: "the machine has no friction" if words[3] == "dahl" else object()
+        rounds,
+        "candidate_of",
+        lambda *words: "the machine has no friction" if words[3] == "dahl" else object(),
     )
     monkeypatch.setattr(rounds, "signature", lambda *_: None)
     monkeypatch.setattr(rounds, "screen", lambda *_: None)
@@ -329,7 +331,7 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         return found
 
     monkeypatch.setattr(
-        rounds, "candidate", lambda model, free, names, name, _: SimpleNamespace(names=(*names, name))
+        rounds, "candidate_of", lambda model, free, names, name, _: SimpleNamespace(names=(*names, name))
     )
     gain = {"dahl": 1.0, "viscous": 2.0}
     seen = SimpleNamespace(seen=lambda name: True, names=list(gain), gain=gain)

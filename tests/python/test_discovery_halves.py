@@ -39,10 +39,9 @@ def test_a_doubtful_law_is_left_out(library, monkeypatch, errors, gained, conver
         return SimpleNamespace(values=values, converged=True)
 
     monkeypatch.setattr(halves_module, "gain_over", lambda one, other: (gained, None))
-    monkeypatch.setattr(halves_module, "Problem", lambda model, prepared, segments, free: free)
     monkeypatch.setattr(halves_module, "minimise", minimise)
     monkeypatch.setattr(halves_module, "polished", lambda data, problem, fit, *rest, **more: fit)
-    data = SimpleNamespace(prepared=[], stages=[None], last=0)
+    data = SimpleNamespace(last=0, problem=lambda model, stage, free: free)
     found = list(halves(data, base, one, whole))
     if not split:
         assert not found

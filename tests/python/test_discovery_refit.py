@@ -31,9 +31,8 @@ def fit(values: list[float], chi2: float) -> Fit:
 def test_a_candidate_is_fitted_from_the_base_before_it_is_worse(
     monkeypatch, linear, lowest, wanted, converged
 ):
-    monkeypatch.setattr(refit, "Problem", lambda *_: None)
     monkeypatch.setattr(refit, "minimise", lambda problem, values, starts: fit(values, lowest))
-    data = SimpleNamespace(prepared=[], stages=[None], last=0)
+    data = SimpleNamespace(last=0, problem=lambda *_: None)
     base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 100.0), ())
     candidate = SimpleNamespace(
         names=("viscous",), model=None, free=FREE, added=(1,), linear=np.array([linear])

@@ -19,6 +19,7 @@ from separatrix.discovery.fitting.catalogue import within_barriers
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import sample_times
+from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.wording import units_of, with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
@@ -157,7 +158,7 @@ def machine_values(fitted: Fitted) -> dict[str, float]:
     for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
         if one.path == "nuisance:drive_scale":
             values |= {path: float(value) * size for path, size in fitted.problem.amplitudes.items()}
-    if fitted.problem.prepared[0].frequency is not None:
+    if fitted.problem.prepared[0].frequency is not None and "drive.ratio" in fitted.model.parameters:
         # a ratio to the natural frequency: that of the drive stays what it is in the base case
         model = fitted.model
         ratio = model.parameters["drive.ratio"].value
@@ -197,6 +198,12 @@ def write_details(path: Path, findings: Findings) -> None:
                 group.attrs["sigma"] = prepared.sigma
                 group.attrs["held_out"] = data is bench.held_out
                 group["t"], group["x"] = prepared.record.t, prepared.record.x
+                if isinstance(prepared, SensedPrepared):
+                    # no motion of one body: what each sensor shows
+                    for sensor in prepared.sensors:
+                        group[sensor.name] = sensor.values
+                        group[sensor.name].attrs["sigma"] = sensor.sigma
+                    continue
                 if prepared.in_force:
                     group["force"] = prepared.record.force
                 group["smoothed"] = smoothed.state

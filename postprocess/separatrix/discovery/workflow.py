@@ -15,27 +15,22 @@ from separatrix.discovery.decision.partial import decide_in_part, nearest
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.decision.verdict import Findings, verdict_of
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
-from separatrix.discovery.fitting.data import fit_stages, gather, scales_of
+from separatrix.discovery.fitting.data import Data, fit_stages, gather, scales_of
 from separatrix.discovery.fitting.machine import on_other_records, with_values
+from separatrix.discovery.fitting.places import place_scales
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.sensed import gather_sensed
+from separatrix.discovery.measured.bodies import is_pair, is_structure, pair_as_structure, structure_of
 from separatrix.discovery.measured.in_force import prepare_force
 from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import Record, read_record, unique_names
+from separatrix.discovery.measured.sensors import prepare_sensors
 from separatrix.discovery.options import Options
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
 
 # share of an only record that is held out, and drive periods that it has at least
 _END, _END_PERIODS = 0.3, 2.05
-_TWO_BODIES = (
-    'body.law: found two bodies, allowed for a base machine "point_mass", which the driven body is in the '
-    "coordinate of the driving one under a measured force (docs/discovery-guide.md, Base machines)"
-)
-
-_STRUCTURE = (
-    'body.law: found several bodies or a structure, allowed for a base machine "point_mass": effects belong '
-    "to one body, and segments of others are not flown yet (docs/discovery-guide.md, Base machines)"
-)
 
 
 def discover(
@@ -67,13 +62,14 @@ def investigate(
     unique_names([*training, *held_out])
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[_prepared(one, model, still, options) for one in group] for group in (training, held_out)]
-    data = gather(prepared[0], options.segment_periods, options.segment_seconds)
-    foretold = gather(prepared[1], options.segment_periods, options.segment_seconds) if held_out else None
-    scales = scales_of(data, model)
+    data = _gathered(prepared[0], model, options)
+    foretold = _gathered(prepared[1], model, options) if held_out else None
+    scales = None if is_structure(model) else scales_of(data, model)
     options.progress("fitting the base machine", 0.05)
-    fitted = fit_base(data, model, scales.mass)
+    fitted = fit_base(data, model, scales.mass if scales else 1.0)
     if not fitted.fit.good.any():
         raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
+    scales = scales or place_scales(fitted.problem, fitted.fit)
     if foretold is not None:
         _prepare_held_out(foretold, data, model, fitted, scales.mass)
     bench = Bench(data, foretold, scales, options)
@@ -91,6 +87,12 @@ def investigate(
     return verdict, findings
 
 
+def _gathered(prepared: list[Prepared], model, options: Options) -> Data:
+    if is_structure(model):
+        return gather_sensed(prepared, options.segment_periods, options.segment_seconds, model)
+    return gather(prepared, options.segment_periods, options.segment_seconds)
+
+
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
     """Noise and phases of the held-out records, measured on short segments with the machine as fitted."""
     free = with_values(fitted.problem.free, fitted.fit.values)
@@ -104,10 +106,13 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
 def _model(base: object):
     named = isinstance(base, str | Path)
     model = Model.read(base) if named else base
-    refused = {"body.driven_mass": _TWO_BODIES, "body.in_sequence": _STRUCTURE}
-    for path, why in refused.items():
-        if path in model.parameters:
-            raise SeparatrixError(f"{base}: {why}" if named else why)
+    try:
+        if is_pair(model):
+            model = pair_as_structure(model)
+        if is_structure(model):
+            structure_of(model)
+    except SeparatrixError as error:
+        raise SeparatrixError(f"{base}: {error}" if named else str(error)) from None
     return model
 
 
@@ -116,6 +121,18 @@ def _record(one: Path | Record, at_rest: bool = False) -> Record:
 
 
 def _prepared(record: Record, model, rest: Record | None, options: Options) -> Prepared:
+    if is_structure(model):
+        if options.compare == "force":
+            raise SeparatrixError(
+                "compare: found force, allowed for a machine of several bodies motion, with columns F.JOINT",
+                USAGE,
+            )
+        return prepare_sensors(record, model, rest)
+    if record.sensors:
+        found = ", ".join(record.sensors)
+        raise SeparatrixError(
+            f"{record.file}: found columns {found}, allowed for a base machine of one body x, v"
+        )
     return prepare_force(record, model, rest) if options.compare == "force" else prepare(record, model, rest)
 
 
@@ -168,6 +185,7 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         name: None if getattr(record, name) is None else getattr(record, name)[part]
         for name in ("v", "force", "phi")
     }
+    sensors = {name: column[part] for name, column in record.sensors.items()}
     header = dict(record.header)
     if first and "phase" in header and "phase_origin_s" not in header:
         # the header tells the crank angle at the first row of the whole record
@@ -180,5 +198,6 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         pieces=pieces,
         warnings=list(record.warnings),
         file=record.file,
+        sensors=sensors,
         **channels,
     )

@@ -13,8 +13,10 @@ import numpy as np
 
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, motion_of
+from separatrix.discovery.decision.joint_hypotheses import hypotheses_at, motion_at
 from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 
 # least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
@@ -74,9 +76,14 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
     base, foretold = decision.rounds[0].base, decision.foretold
     if decision.outcome != "not-in-catalogue" or foretold is None or foretold.fit.excess <= 0:
         return decision
-    natural = _natural_frequency(bench)
-    training, held_out = (motion_of(one, bench.scales.mass, natural) for one in (base, foretold))
-    found = [_best(training, held_out, one) for one in hypotheses(training)]
+    if isinstance(base.problem, CoordinateProblem):
+        training, held_out = motion_at(base), motion_at(foretold)
+        tried = hypotheses_at(training)
+    else:
+        natural = _natural_frequency(bench)
+        training, held_out = (motion_of(one, bench.scales.mass, natural) for one in (base, foretold))
+        tried = hypotheses(training)
+    found = [_best(training, held_out, one) for one in tried]
     best = max(found, key=lambda one: one.evidence)
     if not _known(best, bench):
         return replace(decision, suspected=best if _likely(best, bench) else None)

@@ -8,9 +8,9 @@ from separatrix.discovery.decision.judge import Judged, admissible, clear_of, ma
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.members import MEMBERS, Member
 from separatrix.discovery.fitting.refit import WORSE, Fitted, gain_over
-from separatrix.library import effects
 
 # share of the best evidence, or of what free forces explain, from which on a family is tried
 _PROMISING = 0.3
@@ -37,8 +37,8 @@ def flexible_member(
         return None
     able = [one for one in fitted if admissible(one, found.base, bench.options)[0]]
     best = max(able or fitted, key=lambda one: one.evidence)
-    family = effects()[best.name].family
-    others = [one for one in [*found.judged, *fitted] if effects()[one.name].family != family]
+    family = effect_of(best.name).family
+    others = [one for one in [*found.judged, *fitted] if effect_of(one.name).family != family]
     return best, [one for one in others if not clear_of(best, one, bench.options)]
 
 
@@ -51,11 +51,11 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
     shares = {}
     for member in MEMBERS:
         allowed = wanted is None or any(
-            name == member.effect or effects()[name].family == member.family for name in wanted
+            name == member.effect or effect_of(name).family == member.family for name in wanted
         )
         if not allowed or not fits_machine(member, found.base.model):
             continue
-        closed = [one.evidence for one in found.judged if effects()[one.name].family == member.family]
+        closed = [one.evidence for one in found.judged if effect_of(one.name).family == member.family]
         share = max([free.get(member.explains, 0.0) / most, *(one / highest for one in closed)])
         if share > _PROMISING:
             shares[member] = share
@@ -151,5 +151,5 @@ def _pointless(one: Fitted, more: Fitted, ahead: Fitted | None) -> bool:
 
 def _begun(found: Round, family: str) -> Fitted:
     """The closed form of the family where there is one, else the base."""
-    members = [one for one in found.judged if effects()[one.name].family == family]
+    members = [one for one in found.judged if effect_of(one.name).family == family]
     return members[0].fitted if members else found.base

@@ -11,10 +11,10 @@ from scipy.stats import binom, chi2
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.rig import share_beside_faults
 from separatrix.discovery.options import Options
-from separatrix.library import effects
 
 _BLOCKS = 2
 # fewer segments than this have no distribution of their own to draw from
@@ -268,7 +268,7 @@ def equivalent(one: Judged, other: Judged) -> bool:
     """Whether what two fits do not share is two names of the same motion."""
     mine, theirs = set(one.fitted.names), set(other.fitted.names)
     left, right = mine - theirs, theirs - mine
-    return len(left) == len(right) == 1 and right.pop() in effects()[left.pop()].confused
+    return len(left) == len(right) == 1 and right.pop() in effect_of(left.pop()).confused
 
 
 def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.catalogue import Candidate
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import screen, signature
 from separatrix.discovery.wording import unit_of
-from separatrix.library import effects
 
 _LADDER = 4.0 ** np.arange(-3, 4)
 # usual sizes (some per cent of the machine's own) up to which a linearised size is told
@@ -108,8 +108,8 @@ def advice(one: Fitted, others: list[Fitted]) -> str:
 def equivalents(names: list[str]) -> list[str]:
     """Why effects of the catalogue are the same motion, in words."""
     return [
-        f"{one} and {other}: {effects()[one].confused[other]}"
+        f"{one} and {other}: {effect_of(one).confused[other]}"
         for i, one in enumerate(names)
         for other in names[i + 1 :]
-        if other in effects()[one].confused
+        if other in effect_of(one).confused
     ]

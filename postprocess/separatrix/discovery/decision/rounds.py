@@ -7,16 +7,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.judge import Judged, judged
-from separatrix.discovery.fitting.catalogue import ON_REQUEST, STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import ON_REQUEST, Candidate, Scales
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
+from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of, names_for
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.places import SensedScales
 from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
-from separatrix.library import effects
 
 _CERTAIN_REFITS = 5
 _RELATED = 0.7
@@ -41,7 +42,7 @@ class Bench:
 
     training: Data
     held_out: Data | None
-    scales: Scales
+    scales: Scales | SensedScales
     options: Options
 
     def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
@@ -142,18 +143,19 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
     absent: dict[str, str] = {}
-    for name in STARTS:
-        if name in base.names or (options.candidates and name not in options.candidates):
+    every = names_for(base.model, options.candidates)
+    for name in every:
+        if name in base.names:
             continue
         if any(path.startswith(f"effect.{name}.") for path in base.model.parameters):
             continue
         if name in ON_REQUEST and not options.candidates:
             absent[name] = ON_REQUEST[name]
             continue
-        if base.problem.in_force and effects()[name].acts != "flight":
+        if base.problem.in_force and effect_of(name).acts != "flight":
             absent[name] = "it does nothing to the force along a known motion"
             continue
-        made = candidate(base.model, free, base.names, name, bench.scales)
+        made = candidate_of(base.model, free, base.names, name, bench.scales)
         if isinstance(made, str):
             absent[name] = made
         else:
@@ -162,7 +164,7 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
-    absent = {name: absent[name] for name in STARTS if name in absent}
+    absent = {name: absent[name] for name in every if name in absent}
     return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
 
 

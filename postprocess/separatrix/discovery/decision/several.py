@@ -10,12 +10,11 @@ from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling,
 from separatrix.discovery.decision.judge import Judged, admissible, judged
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
-from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, hopeless, refit
 from separatrix.discovery.fitting.screen import screen, signature
-from separatrix.library import effects
 
 _PAIRS = 6
 # share of what is left of the gap that an effect must close for another one to be looked for on top of it
@@ -80,7 +79,7 @@ def _swapped(bench: Bench, first: Round, whole: Judged, tried: list[Judged]) -> 
         rest = [other for other in whole.fitted.names if other != name]
         least = _SHARE * alone[name].evidence if name in alone else -np.inf
         for one in first.judged:
-            of_family = effects()[one.name].family == effects()[name].family
+            of_family = effect_of(one.name).family == effect_of(name).family
             if one.name in whole.fitted.names or not of_family or one.evidence < least:
                 continue
             if frozenset([one.name, *rest]) in known:
@@ -138,7 +137,8 @@ def over_base(bench: Bench, base: Fitted, foretold: Prediction | None, one: Judg
 
 
 def _is_added(path: str, base: Fitted) -> bool:
-    return path.startswith("effect.") and path not in base.model.parameters
+    nuisance = path.startswith("nuisance:")
+    return not nuisance and all(path not in one.paths for one in base.problem.free)
 
 
 def fit_set(bench: Bench, found: Round, names: Iterable[str]) -> Fitted | None:
@@ -150,7 +150,7 @@ def fit_set(bench: Bench, found: Round, names: Iterable[str]) -> Fitted | None:
         if name in fitted.names:
             continue
         free = with_values(fitted.problem.free, fitted.fit.values)
-        made = candidate(fitted.model, free, fitted.names, name, bench.scales)
+        made = candidate_of(fitted.model, free, fitted.names, name, bench.scales)
         if isinstance(made, str):
             return None
         shown = signature(fitted.problem, fitted.fit, made)

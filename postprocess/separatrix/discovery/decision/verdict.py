@@ -16,13 +16,14 @@ from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import function_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.wording import unit_of, units_of
-from separatrix.library import effects
 from separatrix.version import __version__
 
 # experiments that are told
@@ -64,7 +65,8 @@ def verdict_of(findings: Findings) -> dict:
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
-        "families": [effects()[name].family for name in final.names],
+        "places": _places(final, named, decision),
+        "families": [effect_of(name).family for name in final.names],
         "function": _function(final),
         "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
@@ -92,9 +94,26 @@ def verdict_of(findings: Findings) -> dict:
     }
 
 
+def _places(final: Fitted, named: list[str], decision: Decision) -> dict[str, str]:
+    """Where the effects of the verdict sit in a machine of several bodies, in words; none of one body."""
+    if not isinstance(final.problem, CoordinateProblem):
+        return {}
+    structure = decision.rounds[0].base.problem.structure
+    every = [*named, *(name for names in decision.alternatives for name in names)]
+    found = {}
+    for name in every:
+        where = place_of(name)
+        known = [one.text() for one in structure.places if one.name == where or where in one.joints]
+        found[name] = known[0] if known else where
+    return found
+
+
 def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     """What to measure next where the name is in doubt: known advice, experiments by what they would tell."""
     if findings.decision.outcome != "ambiguous":
+        return {"separating_experiment": "", "experiments": []}
+    if isinstance(final.problem, CoordinateProblem):
+        # experiments are flown by one body
         return {"separating_experiment": "", "experiments": []}
     other = rivals[0] if rivals else findings.base
     names = [" with ".join(one.names) or "the machine without it" for one in (final, other)]
@@ -180,8 +199,11 @@ def _warnings(findings: Findings) -> list[str]:
     ]
     fits = _final(findings)
     for _, data, fitted in fits:
+        if isinstance(fitted.problem, CoordinateProblem):
+            continue
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
-    notes += other_machine(bench.training, fits[0][2], bench.options)
+    several = isinstance(findings.base.problem, CoordinateProblem)
+    notes += [] if several else other_machine(bench.training, fits[0][2], bench.options)
     notes += other_units(bench.training, findings.base.model)
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(bench.training, findings.base)

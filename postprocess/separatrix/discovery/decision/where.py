@@ -15,6 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.fitting.joint_effects import effect_of
+from separatrix.discovery.fitting.joint_response import columns_of
 from separatrix.discovery.fitting.motions import after_impacts, impacts_at, scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.refit import Fitted
@@ -22,7 +25,6 @@ from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.options import Options
 from separatrix.discovery.wording import Units, units_of
-from separatrix.library import effects
 
 IMPACT_SPEED = "impact speed"
 _LOW, _SINCE = "low speed", "time since the last impact"
@@ -64,6 +66,8 @@ class Map:
 
 def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[str] = ()) -> list[Map]:
     """Missing forces in the bins of all maps; of maps that tell much alike, those of `named` effects."""
+    if isinstance(fitted.problem, CoordinateProblem):
+        return _maps_at_places(fitted, options)
     problem, fit = fitted.problem, fitted.fit
     state = scaled_motion(problem, fit)
     evaluation = fit.evaluation
@@ -92,7 +96,7 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
         columns = np.concatenate([columns, kick_columns(problem, fit, impacts[4])], axis=2)
     force, error = _forces(fitted, columns, options)
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
-    own = {name for effect in named for name in _OF_FAMILY.get(effects()[effect].family, ())}
+    own = {name for effect in named for name in _OF_FAMILY.get(effect_of(effect).family, ())}
     gains = _gains(fitted, columns, [member.shape[2] for member in tables])
     flags &= np.repeat(_telling(maps, gains, own), [member.shape[2] for member in tables])
     found, first = [], 0
@@ -102,6 +106,36 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
         of = units.velocity if name == IMPACT_SPEED else units.force
         found.append(Map(name, unit, of, edges, other, force[part], error[part], flags[part]))
     return found
+
+
+def _maps_at_places(fitted: Fitted, options: Options) -> list[Map]:
+    """Missing forces between the ends of every place of several bodies, over its stretch and its speed."""
+    problem, fit = fitted.problem, fitted.fit
+    inside, n = problem.segments.inside & fit.good[:, None], problem.structure.n
+    motion = fit.evaluation.motion
+    maps, columns = [], []
+    for place in problem.structure.places:
+        of_place = (
+            (_PLACE, "m", motion[:, :, :n] @ place.row),
+            (_SPEED, "m/s", motion[:, :, n:] @ place.row),
+        )
+        for name, unit, values in of_place:
+            one = _bins(f"{name} of {place.name}", unit, values, inside, 8)
+            if one is not None:
+                maps.append(one)
+                columns.append(columns_of(problem, fit, one[4], place.row))
+    if not maps:
+        return []
+    whole = np.concatenate(columns, axis=2)
+    force, error = _forces(fitted, whole, options)
+    sizes = [one[4].shape[2] for one in maps]
+    flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
+    flags &= np.repeat(_telling(maps, _gains(fitted, whole, sizes), set()), sizes)
+    ends = np.cumsum([0, *sizes])
+    return [
+        Map(name, unit, "N", edges, other, force[a:b], error[a:b], flags[a:b])
+        for (name, unit, edges, other, _), a, b in zip(maps, ends[:-1], ends[1:], strict=True)
+    ]
 
 
 def _times(problem, inside: np.ndarray) -> list[tuple | None]:

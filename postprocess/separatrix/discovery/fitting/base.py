@@ -10,6 +10,7 @@ from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nu
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.sensed import SensedData, joint_parameters, measure_sensors
 from separatrix.discovery.measured.signals import white_noise
 
 _PHASES = 12
@@ -23,9 +24,7 @@ _SAME_SENSOR = 1.5
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can say something about; sets noise and memory of the records."""
-    force = any(one.record.force is not None for one in data.prepared)
-    free = base_parameters(model, force, data.prepared[0].in_force) + drive_nuisances(model, data.prepared)
-    free += sensor_zeros(free, len(data.prepared))
+    free = _free(data, model)
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
     problem, fit = fit_stages(data, model, free, values, stages=[0, 1])
@@ -49,11 +48,24 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     return best if fit.good.sum() < best.fit.good.sum() else Fitted((), model, best.problem, fit, ())
 
 
+def _free(data: Data, model) -> list[Free]:
+    """What is free in the base machine."""
+    if isinstance(data, SensedData):
+        forces = any(sensor.kind == "F" for one in data.prepared for sensor in one.sensors)
+        return joint_parameters(model, forces) + drive_nuisances(model, data.prepared)
+    force = any(one.record.force is not None for one in data.prepared)
+    free = base_parameters(model, force, data.prepared[0].in_force) + drive_nuisances(model, data.prepared)
+    return free + sensor_zeros(free, len(data.prepared))
+
+
 def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     """Set what the records do not state.
 
     The fit must have been made without memory.
     """
+    if isinstance(data, SensedData):
+        measure_sensors(data, problem, fit)
+        return
     factors, memory = noise_of(problem, fit, 0, mass)
     before = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     for number, prepared in enumerate(data.prepared):
@@ -73,20 +85,19 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
 
 def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
     """Measure the noise anew by a better fit; whether it changed enough to matter (else it stays)."""
-    before = [(one.sigma, one.velocity_sigma, one.memory) for one in data.prepared]
+    before = [one.noise for one in data.prepared]
     for one in data.prepared:
         one.memory = 0.0
     measure_noise(data, problem, again(problem, fit), mass)
     changed = any(
-        abs(np.log(one.sigma / sigma)) > _RENEWED
-        or (one.record.v is not None and abs(np.log(one.velocity_sigma / speed)) > _RENEWED)
-        or abs(one.memory - memory) > _RENEWED_MEMORY
-        for one, (sigma, speed, memory) in zip(data.prepared, before, strict=True)
+        abs(one.noise[0] - memory) > _RENEWED_MEMORY
+        or any(abs(np.log(now / was)) > _RENEWED for now, was in zip(one.noise[1:], sizes, strict=True))
+        for one, (memory, *sizes) in zip(data.prepared, before, strict=True)
     )
     if not changed:
         # what is compared must be scored with one noise
         for one, noise in zip(data.prepared, before, strict=True):
-            one.sigma, one.velocity_sigma, one.memory = noise
+            one.noise = noise
     return changed
 
 
@@ -118,6 +129,9 @@ def limit_noise(source: Data, target: Data) -> bool:
 
     Where the base machine lacks an effect it hides in the noise of records too short to measure it again.
     """
+    if isinstance(source, SensedData):
+        # nothing of theirs is measured on short records alone
+        return False
     shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.signal)) > 0]
     coloured = max([1.0, *shares])
     limited = False

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.joint_forces import families_of
 from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knots_of, scaled_motion, splines
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.problem import Problem
@@ -63,7 +65,10 @@ def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
     """Try every family on what faults of a rig leave of the residuals of a fit."""
     fit = cleaned(problem, fit)
     families = []
-    for name, columns in _families(problem, fit, mass).items():
+    made = (
+        families_of(problem, fit) if isinstance(problem, CoordinateProblem) else _families(problem, fit, mass)
+    )
+    for name, columns in made.items():
         gain, rank = _gain(fit, columns)
         families.append(Family(name, gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     gain, rank = _piecewise_gain(problem, fit, mass)

@@ -14,9 +14,9 @@ from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.shapes import closed_forms, through
+from separatrix.discovery.measured.bodies import is_structure
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
 
@@ -58,6 +58,9 @@ class Function:
 
 def fits_machine(member: Member, model) -> bool:
     """Whether a machine has what the table changes."""
+    if is_structure(model):
+        # its joints have no tables
+        return False
     needs = effects()[member.effect].needs
     has = all(
         any(path == need or path.startswith(f"{need}.") for path in model.parameters)
@@ -114,7 +117,7 @@ def fit_member(
     paths = [one.path for one in free]
     if member.anchor:
         values[paths.index(member.anchor)] = begun[0][0]
-    problem = Problem(extended, data.prepared, data.stages[data.last], [*free, *added])
+    problem = data.problem(extended, data.last, [*free, *added])
     fit = minimise(problem, values, known.fit.starts, most=40, patient=True)
     fit = polished(data, problem, fit, data.last, 40, rival=base.fit)
     return Fitted(names, extended, problem, fit, place)

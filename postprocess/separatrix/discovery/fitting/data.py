@@ -22,7 +22,8 @@ from separatrix.errors import SeparatrixError
 
 # lengths of the stages over that of the longest segments
 STAGES = (0.2, 0.5, 1.0)
-_FEWEST = 10
+FEWEST = 10
+"""Samples of a segment at least."""
 # share of segments that may be wrong and the others still right
 _FEW = 0.25
 # natural periods that a segment may last where the drive is slow
@@ -49,6 +50,10 @@ class Data:
     def last(self) -> int:
         """Number of the stage with the longest segments."""
         return len(self.stages) - 1
+
+    def problem(self, model, stage: int, free: list[Free]) -> Problem:
+        """The fit of a model to the segments of a stage."""
+        return Problem(model, self.prepared, self.stages[stage], free)
 
     def smoothed_starts(self, stage: int) -> np.ndarray:
         """Starts (segments, 2) of a stage from the smoother."""
@@ -92,7 +97,7 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
     smoothed, lengths = [], []
     for one in prepared:
         record = one.record
-        swing = 4 * _correlation_samples(record.x)
+        swing = swing_samples(record.x)
         smoothed.append(_smoothed(one, swing))
         if seconds is not None:
             length = seconds / record.interval
@@ -100,9 +105,9 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
             length = periods * min(one.period_samples, _MOST_SWINGS * _natural_samples(one))
         else:
             length = periods * swing
-        lengths.append(int(np.clip(length, _FEWEST, record.t.size / 3)))
+        lengths.append(int(np.clip(length, FEWEST, record.t.size / 3)))
     stages = [
-        cut([one.samples for one in prepared], smoothed, [max(_FEWEST, int(share * n)) for n in lengths])
+        cut([one.samples for one in prepared], smoothed, [max(FEWEST, int(share * n)) for n in lengths])
         for share in STAGES
     ]
     for number, one in enumerate(prepared):
@@ -184,6 +189,11 @@ def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.
     return hit[nearest], slow[nearest], float(np.median(np.abs(seen.state[:, 2])) / 0.6745)
 
 
+def swing_samples(x: np.ndarray) -> int:
+    """Samples of a swing of a record."""
+    return 4 * _correlation_samples(x)
+
+
 def _correlation_samples(x: np.ndarray) -> int:
     """Samples until the autocorrelation of a record first crosses zero: a quarter of a period of a swing."""
     centred = x - x.mean()
@@ -215,7 +225,7 @@ def fit_stages(
     problem, fit = None, None
     for stage in stages:
         last = stage == stages[-1]
-        problem = Problem(model, data.prepared, data.stages[stage], free)
+        problem = data.problem(model, stage, free)
         starts = data.smoothed_starts(stage) if known is None else data.carried_starts(stage, *known)
         begun = None
         if robust:

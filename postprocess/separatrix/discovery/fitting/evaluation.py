@@ -35,3 +35,5 @@ class Evaluation:
     unknowns: int = 2
     # that the motion takes [N], where it is compared
     force: np.ndarray | None = None
+    # of several bodies: places, then velocities of all coordinates (segments, length, 2 n)
+    motion: np.ndarray | None = None

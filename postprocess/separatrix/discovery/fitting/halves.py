@@ -14,7 +14,6 @@ import numpy as np
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.library import effects
 
@@ -28,6 +27,9 @@ def halves(
 ) -> Iterator[tuple[Candidate, Fitted]]:
     """The effect with each of its laws alone, where not all of them are sure."""
     name = candidate.names[-1]
+    if name not in effects():
+        # of several bodies each is one law
+        return
     effect = effects()[name]
     paths = [candidate.free[i].path for i in candidate.added]
     units = {effect.parameters[key].unit for key in effect.amplitudes}
@@ -43,7 +45,7 @@ def halves(
         part = replace(candidate, model=model, free=kept, added=tuple(at), linear=np.ones(1, bool))
         known = {(one.path, one.record): v for one, v in zip(candidate.free, whole.fit.values, strict=True)}
         values = np.array([known[one.path, one.record] for one in kept])
-        problem = Problem(model, data.prepared, data.stages[data.last], kept)
+        problem = data.problem(model, data.last, kept)
         fit = minimise(problem, values, whole.fit.starts)
         fit = polished(data, problem, fit, data.last, 8, rival=whole.fit)
         if fit.converged:

@@ -94,7 +94,7 @@ def predict(
     fixed = np.arange(len(whole)) < len(shared)
     fixed[: len(shared)] &= ~known.unseen[shared]
     fit = _fit_own(data, model, whole, start, fixed, guess)
-    problem = Problem(model, data.prepared, data.stages[-1], whole)
+    problem = data.problem(model, data.last, whole)
     fit = again(problem, fit)
     used = known.covariance[np.ix_(shared, shared)]
     score = _scores(fit.chi2, fit.reduced.matrix, fit.reduced.gradient, used)
@@ -163,7 +163,7 @@ def _fit_own(
     kept = [one for one, mine in zip(free, own, strict=True) if mine]
     fit = None
     if guess is not None:
-        problem = Problem(settled, data.prepared, data.stages[-1], kept)
+        problem = data.problem(settled, data.last, kept)
         led = _records_own(guess, kept, values[own])
         fit = minimise(problem, led, guess.fit.starts, most=12, fixed=fixed[own])
     # a guess that leads all segments to a minimum needs no way from short ones

@@ -119,13 +119,19 @@ def drive_amplitudes(model) -> dict[str, float]:
     return {
         path: float(parameter.value)
         for path, parameter in model.parameters.items()
-        if path.startswith(_AMPLITUDES) and parameter.value != 0
+        if _is_amplitude(path) and parameter.value != 0
     }
+
+
+def _is_amplitude(path: str) -> bool:
+    """Also of one of several drives: `drive.shaker.amplitude`."""
+    first, _, last = path.rpartition(".")
+    return first.startswith("drive") and f"drive.{last}".startswith(_AMPLITUDES)
 
 
 def drive_nuisances(model, prepared: list) -> list[Free]:
     """Scale of the drive; zero of the crank (where phi was not measured) and clock of each record."""
-    if "drive.ratio" not in model.parameters or not model.parameters["drive.ratio"].value:
+    if prepared[0].frequency is None:
         return []
     free = []
     if drive_amplitudes(model):

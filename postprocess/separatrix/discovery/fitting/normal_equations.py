@@ -3,9 +3,9 @@
 """Normal equations of many short segments: each start is eliminated block by block, the common parameters
 remain.
 
-The normal equations of a Levenberg-Marquardt step have the form of an arrow: one 2 x 2 block per segment,
-coupled only through the parameters. Their Schur complement has the size of the parameters
-(tests/python/test_discovery_fit.py compares it with the dense step).
+The normal equations of a Levenberg-Marquardt step have the form of an arrow: one small block per segment (2 x
+2 of one body, 2 n x 2 n of n coordinates), coupled only through the parameters. Their Schur complement has
+the size of the parameters (tests/python/test_discovery_fit.py compares it with the dense step).
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,12 @@ _TINY = 1e-12
 
 @dataclass
 class Blocks:
-    """Normal equations by segment; columns are the start (2), then the parameters."""
+    """Normal equations by segment; columns are the start, then the parameters."""
 
     matrix: np.ndarray
     gradient: np.ndarray
+    # unknowns of a start
+    starts: int
 
 
 @dataclass
@@ -39,26 +41,46 @@ def blocks_of(by_start: np.ndarray, columns: np.ndarray, residual: np.ndarray, w
     """Normal equations of each segment."""
     whole = np.concatenate([by_start, columns], axis=2)
     weighted = (whole * weights[:, :, None]).transpose(0, 2, 1)
-    return Blocks(weighted @ whole, (weighted @ residual[:, :, None])[:, :, 0])
+    return Blocks(weighted @ whole, (weighted @ residual[:, :, None])[:, :, 0], by_start.shape[2])
 
 
 def eliminate(blocks: Blocks, damping: float = 0.0) -> tuple[Reduced, np.ndarray, np.ndarray]:
     """Schur complement by segment; also inverse start blocks and couplings, to find the starts again."""
-    start = blocks.matrix[:, :2, :2].copy()
+    s = blocks.starts
+    start = blocks.matrix[:, :s, :s].copy()
     diagonal = np.einsum("kii->ki", start)
     diagonal *= 1 + damping
-    diagonal += _TINY * (diagonal.max(axis=1, keepdims=True, initial=0) + 1e-300)
+    if s == 2:
+        diagonal += _TINY * (diagonal.max(axis=1, keepdims=True, initial=0) + 1e-300)
+        inverse = _inverse_of_two(start)
+    else:
+        inverse = _inverse(start)
+    coupling = blocks.matrix[:, :s, s:]
+    carried = coupling.transpose(0, 2, 1) @ inverse
+    matrix = blocks.matrix[:, s:, s:] - carried @ coupling
+    gradient = blocks.gradient[:, s:] - (carried @ blocks.gradient[:, :s, None])[:, :, 0]
+    return Reduced(matrix, gradient), inverse, coupling
+
+
+def _inverse_of_two(start: np.ndarray) -> np.ndarray:
+    """Inverses of 2 x 2 blocks, 0 of those without any."""
     determinant = start[:, 0, 0] * start[:, 1, 1] - start[:, 0, 1] * start[:, 1, 0]
     safe = np.where(determinant > 0, determinant, 1)
     inverse = np.empty_like(start)
     inverse[:, 0, 0], inverse[:, 1, 1] = start[:, 1, 1] / safe, start[:, 0, 0] / safe
     inverse[:, 0, 1] = inverse[:, 1, 0] = -start[:, 0, 1] / safe
     inverse[determinant <= 0] = 0
-    coupling = blocks.matrix[:, :2, 2:]
-    carried = coupling.transpose(0, 2, 1) @ inverse
-    matrix = blocks.matrix[:, 2:, 2:] - carried @ coupling
-    gradient = blocks.gradient[:, 2:] - (carried @ blocks.gradient[:, :2, None])[:, :, 0]
-    return Reduced(matrix, gradient), inverse, coupling
+    return inverse
+
+
+def _inverse(start: np.ndarray) -> np.ndarray:
+    """Inverses of symmetric blocks in units of their diagonals; what no sample shows of a start stays."""
+    size = np.sqrt(np.maximum(np.einsum("kii->ki", start), 0))
+    scale = np.where(size > 0, 1 / np.where(size > 0, size, 1), 0)
+    values, vectors = np.linalg.eigh(start * (scale[:, :, None] * scale[:, None, :]))
+    kept = values > _TINY
+    inner = vectors * np.where(kept, 1 / np.where(kept, values, 1), 0)[:, None, :]
+    return scale[:, :, None] * (inner @ vectors.transpose(0, 2, 1)) * scale[:, None, :]
 
 
 def solve_scaled(
@@ -86,7 +108,7 @@ def gauss_newton_step(
     reduced, inverse, coupling = eliminate(blocks, damping)
     matrix, gradient = reduced.total()
     step = solve_scaled(matrix, gradient, open_, damping)
-    back = blocks.gradient[:, :2] - (coupling @ step[None, :, None])[:, :, 0]
+    back = blocks.gradient[:, : blocks.starts] - (coupling @ step[None, :, None])[:, :, 0]
     starts = (inverse @ back[:, :, None])[:, :, 0]
     whole = np.concatenate([starts, np.broadcast_to(step, (starts.shape[0], step.size))], axis=1)
     bent = (blocks.matrix @ whole[:, :, None])[:, :, 0]

@@ -34,6 +34,9 @@ def flight_tolerance(prepared: Prepared) -> float:
 class Problem:
     """Records cut into segments, a model, and what is free."""
 
+    # what a start is: x and v
+    starts = 2
+
     def __init__(self, model, prepared: list[Prepared], segments: Segments, free: list[Free]) -> None:
         """Collect what every evaluation needs."""
         self.model = model
@@ -47,8 +50,11 @@ class Problem:
     def of_segments(self, rows: np.ndarray) -> "Problem":
         """The same problem with these segments only; a segment may come several times."""
         old = self.segments
-        chosen = padded(old.record[rows], old.first[rows], old.last[rows])
-        return Problem(self.model, self.prepared, chosen, self.free)
+        return self.like(self.model, self.free, padded(old.record[rows], old.first[rows], old.last[rows]))
+
+    def like(self, model, free: list[Free], segments: Segments | None = None) -> "Problem":
+        """The same records with another model, or other segments."""
+        return type(self)(model, self.prepared, self.segments if segments is None else segments, free)
 
     def left_over(self) -> tuple[np.ndarray, np.ndarray]:
         """What condensed stretches of each segment leave over, and its degrees of freedom.
@@ -129,7 +135,7 @@ class Problem:
     def evaluate(
         self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True, by_start_alone: bool = False
     ) -> Evaluation:
-        """Simulate all segments from `starts` (segments, 2) of x and v.
+        """Simulate all segments from `starts` (segments, 2) of x and v, or of places and velocities.
 
         With `by_start_alone` derivatives by the parameters of the machine are 0, which is much quicker.
         """
@@ -146,13 +152,14 @@ class Problem:
             v=np.zeros(shape),
             impacts=[None] * len(self._parts),
             hits=np.zeros(count, int),
+            unknowns=self.starts,
         )
         if self.in_force:
             out.unknowns, out.force = 0, np.zeros(shape)
         if derivatives:
-            out.by_start = np.zeros((count, width, 2))
+            out.by_start = np.zeros((count, width, self.starts))
             out.by_parameter = np.zeros((count, width, len(self.free)))
-            out.transition = np.zeros((count, length, 2, 2))
+            out.transition = np.zeros((count, length, self.starts, self.starts))
         for number, part in enumerate(self._parts):
             if part["rows"].size:
                 try:
@@ -221,11 +228,11 @@ class Problem:
         rows, inside = part["rows"], part["inside"]
         length = inside.shape[1]
         failed = np.asarray(result.reason) != 0
-        finite = _padded(np.isfinite(result.x) & np.isfinite(result.v), inside)
+        finite = padded_table(np.isfinite(result.x) & np.isfinite(result.v), inside)
         failed |= np.any(inside & (finite == 0), axis=1)
         out.failed[rows] = failed
-        out.x[rows] = _padded(result.x, inside)
-        out.v[rows] = _padded(result.v, inside)
+        out.x[rows] = padded_table(result.x, inside)
+        out.v[rows] = padded_table(result.v, inside)
         out.hits[rows] = result.impacts
         hits = result.impact
         out.impacts[number] = np.column_stack(
@@ -236,8 +243,8 @@ class Problem:
             out.steady[rows] = np.asarray(result.steady, bool)
             jacobians = self._derivatives(number, part, moves, result)
             n = len(directions)
-            out.transition[rows, :, 0, :] = _padded(result.jacobian[:, n : n + 2], inside)
-            out.transition[rows, :, 1, :] = _padded(result.velocity_jacobian[:, n : n + 2], inside)
+            out.transition[rows, :, 0, :] = padded_table(result.jacobian[:, n : n + 2], inside)
+            out.transition[rows, :, 1, :] = padded_table(result.velocity_jacobian[:, n : n + 2], inside)
         spread = prepared.samples.spread(prepared.memory)[part["samples"]]
         for channel, (measured, computed, size) in enumerate(
             ((part["x"], result.x, prepared.sigma), (part["v"], result.v, prepared.velocity_sigma))
@@ -246,13 +253,13 @@ class Problem:
                 continue
             columns = slice(channel * length, (channel + 1) * length)
             sigma = size * spread
-            out.residual[rows, columns] = np.nan_to_num(_padded((measured - computed) / sigma, inside))
+            out.residual[rows, columns] = np.nan_to_num(padded_table((measured - computed) / sigma, inside))
             out.used[rows, columns] = self.compared[rows, columns]
             if derivatives:
                 by_start, by_parameter = jacobians[channel]
-                out.by_start[rows, columns] = np.nan_to_num(_padded(by_start / sigma[:, None], inside))
+                out.by_start[rows, columns] = np.nan_to_num(padded_table(by_start / sigma[:, None], inside))
                 out.by_parameter[rows, columns] = np.nan_to_num(
-                    _padded(by_parameter / sigma[:, None], inside)
+                    padded_table(by_parameter / sigma[:, None], inside)
                 )
 
     def _compare_force(
@@ -268,9 +275,9 @@ class Problem:
 
         force, sigma, used = needed(values), prepared.deviation(at), motion.moves[at]
         for table, at_samples in ((out.x, motion.x[at]), (out.v, motion.v[at]), (out.force, force)):
-            table[rows] = _padded(at_samples, inside)
-        out.used[rows, :length] = _padded(used.astype(float), inside)
-        out.residual[rows, :length] = _padded(used * (record.force[at] - force) / sigma, inside)
+            table[rows] = padded_table(at_samples, inside)
+        out.used[rows, :length] = padded_table(used.astype(float), inside)
+        out.residual[rows, :length] = padded_table(used * (record.force[at] - force) / sigma, inside)
         if derivatives:
             slopes = np.zeros((at.size, values.size))
             for j, one in enumerate(self.free):
@@ -278,7 +285,7 @@ class Problem:
                 step = _STEP * one.size * (1 if values[j] + _STEP * one.size <= one.upper else -1)
                 moved = values + step * (np.arange(values.size) == j)
                 slopes[:, j] = (needed(moved) - force) / (step * sigma)
-            out.by_parameter[rows, :length] = _padded(slopes, inside)
+            out.by_parameter[rows, :length] = padded_table(slopes, inside)
 
     def _simulate(
         self,
@@ -392,7 +399,8 @@ class Problem:
         return found
 
 
-def _padded(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
+def padded_table(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Values of samples one after the other as a table by segment, 0 where a segment has none."""
     table = np.zeros(inside.shape + flat.shape[1:])
     table[inside] = flat
     return table

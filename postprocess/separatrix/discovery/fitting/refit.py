@@ -162,7 +162,7 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
     if not candidate.linear.any() or gain_over(best, base)[0] > -WORSE:
         return best
     values = _absent(_base_values(base, candidate), candidate)
-    problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+    problem = data.problem(candidate.model, data.last, candidate.free)
     fit = minimise(problem, values, base.fit.starts)
     found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
     best = found if _better(found, best) else best
@@ -186,7 +186,7 @@ def beaten(one: Fitted, rival: Fitted) -> bool:
 
 def carried_on(data: Data, candidate: Candidate, known: Fitted, patient: bool = False) -> Fitted:
     """An earlier fit, carried on with the noise of now."""
-    problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+    problem = data.problem(candidate.model, data.last, candidate.free)
     values = values_of(known, [replace(one, value=0.0) if one.path in _amplitudes(candidate) else one
                                for one in candidate.free])  # fmt: skip
     fit = minimise(problem, values, known.fit.starts, patient=patient)
@@ -249,7 +249,7 @@ def _try(
 ) -> tuple[Problem, Fit]:
     """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
-        problem = Problem(candidate.model, data.prepared, data.stages[data.last], candidate.free)
+        problem = data.problem(candidate.model, data.last, candidate.free)
         fit = minimise(problem, values, base.fit.starts, most=most, beat=beat)
         absent = _absent(values, candidate)
         if fit.total > base.fit.total + 2 * WORSE and not np.array_equal(absent, values):

@@ -19,6 +19,8 @@ _LEAST_GAIN = 0.01
 _STRONGEST = 1e3
 # starts tried, in standard errors of the smoother
 _TRIED = np.array([(i, j) for i in (0, -4, -2, 2, 4) for j in (0, -3, -1.5, 1.5, 3)], float)
+# the same, one coordinate at a time, of starts of several
+_ALONE = (-4.0, -2.0, 2.0, 4.0)
 
 
 def suspicious(fit: Fit) -> np.ndarray:
@@ -39,11 +41,12 @@ def rescued(
     """
     improved = np.zeros(fit.chi2.size, bool)
     guesses = [*guesses, fit.starts]
-    steps = np.tile(_TRIED, (len(guesses), 1))
+    around = _around(fit.starts.shape[1])
+    steps = np.tile(around, (len(guesses), 1))
     tries = len(steps)
     rows = np.repeat(suspects, tries)
     copies = problem.of_segments(rows)
-    places = np.tile(np.repeat(np.arange(len(guesses)), len(_TRIED)), suspects.size)
+    places = np.tile(np.repeat(np.arange(len(guesses)), len(around)), suspects.size)
     begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
     promising = _promising(copies.evaluate(fit.values, begin, derivatives=False), tries)
     if not promising.size:
@@ -60,6 +63,14 @@ def rescued(
             starts[segment] = found[best]
             improved[segment] = True
     return starts, improved
+
+
+def _around(width: int) -> np.ndarray:
+    """Steps of a start that are tried, in standard errors."""
+    if width == _TRIED.shape[1]:
+        return _TRIED
+    alone = [size * row for row in np.eye(width) for size in _ALONE]
+    return np.array([np.zeros(width), *alone])
 
 
 def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
@@ -112,6 +123,8 @@ def _steps(evaluation: Evaluation, damping: np.ndarray) -> np.ndarray:
     weighted = evaluation.by_start * evaluation.used[:, :, None]
     matrix = weighted.transpose(0, 2, 1) @ evaluation.by_start
     gradient = (weighted.transpose(0, 2, 1) @ evaluation.residual[:, :, None])[:, :, 0]
+    if matrix.shape[1] != 2:
+        return _solved(matrix, gradient, damping, evaluation.failed)
     diagonal = np.einsum("kii->ki", matrix)
     matrix[:, [0, 1], [0, 1]] = diagonal * (1 + damping[:, None]) + 1e-300
     determinant = matrix[:, 0, 0] * matrix[:, 1, 1] - matrix[:, 0, 1] ** 2
@@ -120,3 +133,15 @@ def _steps(evaluation: Evaluation, damping: np.ndarray) -> np.ndarray:
     inverse = np.zeros_like(adjugate)
     inverse[usable] = adjugate[usable] / determinant[usable, None]
     return (inverse.reshape(-1, 2, 2) @ gradient[:, :, None])[:, :, 0]
+
+
+def _solved(matrix: np.ndarray, gradient: np.ndarray, damping: np.ndarray, failed: np.ndarray) -> np.ndarray:
+    """Damped steps in the units of the diagonals."""
+    size = np.sqrt(np.maximum(np.einsum("kii->ki", matrix), 0))
+    scale = np.where(size > 0, 1 / np.where(size > 0, size, 1), 0)
+    usable = np.isfinite(matrix).all(axis=(1, 2)) & ~failed
+    scaled = np.where(usable[:, None, None], matrix, 0) * scale[:, :, None] * scale[:, None, :]
+    scaled = scaled + (damping[:, None, None] + 1e-10) * np.eye(matrix.shape[1])
+    return (
+        scale * np.linalg.solve(scaled, (scale * np.where(usable[:, None], gradient, 0))[:, :, None])[:, :, 0]
+    )

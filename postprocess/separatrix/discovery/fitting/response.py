@@ -8,7 +8,9 @@ integral of T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any nu
 
 import numpy as np
 
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.joint_response import columns_of
 from separatrix.discovery.fitting.problem import Problem
 
 _LOST = 1e-9
@@ -21,6 +23,9 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
     """
     if problem.in_force:
         return _of_forces(problem, fit, forces)
+    if isinstance(problem, CoordinateProblem):
+        # on each body by itself
+        return columns_of(problem, fit, forces)
     back, alive = _back(problem, fit)
     carried = back[:, :, :, None] * forces[:, :, None, :] / mass
     steps = np.diff(sample_times(problem), axis=1)[:, :, None, None]

@@ -12,8 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.joint_forces import fault_columns_of
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
@@ -32,6 +34,8 @@ _NARROWER, _NARROWEST = 4.0, 1e15
 
 def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
     """Columns (segments, width, q) of faults of one standard deviation, along the fitted motion."""
+    if isinstance(problem, CoordinateProblem):
+        return fault_columns_of(problem, fit)
     state = scaled_motion(problem, fit)
     inside = problem.segments.inside
     columns = [_sensor(problem, fit)]

@@ -69,7 +69,7 @@ def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None
     """What the added effect does at the fitted base, in its most telling form; None where it does nothing."""
     by_path = {(one.path, one.record): value for one, value in zip(base.free, fit.values, strict=True)}
     values = np.array([by_path.get((one.path, one.record), one.value) for one in candidate.free])
-    problem = Problem(candidate.model, base.prepared, base.segments, candidate.free)
+    problem = base.like(candidate.model, candidate.free)
     added = list(candidate.added)
     best, best_gain = None, -1.0
     for origin in candidate.forms:

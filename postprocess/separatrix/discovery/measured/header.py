@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, SAME
+from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, SAME, is_noise, is_sensor
 from separatrix.errors import SeparatrixError
 
 _TURN = 2 * np.pi
@@ -19,7 +19,8 @@ _FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "N m": 1.0}
 _FREQUENCY = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6}
 _RATE = {"rad/s": 1.0, "Hz": _TURN, "rpm": _TURN / 60}
 _SPEED = {f"{unit}/s": size for unit, size in (_LENGTH | _ANGLE).items()}
-UNITS = {"t": _TIME, "x": _LENGTH | _ANGLE, "v": _SPEED, "force": _FORCE, "phi": _ANGLE}
+_ACCELERATION = {f"{unit}/s^2": size for unit, size in (_LENGTH | _ANGLE).items()} | {"g": 9.80665}
+UNITS = {"t": _TIME, "x": _LENGTH | _ANGLE, "v": _SPEED, "force": _FORCE, "phi": _ANGLE, "a": _ACCELERATION}
 """Units of the columns, over the SI unit."""
 _OF_KEYS = {
     "sampling_rate_hz": _FREQUENCY,
@@ -73,6 +74,10 @@ def numbers_of(path: Path, header: dict[str, str], of_time: float, warnings: lis
         numbers[key] = _quantity(path, key, header[key], text, _OF_KEYS.get(key, {}))
         if not np.isfinite(numbers[key]):
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}")
+    for key in filter(is_noise, header):
+        numbers[key] = _quantity(path, key, header[key], header[key], {})
+        if not numbers[key] > 0:
+            raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected more than 0")
     for key in _POSITIVE:
         if key in numbers and numbers[key] <= 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected more than 0")
@@ -117,35 +122,44 @@ def to_si(
         warnings.append("no 'units': read as s and m (rad of an angle)")
         return "m", 1.0
     units = _units(path, header["units"], columns)
-    for name, unit in units.items():
-        if name in columns:
-            columns[name] = columns[name] * UNITS[name][unit]
-    return "rad" if units["x"] in _ANGLE else "m", _TIME[units["t"]]
+    for name in columns:
+        unit = units.get(name, units.get(_kind(name)))
+        if unit is not None:
+            columns[name] = columns[name] * UNITS[_kind(name)][unit]
+    place = next(units[name] for name in units if _kind(name) == "x")
+    return "rad" if place in _ANGLE else "m", _TIME[units["t"]]
+
+
+def _kind(name: str) -> str:
+    """What a column is: `x` of `x.BODY`, `force` of `F.JOINT`."""
+    kind = name.partition(".")[0] if is_sensor(name) else name
+    return SAME.get(kind, kind)
 
 
 def _units(path: Path, text: str, columns: dict[str, np.ndarray]) -> dict[str, str]:
     """Unit of each column: `s, mm`, in the order of the columns, or by name, as in `t s, x mm`."""
     entries = [entry.strip() for entry in re.split(r"[,;]", text) if entry.strip()]
-    found, order = {}, iter([name for name in columns if name in UNITS])
+    found, order = {}, iter([name for name in columns if _kind(name) in UNITS])
     for entry in entries:
-        name, unit = _entry(entry)
+        name, unit = _entry(entry, [one for one in columns if is_sensor(one)])
         name = name or next(order, None)
         unit = _SAME.get(unit, unit)
         if name is None:
             # of a column that is not used
             continue
-        if name not in UNITS or unit not in UNITS[name] or name in found:
+        if unit not in UNITS.get(_kind(name), ()) or name in found:
             _refuse(path, text)
         found[name] = unit
-    if not {"t", "x"} <= found.keys():
+    told = {_kind(name) for name in found if name in columns or name in UNITS}
+    if not {"t", "x"} <= told:
         _refuse(path, text)
     return found
 
 
-def _entry(entry: str) -> tuple[str, str]:
+def _entry(entry: str, sensors: list[str]) -> tuple[str, str]:
     """Name of a column ('' if there is none) and unit, from `mm`, `x mm`, `x: mm`, `x = mm`, `x [mm]`."""
-    for name in ("t", "x", *CHANNELS, *SAME):
-        said = re.fullmatch(rf"{name}\s*(?:[:=]\s*|\s+|(?=[\[(]))[\[(]?\s*(.*?)\s*[\])]?", entry)
+    for name in (*sensors, "t", "x", "a", *CHANNELS, *SAME):
+        said = re.fullmatch(rf"{re.escape(name)}\s*(?:[:=]\s*|\s+|(?=[\[(]))[\[(]?\s*(.*?)\s*[\])]?", entry)
         if said:
             return SAME.get(name, name), said.group(1)
     return "", entry.strip("[]() ")

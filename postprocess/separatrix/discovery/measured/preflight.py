@@ -73,6 +73,17 @@ class Prepared:
             self.samples = whole(self.record)
 
     @property
+    def noise(self) -> tuple:
+        """Memory of the noise, and its size in each column that is compared."""
+        return (self.memory, self.sigma, *(() if self.record.v is None else (self.velocity_sigma,)))
+
+    @noise.setter
+    def noise(self, known: tuple) -> None:
+        self.memory, self.sigma = known[:2]
+        if len(known) > 2:
+            self.velocity_sigma = known[2]
+
+    @property
     def signal(self) -> np.ndarray:
         """What is compared: position, or force."""
         return self.record.force if self.in_force else self.record.x

@@ -13,7 +13,7 @@ from separatrix.discovery.measured.clock import pieces_of
 from separatrix.discovery.measured.faults import check_clipping, left_out
 from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
-from separatrix.discovery.measured.tables import CHANNELS, Table
+from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_sensor
 from separatrix.errors import SeparatrixError
 
 _FEWEST_SAMPLES = 60
@@ -29,6 +29,8 @@ class Record:
     v: np.ndarray | None = None
     force: np.ndarray | None = None
     phi: np.ndarray | None = None
+    # of several bodies: columns by what they are of, as `x.BODY`; x is the first place among them
+    sensors: dict[str, np.ndarray] = field(default_factory=dict)
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -62,7 +64,7 @@ def make_record(
 ) -> Record:
     """Check arrays that did not come from a file as if they had."""
     texts = {key: str(value) for key, value in (header or {}).items()}
-    used = {key: column for key, column in columns.items() if key in ("t", *CHANNELS)}
+    used = {key: column for key, column in columns.items() if is_column(key)}
     return _checked(Path(name), Table(texts, used, unused=sorted(columns.keys() - used.keys())), at_rest)
 
 
@@ -80,6 +82,9 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
             raise SeparatrixError(f"{where(bad[0])}: '{name}' is {column[bad[0]]}; {bad.size} such values")
+    sensors = [name for name in columns if is_sensor(name)]
+    if "x" not in columns:
+        columns["x"] = columns[next(name for name in sensors if name[0] == "x")]
     t, x = columns["t"], columns["x"]
     if t.size < _FEWEST_SAMPLES:
         raise SeparatrixError(f"{path}: {t.size} samples, at least {_FEWEST_SAMPLES} are needed")
@@ -104,11 +109,14 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
             f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
     if not at_rest:
-        check_clipping(x, unit, where, warnings)
+        for place in [columns[name] for name in sensors if name[0] == "x"] or [x]:
+            check_clipping(place, unit, where, warnings)
     if table.unused:
         warnings.append(f"columns that are not used: {', '.join(table.unused)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
-    return Record(path.stem, t, header=numbers, pieces=pieces, warnings=warnings, file=str(path), **channels)
+    of_bodies = {name: columns[name] for name in sensors}
+    told = {"header": numbers, "pieces": pieces, "warnings": warnings, "file": str(path)}
+    return Record(path.stem, t, sensors=of_bodies, **told, **channels)
 
 
 def unique_names(records: Iterable[Record]) -> None:

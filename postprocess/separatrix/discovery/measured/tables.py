@@ -4,6 +4,7 @@
 
 import codecs
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -33,12 +34,34 @@ NUMBERS = {
     "force_noise_sigma_n",
 }
 """Header keys with one number."""
+_SENSOR = re.compile(r"[xvaF]\.[A-Za-z_][\w.]*")
+_NOISE = "noise."
 MOST_SAMPLES = 10_000_000
 """Samples of a record that are read."""
 # lines of a header; bytes of a row with two numbers
 _MOST_HEADER, _FEWEST_BYTES = 1000, 8
 KEYS = NUMBERS | {"units"}
 """All header keys that mean something."""
+
+
+def is_sensor(name: str) -> bool:
+    """Whether a column is named by what it is of: `x.BODY`, `v.BODY`, `a.BODY`, `F.JOINT`."""
+    return _SENSOR.fullmatch(name) is not None
+
+
+def is_column(name: str) -> bool:
+    """Whether a column means something."""
+    return name in ("t", *CHANNELS) or is_sensor(name)
+
+
+def has_place(names: Iterable[str]) -> bool:
+    """Whether a place is among the columns."""
+    return any(name == "x" or (is_sensor(name) and name[0] == "x") for name in names)
+
+
+def is_noise(key: str) -> bool:
+    """Whether a key of the header states the noise of a sensor: `noise.x.BODY`."""
+    return key.startswith(_NOISE) and is_sensor(key.removeprefix(_NOISE))
 
 
 @dataclass
@@ -68,10 +91,10 @@ def _read_plain(path: Path) -> Table | None:
                 return None
         first = file.readline()
     names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
-    if "t" not in names or "x" not in names or not first.strip():
+    if "t" not in names or not has_place(names) or not first.strip():
         return None
     check_length(path, path.stat().st_size // max(1, len(first)))
-    used = [name for name in names if name in ("t", *CHANNELS)]
+    used = [name for name in names if is_column(name)]
     try:
         # any comment, blank line or short row among the numbers is left to the closer look
         table = np.loadtxt(path, delimiter=",", comments=None, skiprows=len(begun), ndmin=2)
@@ -126,7 +149,7 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
         if names is None:
             separator = next((mark for mark in ";,\t" if _has_t_and_x(text, mark)), ",")
             names = _names(path, number, text, separator)
-            used = [name for name in names if name in ("t", *CHANNELS)]
+            used = [name for name in names if is_column(name)]
             _units_of_names(header, text, separator, used)
         else:
             lines.append(number)
@@ -166,7 +189,8 @@ def _check_place(path: Path, number: int, key: str, stands: dict[str, int], belo
 
 
 def _has_t_and_x(text: str, separator: str) -> bool:
-    return {"t", "x"} <= {_named(name)[0] for name in text.split(separator)}
+    names = {_named(name)[0] for name in text.split(separator)}
+    return "t" in names and has_place(names)
 
 
 def _named(text: str) -> tuple[str, str]:
@@ -186,8 +210,12 @@ def _units_of_names(header: dict[str, str], text: str, separator: str, used: lis
 
 def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
     names = [_named(name)[0] for name in text.split(separator)]
-    if "t" not in names or "x" not in names:
-        raise SeparatrixError(f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]'")
+    if "t" not in names or not has_place(names):
+        raise SeparatrixError(
+            f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]' or, of "
+            "several bodies, "
+            "'t,x.BODY[,x.BODY,v.BODY,a.BODY,F.JOINT,phi]'"
+        )
     if len(set(names)) != len(names):
         raise SeparatrixError(f"{path}:{number}: a column is named twice in '{text}'")
     return names
@@ -219,13 +247,14 @@ def read_hdf5(path: Path) -> Table:
                 check_length(path, file["t"].size)
             columns = {
                 name: np.asarray(file[name][()], float)
-                for name in ("t", *CHANNELS)
-                if isinstance(file.get(name), h5py.Dataset)
+                for name in file
+                if is_column(name) and isinstance(file[name], h5py.Dataset)
             }
             unused = sorted(set(file) - columns.keys())
     except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
         raise SeparatrixError(f"{path}: not a record that can be read: {error}") from None
-    missing = [name for name in ("t", "x") if name not in columns]
+    missing = [] if "t" in columns else ["t"]
+    missing += [] if has_place(columns) else ["x"]
     if missing:
         raise SeparatrixError(f"{path}: dataset '{missing[0]}' is missing")
     if len({column.shape for column in columns.values()}) != 1 or columns["t"].ndim != 1:

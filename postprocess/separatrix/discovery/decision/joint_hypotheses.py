@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a missing force of a machine of several bodies may depend on, and at which place it acts."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from separatrix.discovery.decision.hypotheses import Hypothesis, Motion
+from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.joint_forces import clock_of, kicks_of
+from separatrix.discovery.fitting.joint_response import columns_of
+from separatrix.discovery.fitting.motions import knots_of, splines
+from separatrix.discovery.fitting.refit import Fitted
+
+_KNOTS, _FEWER, _HARMONICS = 8, 4, 3
+
+
+def motion_at(one: Fitted | Prediction) -> Motion:
+    """The motion of a fit of several bodies; `t` is the time over a record, -1 to 1."""
+    problem, fit = one.problem, one.fit
+    good = problem.segments.inside & fit.good[:, None]
+    time, phase = clock_of(problem, fit)
+    return Motion(problem, fit, 1.0, 1.0, 1.0, time, phase, None, good)
+
+
+def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
+    """All that are tried at all places; knots are those of the training records."""
+    structure = training.problem.structure
+    for place in structure.places:
+        s, u = _stretch(training, place.row), _speed(training, place.row)
+        if not np.std(s[training.good]) > 0:
+            continue
+        of_speed, of_stretch = (knots_of(one[training.good], _KNOTS) for one in (u, s))
+        coarse = [knots_of(one[training.good], _FEWER) for one in (u, s)]
+        row, name = place.row, place.name
+
+        def over_speed(m: Motion, _: float, row=row, knots=of_speed) -> tuple:
+            return _pushed(m, splines(_speed(m, row), knots, m.good), row), None
+
+        def over_stretch(m: Motion, _: float, row=row, knots=of_stretch) -> tuple:
+            return _pushed(m, splines(_stretch(m, row), knots, m.good), row), None
+
+        def over_both(m: Motion, _: float, row=row, knots=coarse) -> tuple:
+            one, other = (
+                splines(f(m, row), k, m.good) for f, k in zip((_speed, _stretch), knots, strict=True)
+            )
+            forces = (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
+            return _pushed(m, forces, row), None
+
+        def drifting(m: Motion, _: float, row=row) -> tuple:
+            drift = np.stack([m.t, m.t * _speed(m, row), m.t * np.sign(_speed(m, row))], axis=2)
+            return None, _pushed(m, drift * m.good[:, :, None], row)
+
+        yield Hypothesis((f"speed at {name}",), over_speed)
+        yield Hypothesis((f"stretch at {name}",), over_stretch)
+        yield Hypothesis((f"speed at {name}", f"stretch at {name}"), over_both)
+        yield Hypothesis((f"slow time at {name}",), drifting)
+    if training.phase is not None:
+        for body, row in zip(structure.names, np.eye(structure.n), strict=True):
+
+            def over_phase(m: Motion, _: float, row=row) -> tuple:
+                waves = [f(k * m.phase) for k in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
+                return _pushed(m, np.stack(waves, axis=2) * m.good[:, :, None], row), None
+
+            yield Hypothesis((f"drive phase at {body}",), over_phase)
+    for path in kicks_of(training.problem, training.fit):
+
+        def at_impacts(m: Motion, _: float, path=path) -> tuple:
+            return kicks_of(m.problem, m.fit).get(path), None
+
+        yield Hypothesis((f"impact speed at {path}",), at_impacts)
+
+
+def _pushed(motion: Motion, forces: np.ndarray, row: np.ndarray) -> np.ndarray:
+    return columns_of(motion.problem, motion.fit, forces, row)
+
+
+def _stretch(motion: Motion, row: np.ndarray) -> np.ndarray:
+    return motion.fit.evaluation.motion[:, :, : row.size] @ row
+
+
+def _speed(motion: Motion, row: np.ndarray) -> np.ndarray:
+    return motion.fit.evaluation.motion[:, :, row.size :] @ row

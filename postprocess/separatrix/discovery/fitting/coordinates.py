@@ -1,0 +1,278 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The short-segment likelihood of machines of several bodies: any sensors, starts of all coordinates."""
+
+import numpy as np
+
+from separatrix.discovery.fitting.evaluation import Evaluation
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.problem import Problem, padded_table
+from separatrix.discovery.measured.bodies import Structure, structure_of
+from separatrix.discovery.measured.segments import Segments
+from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
+
+_TOLERANCE = 1e-10
+# of the distance of samples, and of a radian of the drive, over which an acceleration is the slope of v
+_SHARE, _INSTANT = 0.25, 1e-3
+# of a number of a joint, by which its force is differentiated
+_STEP = 1e-6
+
+
+class CoordinateProblem(Problem):
+    """Records of several sensors cut into segments, a structure, and what is free."""
+
+    def __init__(self, model, prepared: list[SensedPrepared], segments: Segments, free: list[Free]) -> None:
+        """Collect what every evaluation needs."""
+        self.structure = structure_of(model)
+        self.starts = 2 * self.structure.n
+        self.columns = list(dict.fromkeys(one.name for record in prepared for one in record.sensors))
+        self._frequencies = [
+            path
+            for path, parameter in model.parameters.items()
+            if path.startswith("drive.") and path.endswith(".frequency") and parameter.value
+        ]
+        super().__init__(model, prepared, segments, free)
+
+    @property
+    def channels(self) -> int:
+        """How many sensors the records have in all."""
+        return len(self.columns)
+
+    @property
+    def compared(self) -> np.ndarray:
+        """Samples of each sensor that are compared (segments, channels*length)."""
+        has = np.array([[one.sensor(name) is not None for name in self.columns] for one in self.prepared])
+        of_segments = has[self.segments.record]
+        inside = self.segments.inside
+        return (of_segments[:, :, None] & inside[:, None, :]).reshape(inside.shape[0], -1)
+
+    def _part(self, number: int) -> dict:
+        """The segments of one record as lists for the simulator."""
+        prepared = self.prepared[number]
+        rows = np.flatnonzero(self.segments.record == number)
+        first, last = self.segments.first[rows], self.segments.last[rows]
+        offsets = np.concatenate([[0], np.cumsum(last - first)])
+        samples = np.concatenate(
+            [np.arange(a, b) for a, b in zip(first, last, strict=True)] or [np.zeros(0, int)]
+        )
+        starts = prepared.record.t[first]
+        times = prepared.record.t[samples] - np.repeat(starts, last - first)
+        instant = 0.0
+        if any(one.kind == "a" for one in prepared.sensors):
+            radian = 1 / prepared.frequency if prepared.frequency else np.inf
+            instant = min(_SHARE * prepared.record.interval, _INSTANT * radian)
+        return {
+            "rows": rows,
+            "offsets": offsets,
+            "times": times,
+            "starts": starts,
+            "inside": self.segments.inside[rows],
+            "samples": samples,
+            "instant": instant,
+        }
+
+    def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
+        """Values of the machine as it was during record `number`."""
+        chosen = {
+            path: one.physical(value)
+            for one, value in zip(self.free, values, strict=True)
+            if not one.is_nuisance
+            for path in one.paths
+        }
+        prepared = self.prepared[number]
+        scale = self._nuisance("nuisance:drive_scale", number, values, None)
+        if scale is not None or prepared.drive_scale != 1.0:
+            for path, value in self.amplitudes.items():
+                chosen[path] = prepared.drive_scale * (1.0 if scale is None else scale) * value
+        if prepared.frequency is not None:
+            clock = self._nuisance("nuisance:clock", number, values, 0.0)
+            chosen |= dict.fromkeys(self._frequencies, prepared.frequency * (1 + clock))
+        return chosen
+
+    def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
+        """No ratio of frequencies here."""
+        raise AssertionError
+
+    def _chain(self, number: int, values: np.ndarray) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
+        """Paths, their values, which free parameters move them, and in which directions (one row each)."""
+        active, given, moves, directions = self._active(number, values, derivatives=True)
+        clock = [
+            j for j, one in enumerate(self.free) if one.path == "nuisance:clock" and one.record == number
+        ]
+        if not clock or self.prepared[number].frequency is None:
+            return active, given, moves, directions
+        chain = np.zeros((len(self.free), len(active)))
+        chain[moves] = directions
+        for path in self._frequencies:
+            chain[clock[0], active.index(path)] = self.prepared[number].frequency
+        moves = chain.any(axis=1)
+        return active, given, moves, chain[moves]
+
+    def _evaluate_record(
+        self,
+        number: int,
+        part: dict,
+        values: np.ndarray,
+        starts: np.ndarray,
+        wanted: tuple[bool, bool],
+        out: Evaluation,
+    ) -> None:
+        prepared, n = self.prepared[number], self.structure.n
+        derivatives, by_start_alone = wanted
+        if derivatives:
+            active, given, moves, directions = self._chain(number, values)
+            if by_start_alone:
+                moves, directions = np.zeros_like(moves), directions[:0]
+        else:
+            active, given, moves, directions = self._active(number, values, derivatives=False)
+        rows, inside = part["rows"], part["inside"]
+        angle = self.crank_angle(number, values, part["starts"])
+        start = np.column_stack([starts[rows], angle])
+        result, motion, jacobian = self._fly(part, active, given, start, directions)
+        length = inside.shape[1]
+        failed = np.asarray(result.reason) != 0
+        shown = padded_table(motion[0], inside)
+        failed |= np.any(inside[:, :, None] & ~np.isfinite(shown), axis=(1, 2))
+        out.failed[rows] = failed
+        watched = self.structure.names.index(self.structure.watched)
+        if out.motion is None:
+            out.motion = np.zeros((*self.segments.inside.shape, 2 * n))
+        out.motion[rows] = shown
+        out.x[rows], out.v[rows] = shown[:, :, watched], shown[:, :, n + watched]
+        out.hits[rows] = result.impacts
+        hits = result.impact
+        out.impacts[number] = np.column_stack(
+            [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side, result.contact]
+        )
+        if derivatives:
+            out.steady[rows] = np.asarray(result.steady, bool)
+            d = len(directions)
+            out.transition[rows] = padded_table(jacobian[0][:, :, d : d + 2 * n], inside)
+            crank = np.repeat(self._crank_slopes(number, part), np.diff(part["offsets"]), axis=0)
+        for channel, name in enumerate(self.columns):
+            sensor = prepared.sensor(name)
+            if sensor is None:
+                continue
+            columns = slice(channel * length, (channel + 1) * length)
+            shows, by_all = self._shown(sensor, part, motion, jacobian, active, given, directions)
+            residual = (sensor.values[part["samples"]] - shows) / sensor.sigma
+            out.residual[rows, columns] = np.nan_to_num(padded_table(residual, inside))
+            out.used[rows, columns] = self.compared[rows, columns]
+            if derivatives:
+                by_parameter = by_all[:, -1:] * crank
+                by_parameter[:, moves] += by_all[:, :d]
+                table = np.nan_to_num(padded_table(by_all[:, d : d + 2 * n] / sensor.sigma, inside))
+                out.by_start[rows, columns] = table
+                out.by_parameter[rows, columns] = np.nan_to_num(
+                    padded_table(by_parameter / sensor.sigma, inside)
+                )
+
+    def _crank_slopes(self, number: int, part: dict) -> np.ndarray:
+        """Derivatives of the crank angles at the starts by the free parameters."""
+        crank = np.zeros((part["starts"].size, len(self.free)))
+        prepared = self.prepared[number]
+        for j, one in enumerate(self.free):
+            if one.path == "nuisance:phase" and one.record == number:
+                crank[:, j] = 1
+            elif one.path == "nuisance:clock" and one.record == number:
+                crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
+        return crank
+
+    def _fly(self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, directions) -> tuple:
+        """Motion and Jacobian at the samples and, for accelerations, one and two instants later."""
+        instant = part["instant"]
+        times, offsets, each = part["times"], part["offsets"], 1
+        if instant:
+            each = 3
+            times = (times[:, None] + instant * np.arange(each)).ravel()
+            offsets = each * offsets
+        result = self.model.coordinate_segments(
+            active,
+            given,
+            start,
+            offsets,
+            times,
+            derivatives=directions is not None,
+            directions=directions,
+            tolerance=_TOLERANCE,
+        )
+        motion = [result.motion[k::each] for k in range(each)]
+        jacobian = None if directions is None else [result.jacobian[k::each] for k in range(each)]
+        return result, motion, jacobian
+
+    def _shown(
+        self,
+        sensor: Sensor,
+        part: dict,
+        motion: list[np.ndarray],
+        jacobian: list[np.ndarray] | None,
+        active: list[str],
+        given: np.ndarray,
+        directions: np.ndarray | None,
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """What a sensor shows at the samples, and its derivatives by directions, start and crank angle."""
+        structure = self.structure
+        n = structure.n
+        if sensor.kind == "F":
+            return joint_force(
+                structure, sensor.of, motion, jacobian, (active, given, directions), self.model
+            )
+        place = structure.names.index(sensor.of)
+        if sensor.kind in "xv":
+            column = place + n * (sensor.kind == "v")
+            return motion[0][:, column], None if jacobian is None else jacobian[0][:, column]
+        weights = np.array([-1.5, 2.0, -0.5]) / part["instant"]
+        found = sum(w * one[:, n + place] for w, one in zip(weights, motion, strict=True))
+        if jacobian is None:
+            return found, None
+        return found, sum(w * one[:, n + place] for w, one in zip(weights, jacobian, strict=True))
+
+
+def joint_force(
+    structure: Structure,
+    path: str,
+    motion: list[np.ndarray],
+    jacobian: list[np.ndarray] | None,
+    chosen: tuple,
+    model,
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Force of a spring or soft contact [N] and its derivatives; positive: it pulls its second end back."""
+    joint = structure.joint(path)
+    active, given, directions = chosen
+    n = structure.n
+    s, u = motion[0][:, :n] @ joint.row, motion[0][:, n:] @ joint.row
+    own = {
+        name.rpartition(".")[2]: parameter.value
+        for name, parameter in model.parameters.items()
+        if name.startswith(f"{path}.")
+    }
+    places = {name.rpartition(".")[2]: i for i, name in enumerate(active) if name.startswith(f"{path}.")}
+    own |= {key: given[i] for key, i in places.items()}
+    force, by_place, by_speed = _force(joint.law, own, s, u)
+    if jacobian is None:
+        return force, None
+    slopes = by_place[:, None] * np.einsum("kij,i->kj", jacobian[0][:, :n], joint.row)
+    slopes += by_speed[:, None] * np.einsum("kij,i->kj", jacobian[0][:, n:], joint.row)
+    for key, i in places.items():
+        step = _STEP * max(abs(own[key]), 1e-6)
+        moved = (_force(joint.law, {**own, key: own[key] + step}, s, u)[0] - force) / step
+        slopes[:, : len(directions)] += moved[:, None] * directions[:, i]
+    return force, slopes
+
+
+def _force(law: str, own: dict[str, float], s: np.ndarray, u: np.ndarray) -> tuple:
+    """Force of a joint and its slopes over place and speed."""
+    if law in ("linear", "polynomial"):
+        stretch = s - own.get("free_length", 0.0)
+        k, k2, k3, c = (own.get(key, 0.0) for key in ("stiffness", "quadratic", "cubic", "damping"))
+        force = k * stretch + k2 * stretch**2 + k3 * stretch**3 + c * u
+        return force, k + 2 * k2 * stretch + 3 * k3 * stretch**2, np.full(s.shape, c)
+    k, c = own["stiffness"], own.get("damping", 0.0)
+    force, by_place, by_speed = np.zeros(s.shape), np.zeros(s.shape), np.zeros(s.shape)
+    for key, side in (("upper", 1.0), ("lower", -1.0)):
+        depth = side * (s - own.get(key, side * np.inf))
+        push = k * depth + side * c * u
+        touches = (depth > 0) & ((push > 0) | (own.get("tension", 0.0) > 0))
+        force[touches] = side * push[touches]
+        by_place[touches], by_speed[touches] = k, c
+    return force, by_place, by_speed

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Effects that can be named in machines of several bodies: each at a place, as a law of the case file.
+
+An effect adds a joint, or gives one that is there a law that contains its own; so a case with it is an
+ordinary one. A row of the table is an effect; its name in a verdict is `EFFECT@PLACE`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.machine import Free, bounds_of
+from separatrix.discovery.fitting.places import PlaceScales, SensedScales
+from separatrix.discovery.measured.bodies import (
+    GROUND,
+    Joint,
+    Place,
+    Structure,
+    edited,
+    is_structure,
+    structure_of,
+)
+from separatrix.errors import SeparatrixError
+from separatrix.library import Effect, effects
+
+AT = "@"
+_FAR = 20.0
+# of the usual impact speed, above which a stop yields
+_YIELDS = 0.5
+
+
+@dataclass(frozen=True)
+class JointEffect:
+    """One effect: its family, what it changes of a case at a place, and the parameters that this frees.
+
+    `change` (case, place, joint, scales) edits the case and returns the path of the joint whose `keys` are
+    fitted, their values to start from: several of each are tried. `of` is the kind and law of the joint that
+    it needs there, '' for none.
+    """
+
+    name: str
+    meaning: str
+    family: str
+    change: Callable[[dict, Place, Joint | None, PlaceScales], str]
+    keys: Callable[[PlaceScales], dict[str, list[float]]]
+    amplitudes: tuple[str, ...]
+    sizes: tuple[str, ...] = ()
+    of: tuple[str, str] = ("", "")
+    acts: str = "flight"
+    # names that can be the same motion there, and when
+    confused: tuple[tuple[str, str], ...] = ()
+
+
+def _new(family: str, **law: object) -> Callable[[dict, Place, Joint | None, PlaceScales], str]:
+    """A further joint at the place."""
+
+    def change(case: dict, place: Place, _: Joint | None, scales: PlaceScales) -> str:
+        name = f"added_{len(case.setdefault(family, {})) + 1}"
+        case[family][name] = {"between": list(place.ends), **law}
+        return f"{family}.{name}"
+
+    return change
+
+
+def _relaw(law: str, **more: object) -> Callable[[dict, Place, Joint | None, PlaceScales], str]:
+    """Another law of a joint that is there, which contains that of the case."""
+
+    def change(case: dict, _: Place, joint: Joint, scales: PlaceScales) -> str:
+        family, name = joint.path.split(".")
+        case[family][name] |= {"law": law, **more}
+        return joint.path
+
+    return change
+
+
+def _load(case: dict, place: Place, _: Joint | None, scales: PlaceScales) -> str:
+    return f"body.{place.ends[1]}"
+
+
+def _softened(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
+    family, name = joint.path.split(".")
+    table = case[family][name]
+    ends = {key: table[key] for key in ("upper", "lower") if key in table}
+    stiffness = scales.mass * scales.impact_speed**2 / (0.03 * scales.length) ** 2
+    case[family][name] = {
+        "between": table["between"],
+        "law": "kelvin_voigt",
+        "stiffness": stiffness,
+        "damping": 0.3 * scales.mass * scales.impact_speed / (0.03 * scales.length),
+        "tension": 0.0,
+        **ends,
+    }
+    return joint.path
+
+
+JOINT_EFFECTS = {
+    one.name: one
+    for one in (
+        JointEffect(
+            "viscous", "damping that grows with the speed", "friction over speed",
+            _new("spring", damping=0.0),
+            lambda s: {"damping": [0.02 * s.force / s.speed]}, ("damping",),
+        ),
+        JointEffect(
+            "coulomb", "dry friction", "friction over speed", _new("friction", force=0.0),
+            lambda s: {"force": [0.02 * s.force]}, ("force",),
+        ),
+        JointEffect(
+            "quadratic_drag", "a drag that grows with the square of the speed", "friction over speed",
+            _new("friction", law="coulomb_quadratic", force=0.0, drag=0.0),
+            lambda s: {"drag": [0.02 * s.force / s.speed**2]}, ("drag",),
+        ),
+        JointEffect(
+            "stribeck", "friction that falls with the speed", "friction over speed",
+            _new("friction", law="coulomb_stribeck", force=0.0, static_force=0.0, stribeck_velocity=1.0,
+                 stribeck_exponent=2.0),
+            lambda s: {"static_force": [0.05 * s.force],
+                       "stribeck_velocity": [share * s.speed for share in (0.15, 0.04, 0.5)]},
+            ("static_force",), ("stribeck_velocity",),
+        ),
+        JointEffect(
+            "cubic_spring", "a force that grows with the cube of the stretch", "spring over stretch",
+            _new("spring", law="polynomial", stiffness=0.0, cubic=0.0),
+            lambda s: {"cubic": [0.02 * s.force / s.length**3]}, ("cubic",),
+        ),
+        JointEffect(
+            "quadratic_spring", "a force that grows with the square of the stretch", "spring over stretch",
+            _new("spring", law="polynomial", stiffness=0.0, quadratic=0.0),
+            lambda s: {"quadratic": [0.02 * s.force / s.length**2]}, ("quadratic",),
+        ),
+        JointEffect(
+            "linear_spring", "a spring that the case lacks", "spring over stretch",
+            _new("spring", stiffness=0.0),
+            lambda s: {"stiffness": [0.02 * s.force / s.length]}, ("stiffness",),
+        ),
+        JointEffect(
+            "offset_force", "a constant force", "force over place", _load,
+            lambda s: {"load": [0.02 * s.force]}, ("load",),
+        ),
+        JointEffect(
+            "restitution_falloff", "restitution that falls with the impact speed", "restitution over "
+            "impact speed",
+            _relaw("newton_power", yield_speed=1.0, falloff=0.0),
+            lambda s: {"falloff": [0.05], "yield_speed": [_YIELDS * s.impact_speed, 0.1 * s.impact_speed]},
+            ("falloff",), ("yield_speed",), ("contact", "newton"), "barrier",
+        ),
+        JointEffect(
+            "compliant_contact", "a stop that gives way", "contact over penetration", _softened,
+            lambda s: {
+                "stiffness": [
+                    s.mass * s.impact_speed**2 / (share * s.length) ** 2 for share in (0.03, 0.008, 0.1)
+                ],
+                "damping": [0.3 * s.mass * s.impact_speed / (0.03 * s.length)],
+            },
+            (), ("stiffness", "damping"), ("contact", "newton"), "barrier",
+        ),
+    )
+}  # fmt: skip
+"""The table: one row for each effect."""
+
+
+def effect_of(name: str) -> Effect:
+    """What is known of an effect of one body, or of one at a place of several."""
+    if AT not in name:
+        return effects()[name]
+    kind, _, place = name.partition(AT)
+    row = JOINT_EFFECTS[kind]
+    confused = {f"{other}{AT}{place}": reason for other, reason in row.confused}
+    return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", confused)
+
+
+def place_of(name: str) -> str:
+    """The place in the name of an effect, '' of one body."""
+    return name.partition(AT)[2]
+
+
+def names_for(model, asked: tuple[str, ...] | None) -> list[str]:
+    """Names of all effects that a machine may lack, of those that were asked for."""
+    if not is_structure(model):
+        return [name for name in STARTS if not asked or name in asked]
+    structure = structure_of(model)
+    return [
+        f"{kind}{AT}{place}"
+        for kind, row in JOINT_EFFECTS.items()
+        if not asked or kind in asked
+        for place in _places(row, structure)
+    ]
+
+
+def _places(row: JointEffect, structure: Structure) -> list[str]:
+    """Places at which an effect may act: where there is such a joint, or where any force may be."""
+    if row.of[0]:
+        return [joint.path for joint in structure.joints if _is(joint, row)]
+    if row.name == "offset_force":
+        return [one.name for one in structure.places if one.ends[0] == GROUND]
+    return [one.name for one in structure.places]
+
+
+def _is(joint: Joint, row: JointEffect) -> bool:
+    return joint.path.startswith(f"{row.of[0]}.") and joint.law == row.of[1]
+
+
+def candidate_of(
+    model, free: list[Free], names: tuple[str, ...], name: str, scales: Scales | SensedScales
+) -> Candidate | str:
+    """The machine with the effect `name` added, or why that makes no sense."""
+    if AT not in name:
+        return candidate(model, free, names, name, scales)
+    kind, _, where = name.partition(AT)
+    row, structure = JOINT_EFFECTS[kind], structure_of(model)
+    joint = structure.joint(where) if row.of[0] else None
+    ends = joint.ends if joint else structure.place(where).ends
+    place = Place(where, ends, joint.row if joint else structure.place(where).row, ())
+    size = scales.at(where)
+    if size is None:
+        return "nothing moves there in these records"
+    if row.of[0] and not size.impact_speed > 0:
+        return "there are no impacts in these records"
+    path = ""
+
+    def change(case: dict) -> None:
+        nonlocal path
+        path = row.change(case, place, joint, size)
+
+    keys = row.keys(size)
+    try:
+        extended = edited(model, change)
+    except SeparatrixError as reason:
+        return str(reason)
+    added = []
+    whole = [one for one in free if one.is_nuisance or one.path in extended.parameters]
+    own = {f"{path}.{key}" for key in keys}
+    if any(one.path in own for one in whole):
+        return "the base machine has it, and it is fitted"
+    for key, values in keys.items():
+        parameter = extended.parameters[f"{path}.{key}"]
+        if key in row.sizes:
+            ends = np.log([min(values) / _FAR, max(values) * _FAR])
+            added.append(Free(f"{path}.{key}", float(np.log(values[0])), *ends, 0.1, positive=True))
+        else:
+            lower, upper = bounds_of(parameter)
+            if key == "static_force":
+                # -1 stands for the force of sliding
+                lower = 0.0
+            added.append(Free(f"{path}.{key}", values[0], lower, upper, abs(values[0])))
+    at = tuple(range(len(whole), len(whole) + len(added)))
+    linear = np.array([key in row.amplitudes for key in keys])
+    choices = []
+    for (key, values), one in zip(keys.items(), added, strict=True):
+        signs = (1.0, -1.0) if key in row.amplitudes and one.lower < 0 else (1.0,)
+        fitted = np.log(values) if one.positive else np.array(values)
+        choices.append([float(sign * value) for value in fitted for sign in signs])
+    starts = [np.array(values, float) for values in product(*choices)]
+    forms = list(np.unique(np.where(linear, 0.0, np.array(starts)), axis=0))
+    # what a form starts from must be a machine, whatever the joint of the case has
+    extended = _with_starts(extended, added)
+    return Candidate((*names, name), extended, whole + added, at, starts, forms, linear)
+
+
+def _with_starts(model, added: list[Free]):
+    values = {one.path: one.physical(one.value) for one in added}
+    return type(model).from_text(model.to_text(values))

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Families of forces at the places of a machine of several bodies, and the small faults of its rig.
+
+As in `ceiling` and `rig` those of one body: what a flexible machine could explain of what a fit left over,
+and what is no missing effect.
+"""
+
+import numpy as np
+
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.joint_response import columns_of, sample_times_of, sigmas_of
+from separatrix.discovery.fitting.motions import knots_of, splines
+
+_KNOTS, _HARMONICS = 6, 3
+_ALL_HARMONICS = 6
+# impacts of a contact from which on its kicks are tried
+_FEWEST_IMPACTS = 4
+# standard deviation of a fault of a rig over the signal
+_SIZE = 1e-3
+
+
+def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
+    """Columns of families of forces by name: over speed, stretch and time at places, phase, kicks."""
+    structure, n = problem.structure, problem.structure.n
+    good = problem.segments.inside & fit.good[:, None]
+    motion = fit.evaluation.motion
+    found = {}
+    time, phase = clock_of(problem, fit)
+    for place in structure.places:
+        s, u = motion[:, :, :n] @ place.row, motion[:, :, n:] @ place.row
+        if not np.std(s[good]) > 0:
+            continue
+        over = {
+            "speed": splines(u, knots_of(u[good], _KNOTS), good),
+            "stretch": splines(s, knots_of(s[good], _KNOTS), good),
+            "time": np.stack([time, time * u / np.std(u[good]), time * np.sign(u)], axis=2)
+            * good[:, :, None],
+        }
+        for name, forces in over.items():
+            found[f"{name} at {place.name}"] = columns_of(problem, fit, forces, place.row)
+    if phase is not None:
+        waves = [f(k * phase) for k in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
+        forces = np.stack(waves, axis=2) * good[:, :, None]
+        for body, row in zip(structure.names, np.eye(n), strict=True):
+            found[f"phase at {body}"] = columns_of(problem, fit, forces, row)
+    for name, kicks in kicks_of(problem, fit).items():
+        found[f"impacts of {name}"] = kicks
+    return found
+
+
+def clock_of(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.ndarray | None]:
+    """Time of the samples, -1 to 1 over a record, and crank angle; None without a drive."""
+    shape = problem.segments.inside.shape
+    time, phase = np.zeros(shape), None
+    for number, prepared in enumerate(problem.prepared):
+        rows = np.flatnonzero(problem.segments.record == number)
+        t = prepared.record.t
+        stamps = t[problem.segments.index[rows]]
+        time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
+        if prepared.frequency is not None:
+            phase = np.zeros(shape) if phase is None else phase
+            phase[rows] = problem.crank_angle(number, fit.values, stamps)
+    return time, phase
+
+
+def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
+    """Kicks at the impacts of each contact by its path: a cubic of the speed before."""
+    structure = problem.structure
+    times = sample_times_of(problem)
+    tables: dict[int, np.ndarray] = {}
+    for number, hits in enumerate(fit.evaluation.impacts):
+        rows = np.flatnonzero(problem.segments.record == number)
+        for segment, time, before, _, side, contact in hits if hits is not None else ():
+            row = rows[int(segment)]
+            j = int(np.searchsorted(times[row][problem.segments.inside[row]], time))
+            if j < problem.segments.inside[row].sum() and before > 0:
+                table = tables.setdefault(int(contact), np.zeros((*times.shape, 4)))
+                table[row, j] = -side * before ** np.arange(4)
+    found = {}
+    for contact, table in tables.items():
+        hit = np.any(table != 0, axis=2)
+        if np.count_nonzero(hit) < _FEWEST_IMPACTS:
+            continue
+        name = problem.model.contacts[contact]
+        path = name if "." in name else f"contact.{name}"
+        found[path] = columns_of(problem, fit, table, structure.joint(path).row, kick=True)
+    return found
+
+
+def fault_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
+    """Columns of small faults of a rig: sensors that are not quite linear, further harmonics of a drive."""
+    count, length = problem.segments.inside.shape
+    good = problem.segments.inside & fit.good[:, None]
+    columns = []
+    for channel, name in enumerate(problem.columns):
+        signal = np.zeros((count, length))
+        for number, prepared in enumerate(problem.prepared):
+            sensor, rows = prepared.sensor(name), np.flatnonzero(problem.segments.record == number)
+            if sensor is not None:
+                signal[rows] = sensor.values[problem.segments.index[rows]]
+        part = slice(channel * length, (channel + 1) * length)
+        seen = good & (fit.evaluation.used[:, part] > 0)
+        swing = float(np.std(signal[seen])) if seen.any() else 0.0
+        if swing == 0:
+            continue
+        u = (signal - np.mean(signal[seen])) / swing
+        for power in (2, 3):
+            table = np.zeros((count, fit.evaluation.residual.shape[1], 1))
+            table[:, part, 0] = seen * _SIZE * swing * u**power / sigmas_of(problem, name)[:, None]
+            columns.append(table)
+    _, phase = clock_of(problem, fit)
+    n = problem.structure.n
+    for body in problem.structure.driven if phase is not None else ():
+        if body not in problem.structure.names:
+            continue
+        place = problem.structure.names.index(body)
+        steps = np.diff(sample_times_of(problem), axis=1)
+        usable = good[:, 1:] & (steps > 0)
+        speeds = fit.evaluation.motion[:, :, n + place]
+        rates = np.diff(speeds, axis=1)[usable] / steps[usable]
+        usual = problem.structure.mass[place] * float(np.median(np.abs(rates))) / 0.6745
+        waves = [f(k * phase) for k in range(1, _ALL_HARMONICS + 1) for f in (np.sin, np.cos)]
+        forces = _SIZE * usual * np.stack(waves, axis=2) * good[:, :, None]
+        columns.append(columns_of(problem, fit, forces, np.eye(n)[place]))
+    return problem.whitened(np.concatenate(columns, axis=2))

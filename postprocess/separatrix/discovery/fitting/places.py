@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sizes of motion and forces at the places of a machine of several bodies, along a fitted motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.measured.bodies import Structure, structure_of
+
+# stretch or speed over the largest at any place, below which nothing moves there
+_STILL = 1e-9
+
+
+@dataclass(frozen=True)
+class PlaceScales:
+    """Of a place: mass that a force moves, stretch, speed, force, impact speed (0: none), in SI units."""
+
+    mass: float
+    length: float
+    speed: float
+    force: float
+    impact_speed: float
+
+
+@dataclass(frozen=True)
+class SensedScales:
+    """Typical sizes in the records, by place and joint."""
+
+    places: dict[str, PlaceScales | None]
+    # of what forces are over; they are counted on the coordinates themselves
+    mass: float = 1.0
+
+    def at(self, name: str) -> PlaceScales | None:
+        """Sizes at a place, or joint; None where nothing moves."""
+        return self.places.get(name)
+
+
+def place_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
+    """Measure all places along the motion of a fit."""
+    structure = structure_of(problem.model)
+    inside = problem.segments.inside & fit.good[:, None]
+    if not inside.any():
+        inside = problem.segments.inside & ~fit.evaluation.failed[:, None]
+    motion = fit.evaluation.motion[inside]
+    n = structure.n
+    # accelerations from neighbours within segments; impacts are far above
+    steps = np.diff(fit.evaluation.motion[:, :, n:], axis=1)
+    both = inside[:, 1:] & inside[:, :-1]
+    interval = float(np.median([one.record.interval for one in problem.prepared]))
+    rates = steps[both] / interval
+    found: dict[str, PlaceScales | None] = {}
+    largest = float(np.max(np.std(motion[:, :n], axis=0)))
+    rows = {one.name: one.row for one in structure.places} | {one.path: one.row for one in structure.joints}
+    for name, row in rows.items():
+        length = float(np.std(motion[:, :n] @ row))
+        speed = float(np.sqrt(np.mean((motion[:, n:] @ row) ** 2)))
+        if length <= _STILL * largest:
+            found[name] = None
+            continue
+        mass = 1 / float(row @ (row / structure.mass))
+        size = float(np.median(np.abs(rates @ row)) / 0.6745)
+        found[name] = PlaceScales(
+            mass, length, speed, mass * size, _impact_speed(problem, fit, structure, name)
+        )
+    return SensedScales(found)
+
+
+def _impact_speed(problem: CoordinateProblem, fit: Fit, structure: Structure, name: str) -> float:
+    """Usual speed of impacts of a contact, 0 without any."""
+    contacts = [f"contact.{one}" if "." not in one else one for one in problem.model.contacts]
+    if name not in contacts:
+        return 0.0
+    hits = [one for one in fit.evaluation.impacts if one is not None and len(one)]
+    if not hits:
+        return 0.0
+    table = np.concatenate(hits)
+    speeds = table[table[:, 5] == contacts.index(name), 2]
+    return float(np.median(speeds)) if speeds.size else 0.0

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a machine of several bodies is made of: coordinates, joints between them, and places where forces act.
+
+A place is two bodies, or one and the ground, between which a joint may lie; its coordinate is second minus
+first. Two joints at one place are one to all forces there.
+"""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from separatrix.cases import toml
+from separatrix.errors import SeparatrixError
+from separatrix.library import Model
+
+KINDS = ("spring", "friction", "contact")
+"""Tables of a case that are joints."""
+GROUND = "ground"
+# what every case has beside its machine and a base machine does not need
+_OF_RUNS = ("axis", "sweep", "record", "grid", "refine")
+_PAIR = "driving", "driven"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the case: its path, as `spring.coupling`, its law, ends, row over the coordinates, table."""
+
+    path: str
+    law: str
+    ends: tuple[str, str]
+    row: np.ndarray
+    table: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Two bodies, or one on the ground: name, ends, row over the coordinates, paths of the joints there."""
+
+    name: str
+    ends: tuple[str, str]
+    row: np.ndarray
+    joints: tuple[str, ...]
+
+    def text(self) -> str:
+        """In words."""
+        first, second = self.ends
+        where = f"on {second}" if first == GROUND else f"between {first} and {second}"
+        return f"{where} ({', '.join(self.joints)})" if self.joints else f"{where} (no joint in the case)"
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A machine of several bodies as its case says it."""
+
+    names: tuple[str, ...]
+    mass: np.ndarray
+    joints: tuple[Joint, ...]
+    places: tuple[Place, ...]
+    watched: str
+    # bodies that a drive acts on
+    driven: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.names)
+
+    def joint(self, path: str) -> Joint:
+        """The joint with a path."""
+        return next(one for one in self.joints if one.path == path)
+
+    def place(self, name: str) -> Place:
+        """The place with a name."""
+        return next(one for one in self.places if one.name == name)
+
+
+def is_structure(model: Model) -> bool:
+    """Whether a machine has coordinates by name."""
+    return "body.in_sequence" in model.parameters
+
+
+def is_pair(model: Model) -> bool:
+    """Whether a machine is a frictional pair."""
+    return "body.driven_mass" in model.parameters
+
+
+@lru_cache(maxsize=256)
+def structure_of(model: Model) -> Structure:
+    """The structure of a model; what no base machine can have is refused."""
+    case = tomllib.loads(model.to_text({}))
+    if case.get("structure"):
+        raise SeparatrixError(
+            "structure: found a structure of matrices or modes, allowed for a base machine bodies "
+            "and joints: "
+            "its inner coordinates have no joints of their own"
+        )
+    names = model.coordinates
+    bodies = [name for name, table in case["body"].items() if isinstance(table, dict)]
+    joints = []
+    for kind in KINDS:
+        for name, table in case.get(kind, {}).items():
+            ends = tuple(table["between"])
+            if table["law"] == "elastic_coulomb":
+                raise SeparatrixError(
+                    f"{kind}.{name}.law: found elastic_coulomb, whose stretch no start of a segment "
+                    "says; allowed "
+                    "for a base machine all other laws"
+                )
+            joints.append(Joint(f"{kind}.{name}", table["law"], ends, _row(ends, names), table))
+    places: dict[tuple[str, str], list[str]] = {}
+    for joint in joints:
+        places.setdefault(_sorted(joint.ends, bodies), []).append(joint.path)
+    for name in names:
+        places.setdefault((GROUND, name), [])
+    found = []
+    for ends, paths in places.items():
+        row = _row(ends, names)
+        if row.any():
+            name = ends[1] if ends[0] == GROUND else "-".join(ends)
+            found.append(Place(name, ends, row, tuple(paths)))
+    mass = np.array([case["body"][name]["mass"] for name in names])
+    watched = case.get("watch", {}).get("body", names[0])
+    drives = case.get("drive", {}).values()
+    driven = tuple(dict.fromkeys(one["body"] for one in drives if isinstance(one, dict) and "body" in one))
+    return Structure(names, mass, tuple(joints), tuple(found), watched, driven)
+
+
+def _sorted(ends: tuple[str, str], bodies: list[str]) -> tuple[str, str]:
+    """Ends of a joint in the order of the case, the ground first."""
+    order = [GROUND, *bodies]
+    return tuple(sorted(ends, key=order.index))
+
+
+def _row(ends: tuple[str, str], names: tuple[str, ...]) -> np.ndarray:
+    """Second minus first; ground and bodies whose motion is given are no coordinates."""
+    first, second = ends
+    return np.array([(name == second) - (name == first) for name in names], float)
+
+
+def edited(model: Model, change: Callable[[dict], None]) -> Model:
+    """The model whose case a function has changed; tables of runs go where they do not fit any more."""
+    case = tomllib.loads(model.to_text({}))
+    change(case)
+    try:
+        return _model(case)
+    except SeparatrixError:
+        return _model({key: value for key, value in case.items() if key not in _OF_RUNS})
+
+
+def _model(case: dict) -> Model:
+    return Model.from_text("\n".join(f"{key} = {toml(value)}" for key, value in case.items()) + "\n")
+
+
+def pair_as_structure(model: Model) -> Model:
+    """A frictional pair written down joint by joint: bodies `driving` and `driven`."""
+    case = tomllib.loads(model.to_text({}))
+    body, drive, contact = case["body"], case["drive"], case["contact"]
+    driving, driven = _PAIR
+    if drive["law"] not in ("none", "force", "sine") or body.get("blow"):
+        raise SeparatrixError(
+            f"drive.law: found {drive['law']}{' with a blow' if body.get('blow') else ''}, allowed "
+            "for a pair as "
+            "base machine none, force, sine, without a blow"
+        )
+    made = {key: case[key] for key in ("title", "run", "integrator") if key in case}
+    made["body"] = {
+        driving: {"mass": body["mass"]},
+        driven: {"mass": body["driven_mass"]},
+    }
+    made["watch"] = {"body": driven}
+    made["start"] = case["start"]
+    if body["friction"]:
+        made["friction"] = {"interface": {"between": list(_PAIR), "force": body["friction"]}}
+    spring = {}
+    if case["restoring"]["law"] != "none":
+        spring = {key: case["restoring"][key] for key in ("stiffness", "free_length")}
+    if "damping" in case["friction"]:
+        spring["damping"] = case["friction"]["damping"]
+    if spring:
+        made["spring"] = {"frame": {"between": [driving], **spring}}
+    if contact["law"] != "none":
+        carried = body["law"] == "backlash_pair"
+        made["contact"] = {"stop": {"between": list(_PAIR) if carried else [driven], **contact}}
+    if drive["law"] == "force":
+        made["drive"] = {"force": {**drive, "law": "force", "body": driving}}
+    elif drive["law"] == "sine":
+        shaken = {"law": "motion", "body": driving, "frequency": drive["frequency"]}
+        made["drive"] = {"motion": {**shaken, "mean": drive.get("mean", 0.0), "sine": [drive["amplitude"]]}}
+    else:
+        made["body"][driving] |= {"x0": body["driver_x0"], "v0": body["driver_v0"]}
+    return _model(made)

@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records of machines of several bodies: a column for each sensor, named by its kind and what it is on.
+
+`x.BODY`, `v.BODY`, `a.BODY` are place, velocity and acceleration of a body, `F.JOINT` is the force of a
+spring or a soft contact, positive where it pulls the second of its ends back towards the first. Not every
+body needs a sensor. `x` and `v` alone are of the watched body.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from separatrix.discovery.measured.bodies import Structure, structure_of
+from separatrix.discovery.measured.preflight import Prepared, turning
+from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
+from separatrix.errors import SeparatrixError
+from separatrix.library import Model
+
+# laws of joints whose force follows from place and speed
+FORCES = ("linear", "polynomial", "kelvin_voigt")
+_FEWEST_PER_PERIOD, _FEWEST_PERIODS = 12, 2.0
+_MOST_SAMPLES = 50_000
+
+
+@dataclass
+class Sensor:
+    """One column: kind (x, v, a, F), body or path of the joint, values [SI], noise, whether it is known."""
+
+    name: str
+    kind: str
+    of: str
+    values: np.ndarray
+    sigma: float
+    stated: bool
+
+
+@dataclass
+class SensedPrepared(Prepared):
+    """A record of several sensors; `sigma` is the noise of the first."""
+
+    sensors: list[Sensor] = field(default_factory=list)
+
+    @property
+    def signal(self) -> np.ndarray:
+        """What the first sensor shows."""
+        return self.sensors[0].values
+
+    @property
+    def noise(self) -> tuple:
+        """Noise of all sensors and its memory."""
+        return (self.memory, *(one.sigma for one in self.sensors))
+
+    @noise.setter
+    def noise(self, known: tuple) -> None:
+        self.memory = known[0]
+        for one, sigma in zip(self.sensors, known[1:], strict=True):
+            one.sigma = sigma
+        self.sigma = self.sensors[0].sigma
+
+    def sensor(self, name: str) -> Sensor | None:
+        """The sensor of a column, if this record has it."""
+        return next((one for one in self.sensors if one.name == name), None)
+
+
+def prepare_sensors(record: Record, model: Model, rest: Record | None = None) -> SensedPrepared:
+    """Find what each column of a record is of, its noise, and the drive."""
+    structure = structure_of(model)
+    notes = list(record.warnings)
+    if rest is not None:
+        raise SeparatrixError(
+            f"{rest.file}: found a record at rest, allowed for several bodies stated noise: "
+            "noise.x.BODY in the header"
+        )
+    if record.force is not None:
+        raise SeparatrixError(
+            f"{record.file}: found a column force, allowed F.JOINT of a machine of several bodies"
+        )
+    if record.t.size > _MOST_SAMPLES:
+        raise SeparatrixError(
+            f"{record.file}: {record.t.size} samples, at most {_MOST_SAMPLES} a record of several "
+            "bodies: keep a part "
+            f"of it, or every {-(-record.t.size // _MOST_SAMPLES)}th row"
+        )
+    columns = dict(record.sensors)
+    if not columns:
+        columns[f"x.{structure.watched}"] = record.x
+        if record.v is not None:
+            columns[f"v.{structure.watched}"] = record.v
+    sensors = [_sensor(record, name, values, structure, notes) for name, values in columns.items()]
+    first = sensors[0]
+    prepared = SensedPrepared(
+        record,
+        first.sigma,
+        np.inf,
+        resolution_of(first.values),
+        notes=notes,
+        origin=record.header.get("phase_origin_s", float(record.t[0])),
+        sigma_stated=all(one.stated for one in sensors),
+        sensors=sensors,
+    )
+    prepared.drive_scale = record.header.get("drive_scale", 1.0)
+    _find_drive(prepared, model)
+    return prepared
+
+
+def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure, notes: list[str]) -> Sensor:
+    kind, _, of = name.partition(".")
+    if kind == "F":
+        joints = {one.path: one for one in structure.joints}
+        named = [path for path in joints if of in (path, path.partition(".")[2])]
+        if len(named) != 1:
+            raise SeparatrixError(
+                f"{record.file}: column '{name}': {'several joints' if named else 'no joint'} of this "
+                "name; allowed "
+                f"{', '.join(f'F.{path}' for path in joints)}"
+            )
+        if joints[named[0]].law not in FORCES:
+            raise SeparatrixError(
+                f"{record.file}: column '{name}': the force of a joint with law "
+                f"{joints[named[0]].law} is no function "
+                f"of place and speed; allowed {', '.join(FORCES)}"
+            )
+        of = named[0]
+    elif of not in structure.names:
+        raise SeparatrixError(
+            f"{record.file}: column '{name}': no coordinate of this name; allowed "
+            f"{', '.join(structure.names)}"
+        )
+    if np.ptp(values) == 0:
+        raise SeparatrixError(f"{record.file}: '{name}' is constant")
+    stated = record.header.get(f"noise.{name}", 0.0)
+    if not stated and kind == "x":
+        stated = record.header.get("sensor_noise_sigma_m", 0.0)
+    if not stated and kind == "v":
+        stated = record.header.get("sensor_noise_sigma_m_s", 0.0)
+    floor = resolution_of(values) / np.sqrt(12)
+    sigma = float(np.hypot(stated, floor)) if stated else max(white_noise(values), floor)
+    sigma = max(sigma, QUIET * float(np.std(values)))
+    if not stated:
+        notes.append(f"noise of {name}: {sigma:.3g}, from fourth differences")
+    if kind == "x" and np.std(values) < 5 * sigma:
+        raise SeparatrixError(
+            f"{record.file}: {name} scatters by {np.std(values):.3g} m at a noise of {sigma:.3g} m: "
+            "nothing but noise"
+        )
+    return Sensor(name, kind, of, values, sigma, bool(stated))
+
+
+def _find_drive(prepared: SensedPrepared, model: Model) -> None:
+    """Frequency and phase of the drives of a case."""
+    record, header = prepared.record, prepared.record.header
+    frequencies = {
+        parameter.value
+        for path, parameter in model.parameters.items()
+        if path.startswith("drive.") and path.endswith(".frequency") and parameter.value
+    }
+    if not frequencies:
+        return
+    if len(frequencies) > 1:
+        raise SeparatrixError(
+            "drive: found drives of several frequencies, allowed for a base machine one frequency"
+        )
+    if "drive_ratio" in header:
+        raise SeparatrixError(
+            f"{record.file}: found drive_ratio, allowed for several bodies drive_frequency_rad_s: "
+            "there is no one "
+            "natural frequency"
+        )
+    if record.phi is not None:
+        prepared.frequency, prepared.phase = turning(record)
+        prepared.origin = float(record.t[0])
+        prepared.phase_known = True
+    else:
+        prepared.frequency = header.get("drive_frequency_rad_s", frequencies.pop())
+        prepared.phase = header.get("phase", 0.0)
+        prepared.phase_stated = "phase" in header
+        if "drive_frequency_rad_s" not in header:
+            prepared.notes.append(
+                f"no drive_frequency_rad_s: that of the case, {prepared.frequency:g}, is taken"
+            )
+        if not prepared.phase_stated:
+            prepared.notes.append("no phase: it is searched for")
+    if prepared.period_samples < _FEWEST_PER_PERIOD:
+        raise SeparatrixError(
+            f"{record.file}: {prepared.period_samples:.1f} samples per drive period, at least "
+            f"{_FEWEST_PER_PERIOD} "
+            "are needed"
+        )
+    periods = record.duration / record.interval / prepared.period_samples
+    if periods < _FEWEST_PERIODS:
+        raise SeparatrixError(
+            f"{record.file}{record.part}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} "
+            "are needed"
+        )
