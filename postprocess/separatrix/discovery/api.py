@@ -10,6 +10,7 @@ from pathlib import Path
 from separatrix.cases import Case, as_case
 from separatrix.discovery.cli import summary
 from separatrix.discovery.fitting.catalogue import STARTS
+from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, extended_case, replacing, require_writable, write_results
@@ -86,8 +87,9 @@ def discover(
     case = as_case(case)
     effects = [effects] if isinstance(effects, str) else effects
     for name in effects or ():
-        if name not in STARTS:
-            raise SeparatrixError(f"effects: found '{name}', allowed {', '.join(STARTS)}", USAGE)
+        known = dict.fromkeys([*STARTS, *JOINT_EFFECTS])
+        if name not in known:
+            raise SeparatrixError(f"effects: found '{name}', allowed {', '.join(known)}", USAGE)
     with Progress(progress) as told:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,

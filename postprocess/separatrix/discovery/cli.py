@@ -16,10 +16,11 @@ import numpy as np
 
 from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.fitting.catalogue import STARTS
+from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
-from separatrix.discovery.wording import searched, with_error
+from separatrix.discovery.wording import of_effects, searched, with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import INTERNAL, INTERRUPTED, NO_MEMORY, TERMINATED, SeparatrixError
 from separatrix.version import __version__
@@ -137,9 +138,8 @@ def summary(verdict: dict) -> list[str]:
             added(verdict),
         ],
     }[verdict["outcome"]]
-    for path, found in verdict["parameters"].items():
-        if path.startswith("effect."):
-            lines.append(f"  {path} = {with_error(found)}")
+    lines += [f"  {name} sits {place}" for name, place in verdict["places"].items()]
+    lines += [f"  {path} = {with_error(verdict['parameters'][path])}" for path in of_effects(verdict)]
     if verdict["function"]:
         lines.append(f"  {verdict['families'][-1]}: {verdict['function']['text']}")
     for use, gap in verdict["gap"].items():
@@ -195,7 +195,10 @@ def _parser() -> Parser:
     parser.add_argument("--quick", action="store_true", help="a first look: fewer starts and candidates")
     parser.add_argument("--seed", type=whole_number(0), default=1, help="of all random choices [1]")
     parser.add_argument(
-        "--effects", metavar="LIST", type=list_of(STARTS), help="only these effects of the catalogue"
+        "--effects",
+        metavar="LIST",
+        type=list_of([*STARTS, *JOINT_EFFECTS]),
+        help="only these effects of the catalogue",
     )
     parser.add_argument(
         "--segment-periods",

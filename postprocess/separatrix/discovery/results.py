@@ -203,6 +203,7 @@ def write_details(path: Path, findings: Findings) -> None:
                     for sensor in prepared.sensors:
                         group[sensor.name] = sensor.values
                         group[sensor.name].attrs["sigma"] = sensor.sigma
+                    group["impacts"] = np.zeros((0, 6))
                     continue
                 if prepared.in_force:
                     group["force"] = prepared.record.force

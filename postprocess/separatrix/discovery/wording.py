@@ -40,6 +40,16 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def of_effects(verdict: dict) -> list[str]:
+    """Paths of the parameters of the effects of a verdict, those that the base machine has too included."""
+    several = verdict["places"]
+    return [
+        path
+        for path in verdict["parameters"]
+        if path.startswith("effect.") or (several and path not in verdict["base_parameters"])
+    ]
+
+
 def searched(verdict: dict) -> str:
     """Where the effects of a verdict were looked for."""
     return "the catalogue" if verdict["asked_for"] is None else "the part of the catalogue that was asked for"

@@ -16,6 +16,7 @@ from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.decision.verdict import Findings, verdict_of
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.fitting.data import Data, fit_stages, gather, scales_of
+from separatrix.discovery.fitting.joint_effects import names_for
 from separatrix.discovery.fitting.machine import on_other_records, with_values
 from separatrix.discovery.fitting.places import place_scales
 from separatrix.discovery.fitting.refit import Fitted
@@ -55,6 +56,8 @@ def investigate(
     began = time.monotonic()
     options = options or Options()
     model = _model(base)
+    # what cannot be looked for is refused before any work
+    names_for(model, options.candidates)
     read = [[_record(one) for one in group] for group in (records, hold_out)]
     still = None if rest is None else _record(rest, at_rest=True)
     training, held_out, chosen = _split(*read, model, still, options)

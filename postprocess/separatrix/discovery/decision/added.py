@@ -10,6 +10,7 @@ from separatrix.discovery.decision.flexible import best_table
 from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import fits_machine
 from separatrix.discovery.fitting.members import MEMBERS
 
@@ -26,6 +27,8 @@ def with_law(bench: Bench, decision: Decision) -> Decision:
         return replace(decision, outcome="characterised", characters=[decision.suspected], added=found)
     if decision.outcome != "characterised":
         return decision
+    if isinstance(decision.rounds[0].base.problem, CoordinateProblem):
+        return replace(decision, not_added="nothing is added to the case: tables are laws of one body")
     reasons = []
     for character in decision.characters:
         found = _law(bench, decision, character)
@@ -70,5 +73,5 @@ def _elsewhere(character: Character) -> str:
     mass = stiffness / character.constant**2
     return (
         f"; a further body of {mass:.3g} kg on a spring of {stiffness:.3g} N/m has such a state: that is a "
-        "structure (docs/case-file.md), which is no base machine yet"
+        "structure (docs/case-file.md), which can be a base machine itself (docs/discovery-bodies.md)"
     )

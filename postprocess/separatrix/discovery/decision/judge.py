@@ -12,6 +12,7 @@ from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
 from separatrix.discovery.fitting.joint_effects import effect_of
+from separatrix.discovery.fitting.places import usual_speed
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.rig import share_beside_faults
 from separatrix.discovery.options import Options
@@ -288,6 +289,10 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
     for i, value in enumerate(fit.values):
         if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
             return False, "its velocity is above the usual speed, where it is Coulomb friction"
+        if free[i].path.endswith(".stribeck_velocity") and i in inside:
+            joint = free[i].path.rpartition(".")[0]
+            if free[i].physical(value) > usual_speed(one.fitted.problem, fit, joint):
+                return False, "its velocity is above the usual speed there, where it is Coulomb friction"
         if free[i].path == "nuisance:drive_scale" and not lowest < value < highest:
             return False, f"it would need a drive {value:.3g} times the stated one"
     return True, ""

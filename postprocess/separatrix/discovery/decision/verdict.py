@@ -23,6 +23,7 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import WORSE, Fitted
+from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
 
@@ -264,6 +265,8 @@ def _records(findings: Findings) -> list[dict]:
                     "sensor_bias": machine.get(SENSOR_BIAS),
                 }
             )
+            if isinstance(one, SensedPrepared):
+                found[-1]["sensors"] = {sensor.name: sensor.sigma for sensor in one.sensors}
     return found
 
 

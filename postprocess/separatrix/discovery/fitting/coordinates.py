@@ -134,7 +134,7 @@ class CoordinateProblem(Problem):
         shown = padded_table(motion[0], inside)
         failed |= np.any(inside[:, :, None] & ~np.isfinite(shown), axis=(1, 2))
         out.failed[rows] = failed
-        watched = self.structure.names.index(self.structure.watched)
+        watched = self.structure.names.index(prepared.place)
         if out.motion is None:
             out.motion = np.zeros((*self.segments.inside.shape, 2 * n))
         out.motion[rows] = shown

@@ -24,7 +24,7 @@ from separatrix.discovery.measured.bodies import (
     is_structure,
     structure_of,
 )
-from separatrix.errors import SeparatrixError
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Effect, effects
 
 AT = "@"
@@ -180,6 +180,11 @@ def place_of(name: str) -> str:
 
 def names_for(model, asked: tuple[str, ...] | None) -> list[str]:
     """Names of all effects that a machine may lack, of those that were asked for."""
+    known = JOINT_EFFECTS if is_structure(model) else STARTS
+    if asked and not any(name in known for name in asked):
+        raise SeparatrixError(
+            f"effects: found {', '.join(asked)}, allowed for this machine {', '.join(known)}", USAGE
+        )
     if not is_structure(model):
         return [name for name in STARTS if not asked or name in asked]
     structure = structure_of(model)

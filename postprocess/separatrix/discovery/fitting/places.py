@@ -79,3 +79,10 @@ def _impact_speed(problem: CoordinateProblem, fit: Fit, structure: Structure, na
     table = np.concatenate(hits)
     speeds = table[table[:, 5] == contacts.index(name), 2]
     return float(np.median(speeds)) if speeds.size else 0.0
+
+
+def usual_speed(problem: CoordinateProblem, fit: Fit, path: str) -> float:
+    """Root mean square of the speed along a joint in the segments that are followed [m/s]."""
+    good = problem.segments.inside & fit.good[:, None]
+    speeds = fit.evaluation.motion[good][:, problem.structure.n :] @ problem.structure.joint(path).row
+    return float(np.sqrt(np.mean(speeds**2))) if speeds.size else 0.0

@@ -43,6 +43,11 @@ class SensedPrepared(Prepared):
     sensors: list[Sensor] = field(default_factory=list)
 
     @property
+    def place(self) -> str:
+        """The body whose place the record has as x."""
+        return next(one.of for one in self.sensors if one.kind == "x")
+
+    @property
     def signal(self) -> np.ndarray:
         """What the first sensor shows."""
         return self.sensors[0].values

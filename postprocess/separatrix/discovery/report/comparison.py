@@ -69,6 +69,8 @@ def _reason(verdict: dict) -> str:
         return "no effect was added"
     if any(one["drive_frequency"] is None for one in verdict["records"]):
         return "the machine has no drive that turns"
+    if any("sensors" in one for one in verdict["records"]):
+        return "they are of one body; extended.toml is an ordinary case of all of them"
     return ""
 
 

@@ -4,7 +4,16 @@
 
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
-from separatrix.discovery.wording import digits_of, interval, number, probability, searched, with_unit, words
+from separatrix.discovery.wording import (
+    digits_of,
+    interval,
+    number,
+    of_effects,
+    probability,
+    searched,
+    with_unit,
+    words,
+)
 
 GATES = {
     "converged": "the fit converged",
@@ -81,13 +90,14 @@ def _summary(verdict: dict) -> Section:
         )
     elif verdict["not_added"]:
         lines.append(f"{verdict['not_added'][0].upper()}{verdict['not_added'][1:]}.")
-    for path, one in verdict["parameters"].items():
-        if path.startswith("effect."):
-            digits = digits_of(one["value"], one["standard_error"])
-            known = "" if one["interval_95"] is None else "95 % interval "
-            lines.append(
-                f"{path} = {with_unit(one['value'], one['unit'], digits)}, {known}{interval(one, digits)}."
-            )
+    lines += [f"{words(name)} sits {place}." for name, place in verdict["places"].items()]
+    for path in of_effects(verdict):
+        one = verdict["parameters"][path]
+        digits = digits_of(one["value"], one["standard_error"])
+        known = "" if one["interval_95"] is None else "95 % interval "
+        lines.append(
+            f"{path} = {with_unit(one['value'], one['unit'], digits)}, {known}{interval(one, digits)}."
+        )
     if verdict["function"]:
         lines.append(f"{verdict['families'][-1].capitalize()}: {verdict['function']['text']}.")
     for use, one in verdict["gap"].items():
