@@ -125,6 +125,7 @@ def verdict(outcome: str) -> dict:
         "effects": effects,
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
         "equivalent": False,
+        "places": {},
         "equivalences": ["offset_force and sensor_bias: a shift"] if outcome == "ambiguous" else [],
         "parameters": parameters,
         "where": [{"map": "position", "text": "a force of 2.55 +- 0.32 N is missing at 0.9 to 1.1 m"}],
