@@ -134,6 +134,18 @@ def place_and_speed(motion: np.ndarray) -> dict[str, np.ndarray]:
     return {"x.second": motion[:, 1], "v.first": motion[:, 2]}
 
 
+def drag_of_chain(v: np.ndarray) -> np.ndarray:
+    """Between b and c; the last axis is that of the bodies."""
+    u = v[..., 2] - v[..., 1]
+    return 0.3 * np.abs(u) * u
+
+
+def three_kinds(motion: np.ndarray) -> dict[str, np.ndarray]:
+    q, v = motion[:, :3], motion[:, 3:]
+    spring = 40 * (q[:, 2] - q[:, 1]) + 0.2 * (v[:, 2] - v[:, 1])
+    return {"x.a": q[:, 0], "v.b": v[:, 1], "a.c": -(spring + drag_of_chain(v)) / 0.5}
+
+
 @dataclass(frozen=True)
 class Hidden:
     """One machine and what it hides: the effect, its parameters and how well they must be found."""
@@ -165,9 +177,9 @@ CASES = {
         {"static_force": 0.2, "stribeck_velocity": 0.3}, ("stribeck", "viscous"),
         frequencies=(7.0, 9.0, 10.5),
     ),
-    "a chain": Hidden(
-        CHAIN, lambda w: chain(w, lambda q, v: 300 * (q[1] - q[0]) ** 3 * np.array([1, -1, 0])),
-        places("a", "b", "c"), "cubic_spring@a-b", {"cubic": 300}, noise=1e-3, frequencies=(4.0, 6.5, 8.0),
+    "a chain with three kinds of sensors": Hidden(
+        CHAIN, lambda w: chain(w, lambda q, v: drag_of_chain(v) * np.array([0, 1, -1])), three_kinds,
+        "quadratic_drag@b-c", {"drag": 0.3}, noise=5e-3, frequencies=(4.0, 6.5, 8.0),
     ),
     "place and forces": Hidden(
         ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), place_and_forces,
