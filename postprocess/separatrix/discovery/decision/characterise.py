@@ -18,6 +18,7 @@ from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
+from separatrix.discovery.fitting.sensed import SensedData
 
 # least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
 _USABLE, _EXACT = 1e-6, 1e-11
@@ -28,6 +29,11 @@ _FADED = 1.3
 # share of the best evidence from which on a variable of the same kind may be the right one, and the share of
 # the gap that the best closes from which on it is not
 _AKIN, _NEARLY_ALL = 0.4, 0.9
+
+
+# share of the gap that must be closed, linearised, for a place among several bodies: a force at a wrong one
+# closes most of a large gap, too
+_AT_A_PLACE = 0.95
 
 
 @dataclass
@@ -98,7 +104,8 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
 def _known(best: Character, bench: Bench) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = bench.options
-    return best.p < options.detection_level and min(best.closed, best.held_out_closed) > options.characterised
+    least = _AT_A_PLACE if isinstance(bench.training, SensedData) else options.characterised
+    return best.p < options.detection_level and min(best.closed, best.held_out_closed) > least
 
 
 def _likely(best: Character, bench: Bench) -> bool:

@@ -16,6 +16,7 @@ from separatrix.discovery.decision.several import with_more
 from separatrix.discovery.decision.strange import other_units
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted, shared_values
@@ -289,7 +290,10 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     if wide:
         decision.outcome = "not-in-catalogue"
         name = decision.base_ceiling.best.name
-        decision.reasons.append(f"forces that depend on {name} would explain more, no effect does")
+        # of several bodies forces at several places explain a large gap
+        several = isinstance(decision.rounds[0].base.problem, CoordinateProblem)
+        what = "free forces" if several else f"forces that depend on {name}"
+        decision.reasons.append(f"{what} would explain more, no effect does")
     return decision
 
 

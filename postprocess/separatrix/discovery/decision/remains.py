@@ -13,6 +13,7 @@ import numpy as np
 
 from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
@@ -74,7 +75,8 @@ def _remains(
 ) -> Remains:
     closed = closed_share(_fit_of(before), _fit_of(after))
     size = float(np.sqrt(max(0.0, _fit_of(after).sample_chi2 - 1)))
-    if size < _WORTH_WORDS:
+    if size < _WORTH_WORDS or isinstance(after.problem, CoordinateProblem):
+        # of several bodies forces at several places explain what remains
         return Remains(use, closed, size, "")
     families = (known or ceiling(after.problem, after.fit, mass)).families
     free = max(one.gain for one in families)

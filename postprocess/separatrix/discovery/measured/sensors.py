@@ -129,7 +129,8 @@ def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure,
             )
         if any(np.any(value) for key, value in joints[named[0]].table.items() if "modulation" in key):
             raise SeparatrixError(
-                f"{record.file}: column '{name}': the strength of the spring changes with time, allowed constant"
+                f"{record.file}: column '{name}': the strength of the spring changes with time, "
+                "allowed constant"
             )
         of = named[0]
     elif of not in structure.names:
