@@ -11,6 +11,7 @@ module branch
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up, return_share
+  use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
   use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
   use hybrid_machine, only: event_t
@@ -144,6 +145,10 @@ contains
     end do
     if (swaps_halves(trace, next)) then
       call end_at_parent(family, trace, length, points, ending)
+      return
+    end if
+    if (has_vanished(trace, next)) then
+      call end_at_rest(family, trace, length, points, ending)
       return
     end if
     if (leaves_range(plan, next%now%orbit%parameter)) then
