@@ -196,6 +196,7 @@ contains
     type(equilibrium_t), intent(inout) :: point
     complex(wp), allocatable :: values(:), vectors(:, :)
     complex(wp) :: moved
+    real(wp) :: change
     integer :: i, k
     call eigen_of(structure, point, values, vectors)
     point%values = values
@@ -204,7 +205,10 @@ contains
     do i = 2, size(point%values)
       moved = point%values(i)
       do k = i - 1, 1, -1
-        if (real(moved) <= real(point%values(k))) exit
+        change = real(moved - point%values(k))
+        ! The real parts of a pair differ by rounding.
+        if (abs(change) <= 1e-12_wp*maxval(abs(values))) change = aimag(moved - point%values(k))
+        if (change <= 0) exit
         point%values(k + 1) = point%values(k)
       end do
       point%values(k + 1) = moved

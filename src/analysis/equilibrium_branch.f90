@@ -23,6 +23,8 @@ module equilibrium_branch
   !> Smallest step, as a share of the largest; halvings that locate what is passed.
   real(wp), parameter :: smallest_step = 1e-6_wp
   integer, parameter :: halvings = 60
+  !> Where the parameter stands still, steps are longer by one over this.
+  real(wp), parameter :: along_the_state = 0.05_wp
   !> How far beyond a stop that is touched or let go the other mode is looked for, as a share of the range.
   real(wp), parameter :: beyond = 1e-6_wp
 
@@ -217,7 +219,7 @@ contains
       points = [points, next]
       if (ending == label_range) exit
       now = next
-      step = min(plan%largest_step, 1.4_wp*step)
+      step = min(plan%largest_step/max(abs(now%tangent(size(now%tangent))), along_the_state), 1.4_wp*step)
       call machine_neighbourhood(family, now%parameter, machines, error)
     end do
     if (size(points) >= plan%most_points) ending = label_long
@@ -327,7 +329,8 @@ contains
     found = .true.
   end subroutine locate
 
-  !> What it is that an eigenvalue passes at `point`, between two neighbours: a pair, or a real one, where the parameter turns or not.
+  !> What passes the imaginary axis at `point`, between two neighbours: a pair, or a real eigenvalue, where the parameter turns or
+  !> not.
   pure integer function label_of_crossing(now, next, point) result(label)
     type(equilibrium_t), intent(in) :: now, next, point
     integer :: k
