@@ -20,7 +20,8 @@ module branch
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, scales_of_orbit
+  use orbit_motion, only: is_admissible, orbit_of_motion
+  use periodic_orbit, only: correct_orbit, direct, move_along, orbit_t, scales_of_orbit
   use search_watch, only: search_watch_t
   use soft_graze, only: is_touch
   implicit none

@@ -20,8 +20,9 @@ module branch_search
   use orbit_sections, only: section_points
   use orbit_symmetry, only: mark_symmetry
   use part_of_branch, only: lies_on
-  use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, is_admissible, move_along, &
-    orbit_of_motion, orbit_t, same_sequence, scales_of_orbit
+  use orbit_motion, only: is_admissible, orbit_of_motion, same_sequence
+  use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, move_along, orbit_t, &
+    scales_of_orbit
   use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none

@@ -12,7 +12,8 @@ module hopf_cycles
   use errors, only: error_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, watched_rows
-  use periodic_orbit, only: closing_time, correct_orbit, is_admissible, orbit_of_motion, orbit_t
+  use orbit_motion, only: is_admissible, orbit_of_motion
+  use periodic_orbit, only: closing_time, correct_orbit, orbit_t
   use structure, only: structure_t
   use variations, only: neighbourhood_t
   implicit none

@@ -311,7 +311,7 @@ contains
     integer, allocatable :: number(:)
     character(len=name_length) :: along(1)
     real(wp), allocatable :: watched(:, :)
-    integer :: b, i, k, shown
+    integer :: b, i, shown
     call schema%add_attribute('', 'parameter', search%family%path)
     call schema%add_attribute('', 'seeds', search%seeds)
     if (size(search%branches) == 0) return
@@ -350,12 +350,7 @@ contains
     call schema%add_variable('label', type_int8, along, units='1', long_name='what the point is', &
                              flag_values=[(i, i=0, last_label)], flag_meanings=join(label_names, ' '), &
                              data=real(points%label, wp))
-    call schema%add_variable('multiplier_real', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, shown), &
-                                                                 i=1, size(points))])
-    call schema%add_variable('multiplier_imag', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, shown), &
-                                                                      i=1, size(points))])
+    call describe_multipliers(points, shown, schema)
 
   contains
 
@@ -366,6 +361,21 @@ contains
     end subroutine add
 
   end subroutine describe_branches
+
+  !> The first so many multipliers of the points.
+  subroutine describe_multipliers(points, shown, schema)
+    type(point_t), intent(in) :: points(:)
+    integer, intent(in) :: shown
+    type(schema_t), intent(inout) :: schema
+    character(len=name_length), parameter :: over(2) = [character(len=name_length) :: 'point', 'multiplier']
+    integer :: i, k
+    call schema%add_variable('multiplier_real', type_float64, over, units='1', &
+      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, shown), &
+                                                                 i=1, size(points))])
+    call schema%add_variable('multiplier_imag', type_float64, over, units='1', &
+      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, shown), &
+                                                                      i=1, size(points))])
+  end subroutine describe_multipliers
 
   !> Where the section points of orbits are.
   pure function section_text(has_clock) result(text)

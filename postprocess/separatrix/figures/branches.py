@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Branches of periodic orbits and equilibria over a parameter: stable full, unstable broken, with their bifurcations."""
+"""Branches of orbits and equilibria over a parameter: stable full, unstable broken, with bifurcations."""
 
 import numpy as np
 import xarray as xr
