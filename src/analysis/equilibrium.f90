@@ -103,6 +103,8 @@ contains
         call solve(matmul(transpose(slopes), slopes), -matmul(transpose(slopes), miss), step, ok)
         if (ok) ok = all(abs(step) <= 1e3_wp)
         if (.not. ok) return
+        ! Least squares leave a fixed parameter fixed but for rounding.
+        if (.not. any(abs(direction(:n)) > 0)) step(n + 1) = 0
         before = length
         length = norm2(step)
         point%y = point%y + step(:n)*structure%size_of

@@ -23,6 +23,8 @@ module equilibrium_branch
   !> Smallest step, as a share of the largest; halvings that locate what is passed.
   real(wp), parameter :: smallest_step = 1e-6_wp
   integer, parameter :: halvings = 60
+  !> Starts at one value over all modes, and for each at least.
+  integer, parameter :: most_tries = 400, least_starts = 4
   !> Where the parameter stands still, steps are longer by one over this.
   real(wp), parameter :: along_the_state = 0.05_wp
   !> How far beyond a stop that is touched or let go the other mode is looked for, as a share of the range.
@@ -57,7 +59,7 @@ contains
         if (structure%has_clock) return
         modes = modes_at_rest(structure)
         do m = 1, size(modes)
-          do k = 1, size(starts, 2)
+          do k = 1, starts_tried(structure, size(modes), size(starts, 2))
             own = machines
             seed = equilibrium_t(mode=modes(m), parameter=values(i), y=at_rest(structure, starts(:, k)))
             call correct_equilibrium(family, own, seed, along_parameter(seed, 1), ok)
@@ -69,6 +71,14 @@ contains
       end select
     end do
   end subroutine find_equilibria
+
+  !> Starts for each of so many modes: a linear one has one equilibrium; of many modes fewer starts are tried.
+  pure integer function starts_tried(structure, modes, given) result(tried)
+    type(structure_t), intent(in) :: structure
+    integer, intent(in) :: modes, given
+    tried = min(given, max(least_starts, most_tries/modes))
+    if (structure%frame%moving%machine%linear) tried = 1
+  end function starts_tried
 
   !> A start without speeds.
   pure function at_rest(structure, start) result(y)
