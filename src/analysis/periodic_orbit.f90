@@ -13,10 +13,10 @@ module periodic_orbit
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, machine_of_family
   use matrices, only: solve
-  use multipliers, only: multipliers_of
+  use multipliers, only: multipliers_beside_graze, multipliers_of
   use structure, only: structure_t
   use structure_family, only: vary_section
-  use variations, only: by_difference, neighbourhood_t, vary
+  use variations, only: by_difference, neighbourhood_t, split_t, vary, vary_beside_graze
   implicit none
   private
 
@@ -286,7 +286,38 @@ contains
       if (allocated(determinant)) deallocate (determinant)
     end if
     orbit%multipliers = multipliers_of(orbit%matrix, determinant)
+    if (ok .and. any(orbit%multipliers /= orbit%multipliers)) call add_hidden(machines, orbit)
   end subroutine set_multipliers
+
+  !> Finite multipliers that rounding hides behind that of a graze: the event whose guard is met at the least rate apart from the
+  !> others.
+  pure subroutine add_hidden(machines, orbit)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(inout) :: orbit
+    type(split_t) :: split
+    complex(wp) :: values(size(orbit%y))
+    real(wp) :: speeds(size(orbit%events)), by_state(size(orbit%y)), value, by_time
+    integer :: k
+    logical :: ok
+    if (.not. machines%centre%has_clock .or. size(orbit%events) == 0) return
+    associate (machine => machines%centre, n => size(orbit%y))
+      do k = 1, size(orbit%events)
+        associate (event => orbit%events(k))
+          call machine%guard(event, event%time, event%arrival(:n), value, by_state, by_time)
+          speeds(k) = abs(sum(by_state*machine%slope(event%before, event%time, event%arrival(:n))) + by_time)/ &
+            max(norm2(by_state), tiny(1.0_wp))
+        end associate
+      end do
+      call vary_beside_graze(machines, orbit%mode, orbit%y, orbit%events, closing_time(machine, orbit), minloc(speeds, 1), &
+                             split, ok)
+      if (.not. ok) return
+      do k = 1, n
+        split%base(:, k) = split%base(:, k)*machine%size_of(k)/machine%size_of
+      end do
+      values = multipliers_beside_graze(split%base, split%column/machine%size_of, split%row*machine%size_of, split%rate)
+    end associate
+    if (all(values(2:) == values(2:))) orbit%multipliers(2:) = values(2:)
+  end subroutine add_hidden
 
   !> Direction in which the orbits go on, a unit vector in natural sizes, on the side of `along`.
   pure subroutine tangent_of(machines, orbit, parameter_size, along, tangent, ok)
