@@ -25,6 +25,8 @@ module flight_path
     real(wp) :: start = 0
     !> Amplitudes of the exponentials, harmonics at the start, powers of the time since then.
     complex(wp) :: amplitude(2*most_degrees)
+    !> Sizes of the sums that the amplitudes are, for their rounding.
+    real(wp) :: size_of_amplitude(2*most_degrees) = 0
     complex(wp), allocatable :: turning(:)
     real(wp) :: powers(most_degrees, 0:3) = 0
     !> Constant forces on the coordinates and their rates [N, N/s].
@@ -111,7 +113,7 @@ contains
           force = force - (k*(now - zero) + c*joint%offset%rate)*joint%row
           rate = rate - k*joint%offset%rate*joint%row
         else if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
-          call joint_force(joint, state%phase(j), 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, r)
+          call joint_force(joint, state%phase(j), 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, r)
           force = force + r*joint%row
         end if
       end associate
@@ -191,6 +193,8 @@ contains
       forced = -sum(flow%left(k, f + 1:)*push(:f + d))/lambda
       forced_rate = -sum(flow%left(k, f + 1:)*push_rate(:f + d))/lambda
       forced = forced + forced_rate/lambda
+      path%size_of_amplitude(k) = sum(flow%size_of_left(k, :f)*flow%frequency*abs(place(:f))) + &
+        sum(flow%size_of_left(k, f + 1:)*(abs(speed(:f + d)) + abs(push(:f + d))/flow%size_of_exponent(k)))
       do i = 1, d
         place(f + i) = place(f + i) - real(flow%drift(i, k)*path%amplitude(k))
       end do

@@ -29,6 +29,8 @@ module guard_functions
     real(wp) :: power(0:3, most_functions)
     !> Bounds from the powers and harmonics on derivatives 0 to 6.
     real(wp) :: steady(0:6, most_functions)
+    !> Size of the sums that the amplitudes are, as the value, rate and curvature of a guard have it.
+    real(wp) :: blur(0:2, most_guards)
   end type search_t
 
 contains
@@ -69,6 +71,13 @@ contains
           search%term(:n, g) = search%term(:n, g) + guard%force*flow%force_shape(:, guard%held)
           search%turn(:, g) = search%turn(:, g) + guard%force*flow%force_response(:, guard%held)
         end if
+        search%blur(:, g) = guard%blur
+        do k = 1, n
+          largest = (abs(guard%place) + abs(guard%speed)*flow%size_of_exponent(k))*flow%size_of_joint(k, guard%joint)
+          if (guard%held > 0) largest = largest + abs(guard%force)*flow%size_of_force(k, guard%held)
+          search%blur(:, g) = search%blur(:, g) &
+                              + largest*path%size_of_amplitude(k)*flow%size_of_exponent(k)**[(order, order=0, 2)]
+        end do
       end associate
     end do
     g = search%functions

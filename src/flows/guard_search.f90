@@ -124,9 +124,9 @@ contains
     certified = 0
     idle = .false.
     do g = 1, search%guards
-      if (.not. (list(g)%from_zero .or. here(0, g) <= rounding*(bound(search, g, 0, 0.0_wp, 0.0_wp) + list(g)%blur(0)))) cycle
-      call departure(here(1:3, g), [bound(search, g, 1, 0.0_wp, length) + list(g)%blur(1), &
-                                    bound(search, g, 2, 0.0_wp, length) + list(g)%blur(2), &
+      if (.not. (list(g)%from_zero .or. here(0, g) <= rounding*(bound(search, g, 0, 0.0_wp, 0.0_wp) + search%blur(0, g)))) cycle
+      call departure(here(1:3, g), [bound(search, g, 1, 0.0_wp, length) + search%blur(1, g), &
+                                    bound(search, g, 2, 0.0_wp, length) + search%blur(2, g), &
                                     bound(search, g, 3, 0.0_wp, length)], bound(search, g, 4, 0.0_wp, length), length, &
                      certified(g), idle(g))
       fallen(g) = .not. idle(g) .and. certified(g) <= 0
@@ -212,7 +212,7 @@ contains
       call bases_at(search, b, growth, turning)
       evaluations = evaluations + 1
       last = derivatives(search, g, b, growth, turning)
-      if (last(1) < -rounding*(bound(search, g, 1, a, b - a) + list(g)%blur(1))) cycle
+      if (last(1) < -rounding*(bound(search, g, 1, a, b - a) + search%blur(1, g))) cycle
       if (last(1) > 0) last = turning_point(search, g, 1, a, b, here(:, g), last, 0.0_wp)
       margin = min(margin, max(last(0), 0.0_wp))
     end do

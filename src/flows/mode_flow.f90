@@ -30,7 +30,10 @@ contains
     integer :: j
     harmonics = size(machine%force, 2)
     do j = 1, size(machine%joints)
-      if (allocated(machine%joints(j)%offset%harmonic)) harmonics = max(harmonics, size(machine%joints(j)%offset%harmonic))
+      associate (joint => machine%joints(j))
+        if (allocated(joint%offset%harmonic)) harmonics = max(harmonics, size(joint%offset%harmonic))
+        if (allocated(joint%strength)) harmonics = max(harmonics, size(joint%strength%harmonic))
+      end associate
     end do
   end function harmonics_of
 
@@ -320,6 +323,7 @@ contains
                          + matmul(flow%basis(:, f + 1:f + d), flow%drift(:, i))
     end do
     flow%size_of_exponent = modulus(flow%exponent)
+    flow%size_of_left = modulus(flow%left)
   end subroutine set_exponentials
 
   !> Periodic response to the harmonics of the drive.
@@ -365,6 +369,7 @@ contains
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     complex(wp) :: iw
+    real(wp) :: largest
     integer :: j, k, m, count_shapes, harmonics
     count_shapes = size(flow%exponent)
     harmonics = size(forcing, 2)
@@ -378,7 +383,12 @@ contains
         flow%joint_response(m, j) = sum(machine%joints(j)%row*flow%response(:, m)) + offset_of(machine%joints(j), m)
       end do
     end do
+    allocate (flow%size_of_joint(count_shapes, size(machine%joints)), flow%size_of_force(count_shapes, size(flow%held)))
     do k = 1, count_shapes
+      largest = maxval(modulus(flow%shape(:, k)))
+      flow%size_of_joint(k, :) = largest*[(sum(abs(machine%joints(j)%row)), j=1, size(machine%joints))]
+      flow%size_of_force(k, :) = largest*sum(abs(matmul(flow%reaction, flow%stiffness)) &
+                                             + flow%size_of_exponent(k)*abs(matmul(flow%reaction, flow%damping)), dim=2)
       flow%force_shape(k, :) = matmul(flow%reaction, matmul(flow%stiffness, flow%shape(:, k)) &
                                       + flow%exponent(k)*matmul(flow%damping, flow%shape(:, k)))
     end do

@@ -28,13 +28,15 @@ module mode_flow_type
     !> Exponents, shapes in the coordinates (of a conjugate pair one, twofold), and rows that give their amplitudes
     !> from basis coordinates times frequency and their speeds.
     complex(wp), allocatable :: exponent(:), shape(:, :), left(:, :)
-    real(wp), allocatable :: size_of_exponent(:)
+    real(wp), allocatable :: size_of_exponent(:), size_of_left(:, :)
     !> Amplitude of the damped rigid coordinates per amplitude of the exponentials.
     complex(wp), allocatable :: drift(:, :)
     !> Periodic response of the coordinates to the harmonics.
     complex(wp), allocatable :: response(:, :)
     !> Shapes and responses along the rows of the joints, and of the forces of the constraints.
     complex(wp), allocatable :: joint_shape(:, :), joint_response(:, :), force_shape(:, :), force_response(:, :)
+    !> Bounds on what rounding of the shapes takes for its measure there: the largest entry of each.
+    real(wp), allocatable :: size_of_joint(:, :), size_of_force(:, :)
     !> Matrix of the coordinates, their speeds, 1, the time, cosines and sines; bound on its rate [1/s].
     real(wp), allocatable :: matrix(:, :)
     real(wp) :: rate = 0

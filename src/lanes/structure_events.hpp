@@ -91,19 +91,26 @@ inline mask set_off(const structure_machine &m, const size &z, mask fresh, struc
   enter_modes(m, z, fresh & ~wrong, g);
   look_from_start(m, z, fresh, b, g);
   const outlook &o = g.first;
-  for (int j = 0; j < z.joints; j++) {
-    const structure_joint &joint = m.joint[j];
+  for (int j = 0; j < functions_of(z, g); j++) {
+    const structure_joint &joint = m.joint[joint_of(m, z.joints, j)];
     mask above = g.s.left == double(j + 1), below = g.s.left == -double(j + 1);
     mask even = joint.even > 0.5 ? g.s.rising == double(j + 1) : mask{};
-    vec room = joint.slides > 0.5 ? pick(g.s.phase[j] == 0.0, joint.tie, m.slowest) : vec(joint.tie);
+    vec room = joint.tie;
+    if (joint.slides > 0.5)
+      room = pick(g.s.phase[j] == 0.0, joint.tie, m.slowest);
+    if (joint.soft > 0.5 && joint.pulls < 0.5)
+      room = j < z.joints ? pick(magnitude(g.s.phase[j]) == 1.0, joint.tie * joint.stiffness, joint.tie)
+                          : vec(joint.tie * joint.stiffness);
     // What has just been zero must rise, all else be above.
     mask clear_below = pick(below, pick(even, o.f2[j], o.f1[j]) > 0.0, o.f[j] > g.low[j] + room);
     mask clear_above = pick(above, o.f1[j] < 0.0, o.f[j] < g.high[j] - room);
-    if (joint.slides > 0.5 || joint.has_lower > 0.5)
+    if (j >= z.joints)
+      clear_below = clear_below | (g.low[j] == -unlimited);
+    if (has_limit(m, z, g, fresh, j, -1))
       wrong = wrong | (fresh & ~clear_below);
-    if (joint.slides > 0.5 || joint.has_upper > 0.5)
+    if (has_limit(m, z, g, fresh, j, 1))
       wrong = wrong | (fresh & ~clear_above);
-    if (joint.slides > 0.5)
+    if (switches(joint))
       continue;
     wrong = wrong | (fresh & above & chatters_out(m, joint, -o.f1[j], -o.f2[j], o.f3[j]));
     wrong = wrong | (fresh & below & chatters_out(m, joint, o.f1[j], o.f2[j], o.f3[j]));
@@ -111,7 +118,8 @@ inline mask set_off(const structure_machine &m, const size &z, mask fresh, struc
   return wrong;
 }
 
-// Sticking or sliding of joint j where `at` it was found.
+// Sticking or sliding of joint j where `at` it was found. Where it turns, and both it and another that sticks
+// take more force to hold than to slide, the scalar code tells which of them go together.
 inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rare, mask &stuck,
                            structure_group &g) {
   const structure_joint &joint = m.joint[j];
@@ -122,11 +130,39 @@ inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rar
   mask holds = magnitude(force)<joint.upper - joint.tie, turns = force> joint.upper + joint.tie;
   rare = rare | (slid & ~holds & ~turns);
   stuck = slid & holds;
+  for (int i = 0; i < int(m.joints) && joint.even < 0.5; i++)
+    if (i != j && m.joint[i].slides > 0.5 && m.joint[i].even < 0.5)
+      rare = rare | (slid & turns & (g.s.phase[i] == 0.0));
   put(g.s.phase[j], slid, pick(holds, 0, -d));
   put(g.s.left, slid & turns, -double(j + 1));
   put(g.s.phase[j], gave_way, -g.s.side);
   put(g.s.left, gave_way, -double(j + 1));
   put(g.s.rising, gave_way, j + 1);
+}
+
+// Soft contact j begins or ends, or its force does, where `at` that was found. Returns the lanes where it
+// begins.
+inline mask press_or_leave(const structure_machine &m, int j, mask at, structure_group &g) {
+  const structure_joint &joint = m.joint[j];
+  const vec phase = g.s.phase[j], side = pick(phase < 0.0, -1, 1);
+  const double from_here = -double(j + 1);
+  mask begins = at & (phase == 0.0), ends = at & ~begins;
+  put(g.s.phase[j], begins, g.s.side);
+  if (joint.pulls > 0.5)
+    put(g.s.left, begins, from_here);
+  mask cut = joint.pulls > 0.5 ? mask{} : ends & (magnitude(phase) == 1.0);
+  put(g.s.phase[j], cut, 2 * phase);
+  put(g.s.left, cut, -joint.push);
+  mask free = ends & ~cut;
+  put(g.s.phase[j], free, 0);
+  put(g.s.left, free, -from_here * side);
+  return begins;
+}
+
+// A soft contact without force pushes again where `at` that was found.
+inline void press_again(int j, mask at, structure_group &g) {
+  put(g.s.phase[j], at, 0.5 * g.s.phase[j]);
+  put(g.s.left, at, -double(j + 1));
 }
 
 // Impact of contact j where `at` it was found.
@@ -181,6 +217,10 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
     if (m.joint[j].slides > 0.5) {
       slide_or_stick(m, j, at, rare, now, g);
       stuck = stuck | now;
+    } else if (m.joint[j].soft > 0.5) {
+      mask begins = press_or_leave(m, j, at, g);
+      put(speed, begins, magnitude(g.s.end_f1[j]));
+      struck = struck | begins;
     } else {
       // The scalar code counts impacts that follow each other so fast.
       rare = rare | (at & (g.s.span < m.shortest));
@@ -189,6 +229,11 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
       put(g.s.burst, at, g.s.burst + 1.0);
       struck = struck | at;
     }
+  }
+  for (int j = z.joints; j < z.joints + z.pushes; j++) {
+    mask at = due & (g.s.joint == double(j + 1));
+    changed = changed | at;
+    press_again(joint_of(m, z.joints, j), at, g);
   }
   LANE_COUNT(events, count(changed));
   rare = rare | set_off(m, z, due & ~rare, b, g);

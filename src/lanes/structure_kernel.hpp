@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Exact flight of many jointed structures at once: linear structures with dry friction and rigid contacts. In
-// every mode (which friction joints stick) the motion is a sum of complex exponentials and harmonics.
+// Exact flight of many jointed structures at once: linear structures with dry friction and contacts, rigid or
+// linear. In every mode (which friction joints stick, which soft contacts are pressed) the motion is a sum of
+// complex exponentials and harmonics.
 #ifndef SEPARATRIX_STRUCTURE_KERNEL_HPP
 #define SEPARATRIX_STRUCTURE_KERNEL_HPP
 
@@ -74,7 +75,8 @@ template <class size> void fly_all(const structure_machine &m, lane_batch &contr
 inline void fly_structures(const structure_machine &m, lane_batch &control, structure_batch &batch) {
   const any_size z(m);
 #if defined(__AVX__)
-  const bool plain = z.joints == 2 && z.waves == 1 && z.terms == z.coordinates && z.powers == 1 && !z.idle;
+  const bool plain =
+      z.joints == 2 && z.pushes == 0 && z.waves == 1 && z.terms == z.coordinates && z.powers == 1 && !z.idle;
   if (plain && z.terms == 2)
     fly_all<fixed_size<2, 2, 2, 1>>(m, control, batch);
   else if (plain && z.terms == 4)

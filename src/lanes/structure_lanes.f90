@@ -4,12 +4,13 @@
 !> Exact flight for a batch of jointed structures at once, in vectors (the kernel is C++: `structure_kernel.hpp`). What module
 !> `lanes` says of one body holds here.
 module structure_lanes
-  use jointed, only: joint_contact, joint_friction
+  use jointed, only: joint_contact, joint_friction, joint_soft, jointed_t
   use jointed_motion, only: jointed_motion_t
-  use jointed_state, only: jointed_state_t
+  use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use lane_types, only: lane_batch_t, lane_flow_t, lane_fresh
   use motion_state, only: tally_t
+  use structure_functions, only: never_pulls
   use structure_types, only: structure_batch_t, structure_machine_t, structure_region_t, structure_regions
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_sizeof
   implicit none
@@ -46,7 +47,7 @@ contains
     structure_sizes = machine == c_sizeof(here) .and. batch == c_sizeof(there)
   end function structure_sizes
 
-  !> Whether a lane can take a structure: all contacts are open, and its mode is one that lanes know.
+  !> Whether a lane can take a structure: all rigid contacts are open, and its mode is one that lanes know.
   pure logical function structure_flies(flow, moving, state) result(flies)
     type(lane_flow_t), intent(in) :: flow
     type(jointed_motion_t), intent(in) :: moving
@@ -61,6 +62,9 @@ contains
         flies = flies .and. state%phase(j) == 0
       case (joint_friction)
         if (state%phase(j) == 0) key = ibset(key, bit)
+        bit = bit + 1
+      case (joint_soft)
+        if (abs(state%phase(j)) == 1) key = ibset(key, bit)
         bit = bit + 1
       end select
     end do
@@ -107,10 +111,41 @@ contains
     do j = 1, size(moving%machine%joints)
       batch%phase(lane, j) = state%phase(j)
       if (state%left(j) == 0) cycle
-      ! A slide sets off from its lower limit; of two joints at their limits one is taken for an event just past.
-      batch%left(lane) = merge(-j, sign(j, state%left(j)), moving%machine%joints(j)%kind == joint_friction)
+      ! Of two joints at their limits one is taken for an event just past.
+      batch%left(lane) = left_limit(moving, state, j)
     end do
   end subroutine occupy_structure_lane
+
+  !> The function that is zero as joint `j` has just changed its phase, with the sign of the side of its limit. Slides and pressed
+  !> contacts set off from their lower limits; a contact that never pulls begins with a push.
+  pure integer function left_limit(moving, state, j) result(left)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: j
+    real(wp) :: place, speed, stop
+    real(wp), parameter :: far_from_nothing = 1e-6_wp
+    associate (machine => moving%machine, joint => moving%machine%joints(j), phase => state%phase(j))
+      left = -j
+      if (joint%kind /= joint_friction .and. phase == 0) left = sign(j, state%left(j))
+      if (.not. never_pulls(joint) .or. phase == 0) return
+      if (abs(phase) == 2) left = -push_of(machine, j)
+      if (abs(phase) == 2) return
+      call joint_motion(machine, j, state%q, state%v, state%time, turning_at(machine%frequency, state%time, moving%harmonics), &
+                        place, speed)
+      stop = merge(joint%upper, joint%lower, phase > 0)
+      place = joint%contact%stiffness*(place - stop)
+      speed = joint%contact%damping*speed
+      if (abs(place + speed) > far_from_nothing*(abs(place) + abs(speed))) left = 0
+    end associate
+  end function left_limit
+
+  !> Number of the function that is the force of soft contact `j` where it is not pressed, -1 without one.
+  pure integer function push_of(machine, j)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j
+    push_of = -1
+    if (never_pulls(machine%joints(j))) push_of = size(machine%joints) + count(never_pulls(machine%joints(:j)))
+  end function push_of
 
   !> The structure in a lane: where it stopped, or at the start of the flight that is left to the event loop.
   pure subroutine structure_lane_state(moving, batch, lane, state)
@@ -118,7 +153,7 @@ contains
     type(structure_batch_t), intent(in) :: batch
     integer, intent(in) :: lane
     type(jointed_state_t), intent(inout) :: state
-    integer :: j
+    integer :: j, left
     associate (n => moving%machine%n)
       state%q(:n) = batch%q(lane, :n)
       state%v(:n) = batch%v(lane, :n)
@@ -127,7 +162,8 @@ contains
     do j = 1, size(moving%machine%joints)
       state%phase(j) = nint(batch%phase(lane, j))
       state%left(j) = 0
-      if (nint(abs(batch%left(lane))) == j) state%left(j) = nint(sign(1.0_wp, batch%left(lane)))
+      left = nint(abs(batch%left(lane)))
+      if (left == j .or. left == push_of(moving%machine, j)) state%left(j) = nint(sign(1.0_wp, batch%left(lane)))
     end do
     state%burst = nint(batch%burst(lane))
   end subroutine structure_lane_state

@@ -37,17 +37,17 @@ struct structure_control {
 
 // How much there is of everything, so that loops have their ends.
 template <int n, int t, int j, int w> struct fixed_size {
-  enum { coordinates = n, terms = t, joints = j, waves = w, powers = 1, drifts = 0, idle = 0 };
+  enum { coordinates = n, terms = t, joints = j, pushes = 0, waves = w, powers = 1, drifts = 0, idle = 0 };
   explicit fixed_size(const structure_machine &) {}
 };
 
 struct any_size {
-  int coordinates, terms, joints, waves, powers, drifts;
+  int coordinates, terms, joints, pushes, waves, powers, drifts;
   // Some mode is idle.
   bool idle;
   explicit any_size(const structure_machine &m)
-      : coordinates(int(m.coordinates)), terms(0), joints(int(m.joints)), waves(int(m.waves)), powers(1),
-        drifts(0), idle(false) {
+      : coordinates(int(m.coordinates)), terms(0), joints(int(m.joints)), pushes(int(m.pushes)),
+        waves(int(m.waves)), powers(1), drifts(0), idle(false) {
     for (const structure_mode &t : m.mode) {
       terms = t.terms > terms ? int(t.terms) : terms;
       powers = t.powers > powers ? int(t.powers) : powers;
@@ -57,14 +57,14 @@ struct any_size {
   }
 };
 
-// A function of each joint, and its derivatives.
+// The functions and their derivatives.
 struct outlook {
-  vec f[most_joints], f1[most_joints], f2[most_joints], f3[most_joints];
+  vec f[most_functions], f1[most_functions], f2[most_functions], f3[most_functions];
 };
 
 // Two derivatives more.
 struct far_outlook {
-  vec f4[most_joints], f5[most_joints];
+  vec f4[most_functions], f5[most_functions];
 };
 
 // Exponentials and harmonics at an instant, and the time since the start of the flight.
@@ -78,11 +78,13 @@ struct structure_group {
   structure_control c;
   structure_fields<vec> s;
   vec decay[most_terms], turn[most_terms], square[most_terms];
-  vec part_re[most_joints][most_terms], part_im[most_joints][most_terms];
-  vec swing_re[most_joints][most_waves], swing_im[most_joints][most_waves];
+  vec part_re[most_functions][most_terms], part_im[most_functions][most_terms];
+  vec swing_re[most_functions][most_waves], swing_im[most_functions][most_waves];
   // Limits of the functions, bound on their sixth derivatives, mass that a joint feels.
-  vec power[most_powers][most_joints], low[most_joints], high[most_joints], sixth[most_joints],
+  vec power[most_powers][most_functions], low[most_functions], high[most_functions], sixth[most_functions],
       felt_mass[most_joints];
+  // Some lane waits until a contact without force is free: the last functions are looked at.
+  bool waits;
   // The last step of the root search is shorter. Length of the panels [s], and what turns the exponentials
   // and harmonics from one to the next.
   vec close, panel;
@@ -92,16 +94,34 @@ struct structure_group {
   vec first_cosine[most_waves], first_sine[most_waves];
 };
 
+// How many functions are looked at.
+template <class size> inline int functions_of(const size &z, const structure_group &g) {
+  return z.pushes > 0 && g.waits ? z.joints + z.pushes : z.joints;
+}
+
+// Whether the phase of a joint has a say in what mode it is.
+inline bool switches(const structure_joint &joint) { return joint.slides > 0.5 || joint.soft > 0.5; }
+
+// Number of the joint that function j is of.
+inline int joint_of(const structure_machine &m, int joints, int j) {
+  if (j < joints)
+    return j;
+  int owner = 0;
+  while (m.joint[owner].push != double(j + 1))
+    owner++;
+  return owner;
+}
+
 // The lanes of `among` that are in mode number `key`.
 template <class size>
 inline mask in_mode(const structure_machine &m, const size &z, int key, mask among,
                     const structure_fields<vec> &s) {
   int bit = 0;
   for (int j = 0; j < z.joints; j++) {
-    if (m.joint[j].slides < 0.5)
+    if (!switches(m.joint[j]))
       continue;
-    mask sticks = s.phase[j] == 0.0;
-    among = among & (key >> bit & 1 ? sticks : ~sticks);
+    mask set = m.joint[j].slides > 0.5 ? s.phase[j] == 0.0 : magnitude(s.phase[j]) == 1.0;
+    among = among & (key >> bit & 1 ? set : ~set);
     bit++;
   }
   return among;
@@ -110,7 +130,7 @@ inline mask in_mode(const structure_machine &m, const size &z, int key, mask amo
 inline int modes_of(const structure_machine &m) {
   int modes = 1;
   for (int j = 0; j < int(m.joints); j++)
-    modes *= m.joint[j].slides > 0.5 ? 2 : 1;
+    modes *= switches(m.joint[j]) ? 2 : 1;
   return modes;
 }
 
@@ -157,11 +177,11 @@ inline void bases_at(const structure_machine &m, const size &z, const structure_
   harmonics_at(m, z, g.s.start + elapsed, b);
 }
 
-// The functions of the joints with three derivatives, or with `more` five.
+// The functions with three derivatives, or with `more` five.
 template <class size>
 inline void functions_at(const structure_machine &m, const size &z, const structure_group &g,
                          const structure_bases &b, outlook &o, far_outlook *more = nullptr) {
-  for (int j = 0; j < z.joints; j++) {
+  for (int j = 0; j < functions_of(z, g); j++) {
     vec f = g.power[0][j], f1 = {}, f2 = {}, f3 = {}, f4 = {}, f5 = {};
     if (z.powers > 1) {
       vec c1 = g.power[1][j], c2 = g.power[2][j], c3 = g.power[3][j], t = b.elapsed;
@@ -210,8 +230,11 @@ inline void functions_at(const structure_machine &m, const size &z, const struct
   }
 }
 
-// What a joint adds to `still` and `level`: its direction, or its coordinate where it is held.
-inline vec pull_of(const structure_fields<vec> &s, int j) {
+// What a joint adds to `still` and `level`: its direction, its coordinate where it is held, the place of the
+// stop that is pressed.
+inline vec pull_of(const structure_joint &joint, const structure_fields<vec> &s, int j) {
+  if (joint.soft > 0.5)
+    return pick(s.phase[j] == 1.0, joint.upper, pick(s.phase[j] == -1.0, joint.lower, 0));
   return pick(s.phase[j] == 0.0, s.held[j], s.phase[j]);
 }
 
@@ -222,8 +245,8 @@ inline void still_of(const structure_machine &m, const size &z, const structure_
   for (int n = 0; n < z.powers; n++) {
     p[n] = t.still[n][i];
     for (int j = 0; j < z.joints; j++)
-      if (m.joint[j].slides > 0.5)
-        p[n] += t.still_by_joint[n][j][i] * pull_of(s, j);
+      if (switches(m.joint[j]))
+        p[n] += t.still_by_joint[n][j][i] * pull_of(m.joint[j], s, j);
   }
 }
 
@@ -278,9 +301,60 @@ inline void place_at(const structure_machine &m, const size &z, mask among, cons
   }
 }
 
+// Limits of function j of the lanes `in`, and the direction in which it is looked at: that of the slide, or
+// into the contact.
+template <class size>
+inline vec set_limits(const structure_machine &m, const size &z, mask in, int j, structure_group &g) {
+  const int owner = joint_of(m, z.joints, j);
+  const structure_joint &joint = m.joint[owner];
+  const vec phase = g.s.phase[owner];
+  mask moves = phase != 0.0;
+  vec d = 1, low = joint.lower, high = joint.upper;
+  if (joint.slides > 0.5) {
+    d = pick(moves, phase, 1);
+    low = pick(moves, 0, -joint.upper);
+    high = pick(moves, unlimited, joint.upper);
+  } else if (joint.soft > 0.5) {
+    mask pressed = magnitude(phase) == 1.0, waits = magnitude(phase) == 2.0;
+    d = pick(phase < 0.0, -1, 1);
+    vec stop = d * pick(phase < 0.0, joint.lower, joint.upper);
+    if (j < z.joints) {
+      put(low, moves, joint.pulls > 0.5 ? stop : pick(pressed, joint.stiffness * stop, stop));
+    } else {
+      // Where it waits its force stays below nothing.
+      low = pick(waits, -joint.stiffness * stop, -unlimited);
+      d = pick(waits, -d, 0);
+    }
+    high = j < z.joints ? pick(moves, unlimited, joint.upper) : vec(unlimited);
+  }
+  put(g.low[j], in, low);
+  put(g.high[j], in, high);
+  return d;
+}
+
+// Whether any lane of `asked` has a limit of function j on `side` -1 or +1.
+template <class size>
+inline bool has_limit(const structure_machine &m, const size &z, const structure_group &g, mask asked, int j,
+                      int side) {
+  if (j >= z.joints)
+    return side < 0;
+  const structure_joint &joint = m.joint[j];
+  if (joint.slides > 0.5)
+    return side < 0 || any(asked & (g.s.phase[j] == 0.0));
+  if (joint.soft > 0.5 && side < 0 && any(asked & (g.s.phase[j] != 0.0)))
+    return true;
+  if ((side > 0 ? joint.has_upper : joint.has_lower) < 0.5)
+    return false;
+  return joint.soft < 0.5 || any(asked & (g.s.phase[j] == 0.0));
+}
+
 // The coefficients of the flights of the lanes `changed`, from their amplitudes and phases.
 template <class size>
 inline void enter_modes(const structure_machine &m, const size &z, mask changed, structure_group &g) {
+  mask waits = {};
+  for (int j = z.joints; j < z.joints + z.pushes; j++)
+    waits = waits | (magnitude(g.s.phase[joint_of(m, z.joints, j)]) == 2.0);
+  g.waits = any(waits);
   for (int key = 0; key < modes_of(m); key++) {
     mask in = in_mode(m, z, key, changed, g.s);
     if (!any(in))
@@ -294,11 +368,8 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       put(g.square[k], in, square);
       amplitude[k] = size_above(g.s.re[k], g.s.im[k]);
     }
-    for (int j = 0; j < z.joints; j++) {
-      const structure_joint &joint = m.joint[j];
-      const bool slides = joint.slides > 0.5;
-      mask moves = g.s.phase[j] != 0.0;
-      vec d = pick(moves, g.s.phase[j], 1), swing = t.steady[j], sixth = t.steady_sixth[j];
+    for (int j = 0; j < z.joints + z.pushes; j++) {
+      vec d = set_limits(m, z, in, j, g), swing = t.steady[j], sixth = t.steady_sixth[j];
       for (int k = 0; k < z.terms; k++) {
         double square = t.decay[k] * t.decay[k] + t.turn[k] * t.turn[k];
         vec share = t.part_size[k][j] * amplitude[k];
@@ -314,8 +385,8 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       for (int n = 0; n < z.powers; n++) {
         vec level = t.level[n][j];
         for (int i = 0; i < z.joints; i++)
-          if (m.joint[i].slides > 0.5)
-            level += t.level_by_joint[n][j][i] * pull_of(g.s, i);
+          if (switches(m.joint[i]))
+            level += t.level_by_joint[n][j][i] * pull_of(m.joint[i], g.s, i);
         for (int i = 0; i < z.drifts; i++) {
           if (n == 0)
             level += t.level_by_place[i][j] * g.s.place[i];
@@ -325,9 +396,8 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
         put(g.power[n][j], in, d * level);
       }
       put(g.sixth[j], in, sixth);
-      put(g.felt_mass[j], in, t.felt_mass[j]);
-      put(g.low[j], in, slides ? pick(moves, 0, -joint.upper) : vec(joint.lower));
-      put(g.high[j], in, slides ? pick(moves, unlimited, joint.upper) : vec(joint.upper));
+      if (j < z.joints)
+        put(g.felt_mass[j], in, t.felt_mass[j]);
       vec ratio = sixth / (swing + 1e-300);
       put(steepest, ratio > steepest, ratio);
     }
@@ -351,8 +421,8 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
   }
 }
 
-inline void put_outlook(int joints, mask where, const outlook &from, outlook &o) {
-  for (int j = 0; j < joints; j++) {
+inline void put_outlook(int functions, mask where, const outlook &from, outlook &o) {
+  for (int j = 0; j < functions; j++) {
     put(o.f[j], where, from.f[j]);
     put(o.f1[j], where, from.f1[j]);
     put(o.f2[j], where, from.f2[j]);
@@ -371,7 +441,7 @@ inline void look_from_start(const structure_machine &m, const size &z, mask in, 
     b.im[k] = {};
   }
   functions_at(m, z, g, b, o);
-  put_outlook(z.joints, in, o, g.first);
+  put_outlook(functions_of(z, g), in, o, g.first);
   for (int n = 0; n < z.waves; n++) {
     put(g.first_cosine[n], in, b.cosine[n]);
     put(g.first_sine[n], in, b.sine[n]);

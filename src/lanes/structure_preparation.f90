@@ -1,21 +1,23 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure made ready to fly in lanes: linear, of few coordinates, with a clock, dry friction and rigid contacts.
+!> A jointed structure made ready to fly in lanes: linear, of few coordinates, with a clock, dry friction and contacts, rigid or
+!> linear.
 module structure_preparation
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine
-  use flight_path, only: begin_change, force_powers, path_t, place_powers
   use friction_law, only: falls
-  use jointed, only: joint_contact, joint_friction, joint_t, jointed_t
+  use jointed, only: joint_contact, joint_friction, joint_soft, joint_t, jointed_t
   use jointed_flows, only: jointed_motion_t
   use kinds, only: wp
   use lane_curve, only: restitution_curve_of
+  use jointed_state, only: acts_as_spring
   use lane_types, only: lane_flow_t
   use mode_flow, only: mode_flow_t
   use motion_state, only: flight_adaptive
-  use structure_types, only: lane_coordinates, lane_drifts, lane_joints, lane_powers, lane_sliders, lane_terms, lane_waves, &
-    panel_lengths, structure_joint_t, structure_machine_t, structure_mode_t
+  use structure_functions, only: never_pulls, set_functions
+  use structure_types, only: lane_coordinates, lane_drifts, lane_joints, lane_switches, lane_terms, lane_waves, panel_lengths, &
+    structure_joint_t, structure_machine_t, structure_mode_t
   implicit none
   private
 
@@ -27,6 +29,8 @@ module structure_preparation
   real(wp), parameter :: coarse = 3.0_wp, stretches(panel_lengths) = [4.0_wp, 2.5_wp, 1.6_wp, 1.0_wp]
   !> Shares of the sizes of forces and lengths within which a choice is left to the event loop.
   real(wp), parameter :: rounding = 1e-12_wp
+  !> The place of a stop that is not there [m].
+  real(wp), parameter :: no_stop = 1e300_wp
   !> Longest end of a chatter that is completed, and shortest flight that ends a burst of impacts, in periods; as in
   !> `jointed_transition` and `jointed_motion`.
   real(wp), parameter :: longest_chatter = 1e-2_wp, burst_gap = 1e-6_wp
@@ -37,7 +41,7 @@ contains
   pure subroutine prepare_structure_lanes(moving, flow)
     type(jointed_motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
-    integer, allocatable :: sliders(:)
+    integer, allocatable :: switches(:)
     integer :: j, key
     flow%available = fits_lanes(moving)
     if (.not. flow%available) return
@@ -57,10 +61,13 @@ contains
       m%shortest = 10*m%burst_gap
       do j = 1, size(machine%joints)
         call set_joint(machine, j, m%joint(j))
+        if (.not. never_pulls(machine%joints(j))) cycle
+        m%pushes = m%pushes + 1
+        m%joint(j)%push = m%joints + m%pushes
       end do
-      sliders = pack([(j, j=1, size(machine%joints))], machine%joints%kind == joint_friction)
-      do key = 0, 2**size(sliders) - 1
-        call set_mode(moving, sliders, key, m%mode(key + 1))
+      switches = pack([(j, j=1, size(machine%joints))], machine%joints%kind /= joint_contact)
+      do key = 0, 2**size(switches) - 1
+        call set_mode(moving, switches, key, m%mode(key + 1))
         if (m%mode(key + 1)%known > 0) call set_panels(moving%harmonics, machine%frequency, m%mode(key + 1))
       end do
       flow%available = m%mode(1)%known > 0
@@ -107,12 +114,19 @@ contains
         size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
       fits = fits .and. .not. allocated(machine%controller) .and. .not. allocated(machine%impulses)
       if (.not. fits) return
-      fits = count(machine%joints%kind == joint_friction) <= lane_sliders .and. &
-        all(machine%joints%kind == joint_friction .or. machine%joints%kind == joint_contact)
+      fits = count(machine%joints%kind /= joint_contact) <= lane_switches
       do j = 1, size(machine%joints)
         associate (joint => machine%joints(j))
-          if (joint%kind == joint_friction) fits = fits .and. .not. falls(joint%friction) .and. has_plain_level(joint)
-          if (joint%kind == joint_contact) fits = fits .and. .not. abs(joint%offset%rate) > 0
+          select case (joint%kind)
+          case (joint_friction)
+            fits = fits .and. .not. falls(joint%friction) .and. has_plain_level(joint)
+          case (joint_contact)
+            fits = fits .and. .not. abs(joint%offset%rate) > 0
+          case (joint_soft)
+            fits = fits .and. acts_as_spring(joint, 1) .and. .not. abs(joint%offset%rate) > 0
+          case default
+            fits = .false.
+          end select
         end associate
       end do
     end associate
@@ -148,13 +162,19 @@ contains
       end if
       into%has_upper = merge(1, 0, joint%upper < huge(1.0_wp))
       into%has_lower = merge(1, 0, joint%lower > -huge(1.0_wp))
-      into%upper = joint%upper
-      into%lower = joint%lower
+      into%upper = min(joint%upper, no_stop)
+      into%lower = max(joint%lower, -no_stop)
+      into%tie = rounding*machine%length_scale
+      if (joint%kind == joint_soft) then
+        into%soft = 1
+        into%pulls = merge(0, 1, never_pulls(joint))
+        into%stiffness = joint%contact%stiffness
+        return
+      end if
       into%restitution = joint%contact%restitution
       into%restitution_law = joint%contact%kind
       into%coefficients = joint%contact%coefficients
       into%curve = restitution_curve_of(joint%contact%change)
-      into%tie = rounding*machine%length_scale
       kick = matmul(machine%mobility, joint%row)
       kick = kick/sum(joint%row*kick)
       into%kick(:n) = kick
@@ -166,15 +186,15 @@ contains
     end associate
   end subroutine set_joint
 
-  !> The mode in which the friction joints whose bits are set in `key` stick.
-  pure subroutine set_mode(moving, sliders, key, mode)
+  !> The mode in which the joints whose bits are set in `key` stick or are pressed.
+  pure subroutine set_mode(moving, switches, key, mode)
     type(jointed_motion_t), intent(in) :: moving
-    integer, intent(in) :: sliders(:), key
+    integer, intent(in) :: switches(:), key
     type(structure_mode_t), intent(inout) :: mode
-    integer :: i, j, k, bits, terms
+    integer :: i, k, bits, terms
     bits = 0
-    do i = 1, size(sliders)
-      if (btest(key, i - 1)) bits = ibset(bits, sliders(i) - 1)
+    do i = 1, size(switches)
+      if (btest(key, i - 1)) bits = ibset(bits, switches(i) - 1)
     end do
     associate (machine => moving%machine, flow => moving%flows(bits + 1))
       if (.not. flow%modal) return
@@ -191,17 +211,12 @@ contains
       mode%decay(:terms) = -real(flow%exponent)
       mode%turn(:terms) = aimag(flow%exponent)
       call set_amplitudes(machine, flow, mode)
-      do j = 1, size(machine%joints)
-        k = findloc(flow%held, j, 1)
-        call set_function(machine, flow, j, k, mode)
-      end do
-      call set_statics(machine, flow, mode)
-      call set_drifts(machine, flow, mode)
-      do i = 1, size(sliders)
-        if (btest(bits, sliders(i) - 1)) cycle
-        associate (holding => moving%flows(ibset(bits, sliders(i) - 1) + 1))
-          k = findloc(holding%held, sliders(i), 1)
-          mode%felt_mass(sliders(i)) = holding%hold(k, k)
+      call set_functions(machine, flow, mode)
+      do i = 1, size(switches)
+        if (btest(bits, switches(i) - 1) .or. machine%joints(switches(i))%kind /= joint_friction) cycle
+        associate (holding => moving%flows(ibset(bits, switches(i) - 1) + 1))
+          k = findloc(holding%held, switches(i), 1)
+          mode%felt_mass(switches(i)) = holding%hold(k, k)
           ! Joints that depend on each other share a force in more ways than one.
           if (size(holding%independent) < size(holding%held)) mode%known = 0
         end associate
@@ -259,116 +274,5 @@ contains
       end do
     end associate
   end subroutine set_amplitudes
-
-  !> The function of joint j: the force that holds it as constraint number `held`, its speed, or its coordinate.
-  pure subroutine set_function(machine, flow, j, held, mode)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    integer, intent(in) :: j, held
-    type(structure_mode_t), intent(inout) :: mode
-    complex(wp) :: part, swing
-    integer :: k, m
-    logical :: slides
-    slides = machine%joints(j)%kind == joint_friction
-    do k = 1, size(flow%exponent)
-      if (held > 0) then
-        part = flow%force_shape(k, held)
-      else
-        part = flow%joint_shape(k, j)
-        if (slides) part = part*flow%exponent(k)
-      end if
-      mode%part_re(j, k) = real(part)
-      mode%part_im(j, k) = aimag(part)
-      mode%part_size(j, k) = modulus(part)
-    end do
-    do m = 1, size(flow%response, 2)
-      if (held > 0) then
-        swing = flow%force_response(m, held)
-      else
-        swing = flow%joint_response(m, j)
-        if (slides) swing = swing*cmplx(0.0_wp, m*machine%frequency, wp)
-      end if
-      mode%swing_re(j, m) = real(swing)
-      mode%swing_im(j, m) = aimag(swing)
-      mode%steady(j) = mode%steady(j) + modulus(swing)
-      mode%steady_sixth(j) = mode%steady_sixth(j) + modulus(swing)*(m*machine%frequency)**6
-    end do
-  end subroutine set_function
-
-  !> Where the load and the surfaces would take the structure, by powers of time, and what each joint adds to that: friction in
-  !> its direction, or the place where it is held.
-  pure subroutine set_statics(machine, flow, mode)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(structure_mode_t), intent(inout) :: mode
-    real(wp), dimension(machine%n) :: none, force, place
-    type(path_t) :: path
-    logical :: drifts
-    integer :: j, i
-    none = 0
-    associate (n => machine%n)
-      call begin_change(machine, flow, none, none, machine%load, path, -machine%joints%offset%rate)
-      mode%still(:n, :) = path%powers(:n, :)
-      call set_levels(machine, flow, path, .true., mode%level)
-      drifts = mode%drifts > 0 .or. any(abs(path%powers(:n, 1:)) > 0)
-      do j = 1, size(machine%joints)
-        if (machine%joints(j)%kind /= joint_friction) cycle
-        i = findloc(flow%held, j, 1)
-        force = 0
-        place = 0
-        if (i > 0) place = flow%carried(:, i)
-        if (i == 0) force = -machine%joints(j)%friction%kinetic*machine%joints(j)%row
-        call begin_change(machine, flow, place, none, force, path)
-        mode%still_by_joint(:n, j, :) = path%powers(:n, :)
-        call set_levels(machine, flow, path, .false., mode%level_by_joint(j, :, :))
-        drifts = drifts .or. any(abs(path%powers(:n, 1:)) > 0)
-      end do
-    end associate
-    mode%powers = merge(lane_powers, 1, drifts)
-  end subroutine set_statics
-
-  !> What a place and a pace along each direction without a spring add to the functions.
-  pure subroutine set_drifts(machine, flow, mode)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(structure_mode_t), intent(inout) :: mode
-    real(wp) :: level(lane_joints, lane_powers)
-    type(path_t) :: path
-    integer :: d
-    do d = 1, nint(mode%drifts)
-      path%powers = 0
-      path%powers(:machine%n, 0) = mode%drift(:machine%n, d)
-      level = 0
-      call set_levels(machine, flow, path, .false., level)
-      mode%level_by_place(:, d) = level(:, 1)
-      path%powers = 0
-      path%powers(:machine%n, 1) = mode%drift(:machine%n, d)
-      level = 0
-      call set_levels(machine, flow, path, .false., level)
-      mode%level_by_pace(:, d, :) = level(:, :2)
-    end do
-  end subroutine set_drifts
-
-  !> Powers of time in the functions of the joints (rows) along a path, with the given part of their coordinates or without.
-  pure subroutine set_levels(machine, flow, path, with_offset, level)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(path_t), intent(in) :: path
-    logical, intent(in) :: with_offset
-    real(wp), intent(inout) :: level(:, :)
-    real(wp) :: powers(0:3)
-    integer :: k, held
-    do k = 1, size(machine%joints)
-      held = findloc(flow%held, k, 1)
-      if (held > 0) then
-        level(k, :) = force_powers(machine, flow, path, held)
-        cycle
-      end if
-      powers = matmul(machine%joints(k)%row, path%powers(:machine%n, :))
-      if (with_offset) powers = place_powers(machine, path, k)
-      if (machine%joints(k)%kind == joint_friction) powers = [powers(1), 2*powers(2), 3*powers(3), 0.0_wp]
-      level(k, :) = powers
-    end do
-  end subroutine set_levels
 
 end module structure_preparation

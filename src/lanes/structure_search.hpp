@@ -52,15 +52,16 @@ inline mask stays_within(const structure_machine &m, const size &z, const struct
                          const outlook &here, const outlook &far, vec span, mask &fallen) {
   vec cube = span * span * span, power = cube * cube * (1.0 / 14400);
   mask within = asked;
-  for (int j = 0; j < z.joints; j++) {
-    const structure_joint &joint = m.joint[j];
+  for (int j = 0; j < functions_of(z, g); j++) {
     vec error = g.sixth[j] * power;
-    if (joint.has_lower > 0.5) {
-      fallen = fallen | (far.f[j] < g.low[j]);
-      within = within & stays_positive<halves>(span, here.f[j] - g.low[j], here.f1[j], here.f2[j],
-                                               far.f[j] - g.low[j], far.f1[j], far.f2[j], error);
+    // Where nothing waits the last functions are nothing.
+    mask idle = j < z.joints ? mask{} : g.low[j] == -unlimited;
+    if (has_limit(m, z, g, asked, j, -1)) {
+      fallen = fallen | ((far.f[j] < g.low[j]) & ~idle);
+      within = within & (idle | stays_positive<halves>(span, here.f[j] - g.low[j], here.f1[j], here.f2[j],
+                                                       far.f[j] - g.low[j], far.f1[j], far.f2[j], error));
     }
-    if (joint.has_upper > 0.5 && (joint.slides < 0.5 || any(asked & (g.s.phase[j] == 0.0)))) {
+    if (has_limit(m, z, g, asked, j, 1)) {
       fallen = fallen | (far.f[j] > g.high[j]);
       within = within & stays_positive<halves>(span, g.high[j] - here.f[j], -here.f1[j], -here.f2[j],
                                                g.high[j] - far.f[j], -far.f1[j], -far.f2[j], error);
@@ -96,7 +97,7 @@ template <class size>
 inline guard_course course_of(const size &z, const structure_group &g, const structure_target &target,
                               const outlook &o) {
   guard_course c;
-  for (int j = 0; j < z.joints; j++) {
+  for (int j = 0; j < functions_of(z, g); j++) {
     mask is = target.joint == double(j + 1);
     put(c.w, is, -target.side * (o.f[j] - pick(target.side > 0.0, g.high[j], g.low[j])));
     put(c.w1, is, -target.side * o.f1[j]);
@@ -110,7 +111,7 @@ inline guard_course course_of(const size &z, const structure_group &g, const str
 template <class size>
 inline void make_zero(const size &z, const structure_group &g, const structure_target &target, mask where,
                       outlook &o) {
-  for (int j = 0; j < z.joints; j++)
+  for (int j = 0; j < functions_of(z, g); j++)
     put(o.f[j], where & (target.joint == double(j + 1)), pick(target.side > 0.0, g.high[j], g.low[j]));
 }
 
@@ -121,14 +122,16 @@ inline structure_target earliest_fallen(const structure_machine &m, const size &
                                         const outlook &here, const outlook &far) {
   structure_target target = {0, 0};
   vec least = 2;
-  for (int j = 0; j < z.joints; j++)
+  for (int j = 0; j < functions_of(z, g); j++)
     for (int side = -1; side <= 1; side += 2) {
-      if ((side > 0 ? m.joint[j].has_upper : m.joint[j].has_lower) < 0.5)
+      if (!has_limit(m, z, g, ~mask{}, j, side))
         continue;
       vec w0 = side > 0 ? g.high[j] - here.f[j] : here.f[j] - g.low[j];
       vec w1 = side > 0 ? g.high[j] - far.f[j] : far.f[j] - g.low[j];
       vec share = w0 / (w0 - w1);
       mask first = (w1 < 0.0) & (share < least);
+      if (j >= z.joints)
+        first = first & (g.low[j] != -unlimited);
       put(target.joint, first, j + 1);
       put(target.side, first, side);
       put(least, first, share);
@@ -183,7 +186,7 @@ inline void keep_end(const size &z, mask found, const structure_walk &p, const s
     put(g.s.end_re[k], found, g.s.re[k] * p.b.re[k] - g.s.im[k] * p.b.im[k]);
     put(g.s.end_im[k], found, g.s.re[k] * p.b.im[k] + g.s.im[k] * p.b.re[k]);
   }
-  for (int j = 0; j < z.joints; j++) {
+  for (int j = 0; j < functions_of(z, g); j++) {
     put(g.s.end_f[j], found, p.far.f[j]);
     put(g.s.end_f1[j], found, p.far.f1[j]);
   }
@@ -219,7 +222,7 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
     functions_at(m, z, g, next, there);
     LANE_COUNT(panels, count(walking));
     put_bases(z.terms, z.waves, walking, next, p.b);
-    put_outlook(z.joints, walking, there, p.far);
+    put_outlook(functions_of(z, g), walking, there, p.far);
     put(p.end, walking, p.t + g.panel);
     walking = proven_within(m, z, g, walking, p.here, p.far, g.panel);
     mask over = walking & (p.panels >= double(most_panels));
@@ -228,7 +231,7 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
       sought = sought & ~over;
       walking = walking & ~over;
     }
-    put_outlook(z.joints, walking, p.far, p.here);
+    put_outlook(functions_of(z, g), walking, p.far, p.here);
     put(p.t, walking, p.end);
     put(p.panels, walking, p.panels + 1.0);
   }
@@ -236,10 +239,10 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
 
 // Newton's step from `step` to the zero of Taylor's polynomial of the targets.
 template <class size>
-inline vec zero_nearby(const size &z, const structure_target &target, const guard_course &c,
-                       const far_outlook &far, vec step) {
+inline vec zero_nearby(const size &z, const structure_group &g, const structure_target &target,
+                       const guard_course &c, const far_outlook &far, vec step) {
   vec w4 = {}, w5 = {};
-  for (int j = 0; j < z.joints; j++) {
+  for (int j = 0; j < functions_of(z, g); j++) {
     mask is = target.joint == double(j + 1);
     put(w4, is, -target.side * far.f4[j]);
     put(w5, is, -target.side * far.f5[j]);
@@ -271,7 +274,7 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
     // Where the step is short Taylor's polynomial is the function: its zero, by one step of Newton's method
     // where the slope hardly changes on the way.
     mask near = (magnitude(step) <= g.close) & (magnitude(step * w2) <= -straight * w1);
-    vec zero = zero_nearby(z, p.target, c, far, step);
+    vec zero = zero_nearby(z, g, p.target, c, far, step);
     step = pick(near, zero, step);
     vec next = s + step;
     mask guided = (w1 < 0.0) & (next >= low) & (next <= high) & (next > p.t);
@@ -288,7 +291,7 @@ inline mask polish(const structure_machine &m, const size &z, mask asked, struct
         put(p.b.im[k], close, im);
       }
       vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step, fifth = 0.2 * step;
-      for (int j = 0; j < z.joints; j++) {
+      for (int j = 0; j < functions_of(z, g); j++) {
         vec f5 = far.f5[j], f4 = far.f4[j], f3 = o.f3[j], f2 = o.f2[j], f1 = o.f1[j];
         vec slope = f1 + step * (f2 + half * (f3 + third * (f4 + fourth * f5)));
         put(p.far.f[j], close,
@@ -317,7 +320,7 @@ inline void halve(const structure_machine &m, const size &z, mask asked, structu
   bases_at(m, z, g, middle, b);
   functions_at(m, z, g, b, o);
   put_bases(z.terms, z.waves, asked, b, p.b);
-  put_outlook(z.joints, asked, o, p.far);
+  put_outlook(functions_of(z, g), asked, o, p.far);
   put(p.end, asked, middle);
   p.at_zero = p.at_zero & ~asked;
 }
@@ -361,7 +364,7 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     mask found = within & p.at_zero;
     keep_end(z, found, p, p.target, g);
     walking = within & ~p.at_zero;
-    put_outlook(z.joints, walking, p.far, p.here);
+    put_outlook(functions_of(z, g), walking, p.far, p.here);
     put(p.t, walking, p.end);
     put(p.tries, sought, p.tries + 1.0);
     failed = failed | (sought & ~found & (p.tries >= double(most_tries)));

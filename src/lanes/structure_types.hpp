@@ -13,9 +13,11 @@ enum {
   most_coordinates = 8,
   most_terms = 16,
   most_joints = 4,
-  // Dry friction joints, and the modes that they make: stuck or not.
-  most_sliders = 2,
-  most_structure_modes = 4,
+  // Joints of dry friction and soft contacts, and the modes that they make: stuck, pressed or not.
+  most_switches = 4,
+  most_structure_modes = 16,
+  // A function of each joint, and one more of a soft contact that never pulls.
+  most_functions = 8,
   most_waves = 8,
   // Directions without a spring, and the powers of time that motions have along them.
   most_drifts = 4,
@@ -26,13 +28,15 @@ enum {
   most_structure_regions = 64
 };
 
-// One mode of a structure: which of its friction joints stick. With E(k) = exp((-decay + i turn) t), complex
-// amplitudes a(k), W(m) = exp(i m Omega t), places b(d) and paces c(d) along the directions without a spring
+// One mode of a structure: which of its friction joints stick, which soft contacts are pressed. With E(k) =
+// exp((-decay + i turn) t), complex amplitudes a(k), W(m) = exp(i m Omega t), places b(d) and paces c(d)
+// along the directions without a spring
 //   q = sum still(p) t^p + sum drift (b + c t) + Re sum shape a E + Re sum wave W,
-// and of every joint one function: its coordinate (an open contact), its sliding speed, the force that holds
-// it,
+// and of every joint one function: its coordinate (a contact), its sliding speed, the force that holds it, or
+// the force k s + c s' of a soft contact that never pulls,
 //   f = sum level(p) t^p + Re sum part a E + Re sum swing W.
-// `still` and `level` are sums over the directions of the sliding joints and the coordinates of those held.
+// After them those forces of contacts that are not pressed. `still` and `level` are sums over the directions
+// of the sliding joints, the coordinates of those held, and the places of the stops that are pressed.
 struct structure_mode {
   // How many powers of time it has, 1 where nothing drifts; `idle`: nothing moves at all.
   double known, terms, drifts, powers, idle;
@@ -48,13 +52,13 @@ struct structure_mode {
   double place_from_place[most_coordinates][most_drifts], place_from_speed[most_coordinates][most_drifts],
       pace_from_speed[most_coordinates][most_drifts];
   double drift[most_drifts][most_coordinates];
-  double level_by_place[most_drifts][most_joints], level_by_pace[2][most_drifts][most_joints];
-  double part_re[most_terms][most_joints], part_im[most_terms][most_joints],
-      part_size[most_terms][most_joints];
-  double swing_re[most_waves][most_joints], swing_im[most_waves][most_joints];
-  double level[most_powers][most_joints], level_by_joint[most_powers][most_joints][most_joints];
+  double level_by_place[most_drifts][most_functions], level_by_pace[2][most_drifts][most_functions];
+  double part_re[most_terms][most_functions], part_im[most_terms][most_functions],
+      part_size[most_terms][most_functions];
+  double swing_re[most_waves][most_functions], swing_im[most_waves][most_functions];
+  double level[most_powers][most_functions], level_by_joint[most_powers][most_functions][most_joints];
   // Bounds on what the waves have in the functions and their sixth derivatives.
-  double steady[most_joints], steady_sixth[most_joints];
+  double steady[most_functions], steady_sixth[most_functions];
   // A step of the root search shorter than this [s] is the last.
   double close;
   // Lengths of panels, longest first [s]; how large the sixth derivative of a function may be, in its own
@@ -67,8 +71,11 @@ struct structure_mode {
 };
 
 struct structure_joint {
-  // 1: dry friction, 0: rigid contact.
-  double slides;
+  // 1: dry friction, 1: soft contact; none: rigid contact.
+  double slides, soft;
+  // A soft contact that may pull, or has no damper, ends where it began; else it ends where its force k s + c
+  // s' falls below k [N/m] times the stop, function number `push` (1, ...) where it is not pressed.
+  double pulls, stiffness, push;
   // Stops [m], or break-away level [N].
   double upper, lower;
   double has_upper, has_lower;
@@ -87,7 +94,7 @@ struct structure_joint {
 };
 
 struct structure_machine {
-  double coordinates, joints, waves;
+  double coordinates, joints, pushes, waves;
   double drive_frequency, period, domain;
   // Sliding speeds below this are left to the scalar code [m/s].
   double slowest;
@@ -107,7 +114,8 @@ template <class T> struct structure_fields {
   // zero there, with the sign of its side, 0 = none; `rising`: that of the joint that has just given way;
   // `burst`: impacts in a row with next to no time between them.
   T q[most_coordinates], v[most_coordinates], time, left, rising, burst;
-  // Friction: direction of the slide, 0 = sticks. Of contacts 0.
+  // Friction: direction of the slide, 0 = sticks. Soft contacts: 0 = open, the side on which they are pressed
+  // (+1, -1) or without force but not yet free (+2, -2). Of rigid contacts 0.
   T phase[most_joints];
   // The flight: start [s after the section], amplitudes, coordinates of the joints held.
   T start, re[most_terms], im[most_terms], held[most_joints];
@@ -115,7 +123,8 @@ template <class T> struct structure_fields {
   T place[most_drifts], pace[most_drifts];
   // What ends it: 1 = found, when, joint (1, ...; 0 = none, the flight goes on), side; amplitudes then;
   // functions of the joints and their rates then.
-  T found, span, joint, side, end_re[most_terms], end_im[most_terms], end_f[most_joints], end_f1[most_joints];
+  T found, span, joint, side, end_re[most_terms], end_im[most_terms], end_f[most_functions],
+      end_f1[most_functions];
   // Counted like those of `lane_fields`.
   T sticks;
 };

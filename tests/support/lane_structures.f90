@@ -3,8 +3,8 @@
 
 !> Jointed structures that lanes fly.
 module lane_structures
-  use contact_law, only: contact_linear, contact_power, contact_t, contact_viscoelastic
-  use jointed, only: joint_contact, joint_t, jointed_t
+  use contact_law, only: contact_kelvin_voigt, contact_linear, contact_power, contact_t, contact_viscoelastic
+  use jointed, only: joint_contact, joint_soft, joint_t, jointed_t
   use jointed_machines, only: barrier, body, fit, push, ready, rub, spring
   use kinds, only: wp
   use lane_types, only: widest_lanes
@@ -16,8 +16,8 @@ module lane_structures
   public :: structure_number, chain, made_ready
 
   !> Structures whose every mode oscillates; that no spring ties to the ground, or a damper alone, on belts and with strong
-  !> dampers; with a restitution that depends on the speed.
-  integer, parameter, public :: oscillating = 1, drifting = 2, restituting = 3
+  !> dampers; with a restitution that depends on the speed; with stops that have springs and dampers.
+  integer, parameter, public :: oscillating = 1, drifting = 2, restituting = 3, pressing = 4
 
 contains
 
@@ -28,6 +28,8 @@ contains
     type(motion_t) :: moving
     if (kind == drifting) then
       moving = drifting_structure(i)
+    else if (kind == pressing) then
+      moving = pressing_structure(i)
     else
       moving = oscillating_structure(i, kind == restituting)
     end if
@@ -64,6 +66,44 @@ contains
     call push(machine, last(modulo(i, 3)), 0.2_wp, uniform(0.5_wp, 2.0_wp), 0.3_wp)
     moving = made_ready(machine)
   end function oscillating_structure
+
+  !> Two or four bodies in a row that may rub at up to three places: stops with a spring and a damper, light or so strong that the
+  !> body creeps back, some of which pull; on one side of the last body or both, between bodies, on a surface that moves, beside
+  !> rigid ones.
+  function pressing_structure(i) result(moving)
+    integer, intent(in) :: i
+    type(motion_t) :: moving
+    type(jointed_t) :: machine
+    type(joint_t) :: stop
+    character(len=2) :: name
+    integer :: n, k
+    n = 2**(1 + modulo(i, 2))
+    machine%frequency = uniform(1.0_wp, 2.5_wp)
+    do k = 1, n
+      write (name, '(a, i1)') 'b', k
+      call body(machine, name, uniform(0.5_wp, 2.0_wp))
+      if (k == 1) call spring(machine, 'ground', name, uniform(1.0_wp, 3.0_wp), 0.05_wp)
+      if (k > 1) call spring(machine, machine%names(k - 1), name, uniform(2.0_wp, 6.0_wp), 0.05_wp)
+    end do
+    if (modulo(i, 4) < 3) call rub(machine, 'ground', 'b1', 0.3_wp, merge(0.3_wp, 0.45_wp, modulo(i, 4) < 2))
+    if (modulo(i, 6) == 2) call rub(machine, 'b1', 'b2', 0.1_wp, 0.15_wp)
+    if (modulo(i, 6) == 2) call rub(machine, 'ground', name, 0.1_wp, 0.1_wp, belt=0.1_wp)
+    stop%kind = joint_soft
+    stop%upper = 0.2_wp
+    if (modulo(i, 3) == 0) stop%lower = -0.3_wp
+    if (modulo(i, 7) == 3) stop%offset%mean = 0.05_wp
+    if (modulo(i, 7) == 3) stop%offset%harmonic = [(0.03_wp, 0.02_wp)]
+    stop%contact = contact_t(kind=contact_kelvin_voigt, soft=.true., stiffness=uniform(20.0_wp, 2000.0_wp), &
+                             damping=merge(0.0_wp, uniform(0.2_wp, 20.0_wp), modulo(i, 5) == 4), tension=modulo(i, 5) > 2)
+    call fit(machine, 'ground', name, stop)
+    if (modulo(i, 6) == 5) call barrier(machine, 'b1', 'b2', uniform(0.3_wp, 0.9_wp), upper=0.4_wp)
+    stop%lower = -0.2_wp
+    stop%contact%damping = uniform(1.0_wp, 3.0_wp)
+    stop%contact%tension = .false.
+    if (modulo(i, 6) == 4) call fit(machine, 'b1', 'b2', stop)
+    call push(machine, name, 0.2_wp, uniform(0.5_wp, 2.0_wp), 0.3_wp)
+    moving = made_ready(machine)
+  end function pressing_structure
 
   !> A stop whose restitution depends on the speed.
   function stop_with_law(i) result(joint)
