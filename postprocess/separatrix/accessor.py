@@ -66,6 +66,8 @@ class Accessor:
         """The labelled points of branches: folds, period doublings, grazes, ends of the range, ..."""
         self._require("branches")
         found = self._result
+        if "label" not in found:
+            raise SeparatrixError("no periodic orbits, only equilibria", USAGE)
         labels = self.decoded("label").values
         chosen = np.flatnonzero(labels != "none")
         columns = ("branch", "parameter", "period", "impacts", "x", "v", "x_min", "x_max")

@@ -11,6 +11,7 @@ module branch
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up, return_share
+  use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
   use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
   use hybrid_machine, only: event_t
@@ -19,7 +20,8 @@ module branch
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, move_along, orbit_of_motion, orbit_t, scales_of_orbit
+  use orbit_motion, only: is_admissible, orbit_of_motion
+  use periodic_orbit, only: correct_orbit, direct, move_along, orbit_t, scales_of_orbit
   use search_watch, only: search_watch_t
   use soft_graze, only: is_touch
   implicit none
@@ -144,6 +146,10 @@ contains
     end do
     if (swaps_halves(trace, next)) then
       call end_at_parent(family, trace, length, points, ending)
+      return
+    end if
+    if (has_vanished(trace, next)) then
+      call end_at_rest(family, trace, length, points, ending)
       return
     end if
     if (leaves_range(plan, next%now%orbit%parameter)) then

@@ -14,7 +14,8 @@ module branch_passage
   use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_release, of_slip, of_stick, &
     of_turning, same_meaning
   use other_sequence, only: change_sequence
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_t
+  use orbit_motion, only: is_admissible
+  use periodic_orbit, only: correct_orbit, direct, orbit_t
   use secant_bracket, only: bracket_t, narrow, next_trial
   use soft_graze, only: enter_touches, is_touch, touches_apart, touching, vanishing_touch
   use structure, only: structure_t

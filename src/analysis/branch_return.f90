@@ -7,7 +7,8 @@ module branch_return
   use branch_point, only: point_t, step_to, trace_t
   use kinds, only: wp
   use orbit_sections, only: section_points
-  use periodic_orbit, only: orbit_t, same_sequence, scales_of_orbit
+  use orbit_motion, only: same_sequence
+  use periodic_orbit, only: orbit_t, scales_of_orbit
   implicit none
   private
 

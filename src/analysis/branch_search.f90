@@ -8,8 +8,10 @@ module branch_search
   use body_family, only: family_t
   use branch, only: trace_branch
   use branch_ends, only: join_ends
-  use branch_point, only: branch_t, label_bp, label_pd, plan_t, point_t, set_sizes
+  use branch_point, only: branch_t, label_bp, label_hb, label_pd, plan_t, point_t, set_sizes
+  use equilibrium_branch, only: equilibria_t, find_equilibria
   use errors, only: error_t
+  use hopf_cycles, only: begin_cycle, mark_births
   use kinds, only: wp
   use hybrid_machine, only: hybrid_t
   use machine_family, only: machine_neighbourhood, machine_of_family, watched_rows
@@ -18,8 +20,9 @@ module branch_search
   use orbit_sections, only: section_points
   use orbit_symmetry, only: mark_symmetry
   use part_of_branch, only: lies_on
-  use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, is_admissible, move_along, &
-    orbit_of_motion, orbit_t, same_sequence, scales_of_orbit
+  use orbit_motion, only: is_admissible, orbit_of_motion, same_sequence
+  use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, move_along, orbit_t, &
+    scales_of_orbit
   use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none
@@ -50,6 +53,8 @@ module branch_search
     !> Whether any orbit that was found depends on the parameter.
     logical :: depends = .false.
     type(branch_t), allocatable :: branches(:)
+    !> Branches of equilibria of a machine without a clock.
+    type(equilibria_t), allocatable :: equilibria(:)
     !> Rows that give place and speed of what is watched from a section point; whether the section is a time of the drive.
     real(wp), allocatable :: watch(:, :)
     logical :: has_clock = .true.
@@ -111,12 +116,30 @@ contains
         if (.not. is_known(search, i, seeds(i)%orbits(k))) call follow_new(search, seeds(i)%orbits(k))
       end do
     end do
+    call follow_births(search)
     call leave_out_parts(search)
     call join_ends(search%family, search%branches)
+    call mark_births(search%family, search%watch, search%equilibria, search%branches)
     do i = 1, size(search%branches)
       call mark_symmetry(search%family, search%branches(i))
     end do
   end subroutine follow_seeds
+
+  !> Follows the equilibria, and the cycles that are born at their Hopf points.
+  subroutine follow_births(search)
+    type(search_t), intent(inout) :: search
+    type(orbit_t) :: orbit
+    integer :: e, i
+    logical :: ok
+    call find_equilibria(search%family, search%plan, search%values, search%starts, search%equilibria)
+    do e = 1, size(search%equilibria)
+      do i = 1, size(search%equilibria(e)%points)
+        if (search%equilibria(e)%points(i)%label /= label_hb) cycle
+        call begin_cycle(search%family, search%equilibria(e)%points(i), orbit, ok)
+        if (ok) call follow_new(search, orbit)
+      end do
+    end do
+  end subroutine follow_births
 
   !> Leaves out branches that lie on another one: one may end, for want of points or of a sequence of events, where the other
   !> goes on.

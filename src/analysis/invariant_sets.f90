@@ -8,13 +8,11 @@
 !> Hobson, J. Comput. Phys. 104 (1993)), at the level before first; what stays apart is a cut.
 module invariant_sets
   use body_family, only: map_with_variation
-  use circle, only: point_near
-  use constants, only: unreachable
   use kinds, only: wp
-  use matrices, only: solve
   use motion_state, only: tally_t
   use one_body, only: one_body_t
   use saddle_search, only: distance_to_saddle, saddle_t, section_distance
+  use section_preimages, only: preimage_beside, scan_t, scan_window
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -26,13 +24,9 @@ module invariant_sets
   character(len=*), parameter, public :: end_names(0:3) = [character(len=12) :: 'converged', 'left_window', 'no_preimage', &
     'too_long']
 
-  integer, parameter :: most_levels = 80, most_points = 6000, most_newton = 12
-  !> Starts along each side of the window whose images are known, and how many of them are tried as guesses.
-  integer, parameter :: scans = 40, most_tries = 4
-  !> Of natural sizes: how far the image of a guess may be from the target, and after five steps.
-  real(wp), parameter :: farthest_guess = 0.5_wp, hopeless = 1e-2_wp
-  !> Of natural sizes: distance from the saddle at which a set begins, between neighbours, and of a preimage's image.
-  real(wp), parameter :: first_step = 1e-6_wp, spacing = 1e-2_wp, accuracy = 1e-12_wp
+  integer, parameter :: most_levels = 80, most_points = 6000
+  !> Of natural sizes: distance from the saddle at which a set begins, and between neighbours.
+  real(wp), parameter :: first_step = 1e-6_wp, spacing = 1e-2_wp
   !> Largest angle between neighbouring chords [rad] where these are longer than the share of the spacing; least step of the place.
   real(wp), parameter :: most_angle = 0.3_wp, straight = 0.1_wp, least_step = 1e-9_wp
 
@@ -61,7 +55,7 @@ module invariant_sets
     logical :: stable = .false.
     real(wp) :: origin(2) = 0, direction(2) = 0, factor = 1, low(2) = 0, high(2) = 0
     integer :: turns = 1
-    real(wp), allocatable :: starts(:, :), images(:, :)
+    type(scan_t) :: scan
   end type growth_t
 
 contains
@@ -82,7 +76,7 @@ contains
     set%stable = stable
     set%side = side
     call set_growth(body, saddle, stable, side, low, high, growth)
-    if (stable) call scan_window(machines, body, growth)
+    if (stable) call scan_window(machines, body, low, high, growth%scan)
     allocate (levels(0:most_levels*growth%turns))
     levels(0)%nodes = [base(growth, 0.0_wp), base(growth, 1.0_wp)]
     set%ending = end_too_long
@@ -265,97 +259,13 @@ contains
     node = node_t(place=from%place, y=from%y, there=.false.)
     if (.not. is_inside(growth, from)) return
     if (growth%stable) then
-      call preimage_beside(machines, body, growth, from%y, guess%y, node%y, node%there)
+      call preimage_beside(machines, body, growth%scan, from%y, guess%y, node%y, node%there)
     else
       call map_with_variation(machines, from%y, 1, node%y, slopes, tally, node%there)
       ! The derivative is not needed here.
       node%there = tally%events > 0 .and. all(abs(node%y) < huge(1.0_wp))
     end if
   end subroutine map_node
-
-  !> The preimage near a guess, or, where the curve runs into a barrier and goes on elsewhere, near the starts whose images are
-  !> nearest to the target.
-  subroutine preimage_beside(machines, body, growth, target, guess, y, ok)
-    type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
-    type(growth_t), intent(in) :: growth
-    real(wp), intent(in) :: target(2), guess(2)
-    real(wp), intent(out) :: y(2)
-    logical, intent(out) :: ok
-    real(wp) :: distance(size(growth%starts, 2))
-    integer :: i, nearest
-    y = guess
-    call find_preimage(machines, body, target, y, ok)
-    if (ok) return
-    do i = 1, size(distance)
-      distance(i) = section_distance(body, growth%images(:, i), target)
-    end do
-    do i = 1, most_tries
-      nearest = minloc(distance, 1)
-      if (distance(nearest) > farthest_guess) exit
-      y = growth%starts(:, nearest)
-      call find_preimage(machines, body, target, y, ok)
-      if (ok) return
-      distance(nearest) = huge(distance)
-    end do
-  end subroutine preimage_beside
-
-  !> Starts all over the window and their images: guesses where the neighbour is none.
-  subroutine scan_window(machines, body, growth)
-    type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
-    type(growth_t), intent(inout) :: growth
-    type(tally_t) :: tally
-    real(wp) :: slopes(2, 2), low(2), high(2)
-    integer :: i, j, k
-    logical :: ok
-    allocate (growth%starts(2, scans**2), growth%images(2, scans**2))
-    associate (contact => body%moving%machine%contact)
-      low = [max(growth%low(1), contact%lower), growth%low(2)]
-      high = [min(growth%high(1), contact%upper), growth%high(2)]
-    end associate
-    do j = 1, scans
-      do i = 1, scans
-        k = i + scans*(j - 1)
-        growth%starts(:, k) = low + (high - low)*[i - 0.5_wp, j - 0.5_wp]/scans
-        call map_with_variation(machines, growth%starts(:, k), 1, growth%images(:, k), slopes, tally, ok)
-        if (.not. ok) growth%images(:, k) = unreachable
-      end do
-    end do
-  end subroutine scan_window
-
-  !> Newton's method for the preimage of `target`, from `y` on.
-  subroutine find_preimage(machines, body, target, y, ok)
-    type(neighbourhood_t), intent(in) :: machines
-    type(one_body_t), intent(in) :: body
-    real(wp), intent(in) :: target(2)
-    real(wp), intent(inout) :: y(2)
-    logical, intent(out) :: ok
-    type(tally_t) :: tally
-    real(wp) :: image(2), slopes(2, 2), step(2), miss, best(2), least
-    integer :: i
-    least = huge(least)
-    best = y
-    do i = 1, most_newton
-      call map_with_variation(machines, y, 1, image, slopes, tally, ok)
-      if (.not. ok) exit
-      miss = section_distance(body, image, target)
-      image = point_near(image, target, body%moving%machine%turn)
-      if (miss < least) best = y
-      if (miss >= least .and. least < accuracy) exit
-      ! Newton's method is quick, or it leads nowhere.
-      if (i > 5 .and. least > hopeless) exit
-      least = min(least, miss)
-      if (.not. miss > 0) exit
-      call solve(slopes, target - image, step, ok)
-      if (.not. ok) exit
-      if (norm2(step/body%size_of) > 10) exit
-      y = y + step
-      y(1) = max(min(y(1), body%moving%machine%contact%upper), body%moving%machine%contact%lower)
-    end do
-    ok = least < accuracy
-    y = best
-  end subroutine find_preimage
 
   !> Whether a point is to be put in behind the i-th of a level.
   pure logical function needs_middle(body, growth, nodes, i) result(needs)

@@ -11,7 +11,7 @@ module multipliers
   implicit none
   private
 
-  public :: multipliers_of, shifted_determinant
+  public :: multipliers_of, multipliers_beside_graze, shifted_determinant
 
   !> Rounding of the entries of a map's derivative, as a share of its norm; what an eigenvalue must be known to, absolutely or as a
   !> share.
@@ -73,6 +73,37 @@ contains
       if (miss > known_to*max(1.0_wp, modulus(values(i)))) values(i) = ieee_value(1.0_wp, ieee_quiet_nan)
     end do
   end subroutine leave_out_hidden
+
+  !> Eigenvalues of base - column row/rate, largest modulus first, where the rate is so small that but for one they are those of
+  !> the limit: with the first axis along the row that of the rest of the base, less what the column makes of it. They are not
+  !> numbers where the limit is not known to 1e-6.
+  pure function multipliers_beside_graze(base, column, row, rate) result(values)
+    real(wp), intent(in) :: base(:, :), column(:), row(:), rate
+    complex(wp) :: values(size(row))
+    real(wp), dimension(size(row), size(row)) :: turn, turned
+    real(wp), dimension(size(row)) :: axis, along
+    real(wp) :: lead
+    integer :: i, n
+    n = size(row)
+    values = ieee_value(1.0_wp, ieee_quiet_nan)
+    if (.not. norm2(row) > 0) return
+    ! Householder's reflection of the row onto the first axis.
+    axis = row/norm2(row)
+    axis(1) = axis(1) + sign(1.0_wp, axis(1))
+    turn = -2*spread(axis, 2, n)*spread(axis, 1, n)/sum(axis**2)
+    do i = 1, n
+      turn(i, i) = turn(i, i) + 1
+    end do
+    turned = matmul(turn, matmul(base, turn))
+    along = matmul(turn, column)
+    lead = along(1)*sum(turn(1, :)*row)
+    if (.not. abs(rate)*max(1.0_wp, maxval(abs(base)))**2 < known_to*abs(lead)) return
+    do i = 2, n
+      turned(i, 2:) = turned(i, 2:) - along(i)/along(1)*turned(1, 2:)
+    end do
+    values(1) = -lead/rate
+    values(2:) = multipliers_of(turned(2:, 2:))
+  end function multipliers_beside_graze
 
   !> det(M + shift).
   pure real(wp) function shifted_determinant(m, shift) result(determinant)

@@ -12,7 +12,8 @@ module orbit_search
   use motion_state, only: tally_t
   use multipliers, only: shifted_determinant
   use orbit_sections, only: section_points
-  use periodic_orbit, only: correct_orbit, direct, is_admissible, orbit_of_motion, orbit_t, same_orbit
+  use orbit_motion, only: is_admissible, orbit_of_motion
+  use periodic_orbit, only: correct_orbit, direct, orbit_t, same_orbit
   use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none

@@ -11,21 +11,18 @@ module periodic_orbit
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use machine_family, only: fly_sections, machine_neighbourhood, machine_of_family
+  use machine_family, only: machine_neighbourhood, machine_of_family
   use matrices, only: solve
-  use multipliers, only: multipliers_of
-  use motion_state, only: tally_t
+  use multipliers, only: multipliers_beside_graze, multipliers_of
   use structure, only: structure_t
   use structure_family, only: vary_section
-  use variations, only: by_difference, neighbourhood_t, vary
+  use variations, only: by_difference, neighbourhood_t, split_t, vary, vary_beside_graze
   implicit none
   private
 
-  public :: orbit_of_motion, correct_orbit, tangent_of, direct, same_sequence, is_admissible, scales_of_orbit, move_along, shoot, &
-    closing_time, crossing_direction, depends_on_parameter, set_multipliers
+  public :: correct_orbit, tangent_of, direct, scales_of_orbit, move_along, shoot, closing_time, crossing_direction, &
+    depends_on_parameter, set_multipliers
 
-  !> Orbits with more events are not followed.
-  integer, parameter, public :: most_events = 60
   integer, parameter :: most_newton = 12
   !> Newton's method has converged when a step, in natural sizes, is below this.
   real(wp), parameter :: converged_step = 1e-11_wp
@@ -33,8 +30,6 @@ module periodic_orbit
   integer, parameter :: newton_between = 4
   !> Orbits whose points on the section are within this in natural sizes are one.
   real(wp), parameter, public :: same_orbit = 1e-7_wp
-  !> A motion with the events of an orbit at other instants than this share of 1/frequency is not that orbit.
-  real(wp), parameter :: likeness = 1e-5_wp
 
   !> An orbit of `periods` drive periods at the value `parameter`.
   type, public :: orbit_t
@@ -50,25 +45,6 @@ module periodic_orbit
   end type orbit_t
 
 contains
-
-  !> The orbit near which a motion that starts at `y` on the section is for `periods` drive periods, not yet corrected.
-  subroutine orbit_of_motion(machines, parameter, y, periods, orbit, ok)
-    type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: parameter, y(:)
-    integer, intent(in) :: periods
-    type(orbit_t), intent(out) :: orbit
-    logical, intent(out) :: ok
-    type(tally_t) :: tally
-    integer :: i
-    real(wp) :: image(size(y))
-    orbit%periods = periods
-    orbit%parameter = parameter
-    orbit%y = y
-    orbit%multipliers = [(cmplx(0.0_wp, 0.0_wp, wp), i=1, size(y))]
-    allocate (orbit%matrix(size(y), size(y)), source=0.0_wp)
-    call fly_sections(machines%centre, y, periods, .true., image, orbit%events, orbit%mode, tally, ok)
-    if (ok) ok = size(orbit%events) <= most_events
-  end subroutine orbit_of_motion
 
   !> Natural sizes of the unknowns: state, instants, parameter.
   pure function scales_of_orbit(machines, orbit, parameter_size) result(scales)
@@ -310,7 +286,38 @@ contains
       if (allocated(determinant)) deallocate (determinant)
     end if
     orbit%multipliers = multipliers_of(orbit%matrix, determinant)
+    if (ok .and. any(orbit%multipliers /= orbit%multipliers)) call add_hidden(machines, orbit)
   end subroutine set_multipliers
+
+  !> Finite multipliers that rounding hides behind that of a graze: the event whose guard is met at the least rate apart from the
+  !> others.
+  pure subroutine add_hidden(machines, orbit)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(inout) :: orbit
+    type(split_t) :: split
+    complex(wp) :: values(size(orbit%y))
+    real(wp) :: speeds(size(orbit%events)), by_state(size(orbit%y)), value, by_time
+    integer :: k
+    logical :: ok
+    if (.not. machines%centre%has_clock .or. size(orbit%events) == 0) return
+    associate (machine => machines%centre, n => size(orbit%y))
+      do k = 1, size(orbit%events)
+        associate (event => orbit%events(k))
+          call machine%guard(event, event%time, event%arrival(:n), value, by_state, by_time)
+          speeds(k) = abs(sum(by_state*machine%slope(event%before, event%time, event%arrival(:n))) + by_time)/ &
+            max(norm2(by_state), tiny(1.0_wp))
+        end associate
+      end do
+      call vary_beside_graze(machines, orbit%mode, orbit%y, orbit%events, closing_time(machine, orbit), minloc(speeds, 1), &
+                             split, ok)
+      if (.not. ok) return
+      do k = 1, n
+        split%base(:, k) = split%base(:, k)*machine%size_of(k)/machine%size_of
+      end do
+      values = multipliers_beside_graze(split%base, split%column/machine%size_of, split%row*machine%size_of, split%rate)
+    end associate
+    if (all(values(2:) == values(2:))) orbit%multipliers(2:) = values(2:)
+  end subroutine add_hidden
 
   !> Direction in which the orbits go on, a unit vector in natural sizes, on the side of `along`.
   pure subroutine tangent_of(machines, orbit, parameter_size, along, tangent, ok)
@@ -378,26 +385,5 @@ contains
     along = 0
     along(size(along)) = way
   end function direct
-
-  !> Whether two orbits have the same events in the same order.
-  pure logical function same_sequence(one, other) result(same)
-    type(orbit_t), intent(in) :: one, other
-    same = one%periods == other%periods .and. size(one%events) == size(other%events)
-    if (same) same = all(one%events%kind == other%events%kind) .and. all(one%events%side == other%events%side) .and. &
-      all(one%events%joint == other%events%joint) .and. all(one%events%guard == other%events%guard)
-  end function same_sequence
-
-  !> Whether the motion that starts at the orbit's section point really has its events at its instants.
-  logical function is_admissible(machines, orbit)
-    type(neighbourhood_t), intent(in) :: machines
-    type(orbit_t), intent(in) :: orbit
-    type(orbit_t) :: motion
-    real(wp) :: allowed
-    call orbit_of_motion(machines, orbit%parameter, orbit%y, orbit%periods, motion, is_admissible)
-    if (is_admissible) is_admissible = same_sequence(motion, orbit)
-    if (.not. is_admissible) return
-    allowed = likeness*machines%centre%period*max(1.0_wp, abs(orbit%multipliers(1))*1e-3_wp)
-    is_admissible = all(abs(motion%events%time - orbit%events%time) <= allowed)
-  end function is_admissible
 
 end module periodic_orbit

@@ -9,7 +9,8 @@ module soft_graze
   use kinds, only: wp
   use motion_state, only: event_separation, event_touch_lower, event_touch_upper
   use orbit_margins, only: margin_t, margins_t, of_gap, of_impact
-  use periodic_orbit, only: correct_orbit, is_admissible, move_along, orbit_t, scales_of_orbit
+  use orbit_motion, only: is_admissible
+  use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit
   implicit none
   private
 

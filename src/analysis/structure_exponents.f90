@@ -15,7 +15,8 @@ module structure_exponents
     event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
   use structure, only: coordinates_of, mode_number, state_in, structure_t
-  use structure_family, only: advance_section, least_dimension, start_of_structure, state_at_start, vary_section
+  use structure_family, only: least_dimension, state_at_start, vary_section
+  use structure_walk, only: advance_section, start_of_structure
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -78,80 +79,123 @@ contains
     integer, intent(in) :: transient, sections
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
-    real(wp) :: frame(structure%n, structure%n), by_start(structure%n, structure%n), batch(batches, structure%n)
-    real(wp) :: point(structure%n), growth(structure%n), duration, lasted
+    real(wp) :: frame(structure%n, structure%n), batch(batches, structure%n), growth(structure%n), duration, lasted
     type(event_t), allocatable :: events(:)
-    type(tally_t) :: tally
-    integer :: i, k, n, part, mode, count_events, left
-    logical :: smooth
-    n = structure%n
+    integer :: i, k, part, mode, left
     series = 0
     batch = 0
     duration = 0
-    left = n
+    left = structure%n
     frame = 0
-    do k = 1, n
+    do k = 1, structure%n
       frame(k, k) = 1
     end do
     spectrum%has_sum = has_exact_sum(structure)
-    allocate (spectrum%exponents(n), spectrum%errors(n), source=0.0_wp)
-    allocate (events(8))
+    allocate (spectrum%exponents(structure%n), spectrum%errors(structure%n), source=0.0_wp)
     ! To the first section.
-    lasted = 0
-    count_events = 0
-    smooth = .true.
-    call advance_section(structure, state, lasted, events, count_events, tally, spectrum%known, smooth)
+    call advance_alone(structure, state, events, lasted, spectrum%known)
     if (.not. spectrum%known) return
     do i = 1 - transient, sections
-      point = coordinates_of(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
-      count_events = 0
-      lasted = 0
-      smooth = .true.
-      ! Budgets are those of a section, as for one body.
-      tally = tally_t()
-      call advance_section(structure, state, lasted, events, count_events, tally, spectrum%known, smooth)
-      spectrum%known = spectrum%known .and. smooth
-      if (spectrum%known) call vary_section(machines, structure, mode, point, events(:count_events), 1, &
-                                            coordinates_of(structure, state), by_start, spectrum%known)
+      call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%known)
       if (.not. spectrum%known) return
-      do k = 1, n
-        by_start(:, k) = by_start(:, k)*structure%size_of(k)/structure%size_of
-      end do
-      frame = matmul(by_start, frame)
-      call orthogonalise(frame, growth)
       if (i < 1) cycle
-      left = min(left, least_dimension(structure, mode, events(:count_events)))
+      left = min(left, least_dimension(structure, mode, events))
       duration = duration + lasted
       part = 1 + int((int(i - 1, int64)*batches)/sections)
       where (growth > 0) batch(part, :) = batch(part, :) + log_of(growth)
-      call note_events(structure, events(:count_events), spectrum)
-      if (i > size(series)) cycle
-      ! What may be anywhere is watched by what does not run away.
-      series(i) = state%q(structure%frame%moving%machine%watched)
-      point = coordinates_of(structure, state)
-      if (structure%places < structure%frame%moving%machine%n) series(i) = point(1)
+      call note_events(structure, events, spectrum)
+      if (i <= size(series)) series(i) = place_of(structure, state)
     end do
     ! Of a fixed point only the rounding moves.
     if (maxval(series) - minval(series) <= fixed*structure%size_of(1)) series = series(1)
     spectrum%returns = period_of_section(series, same) > 0
-    batch = batch*batches/duration
-    do k = 1, n
+    spectrum%periods = sections
+    spectrum%mean_period = duration/sections
+    call conclude(structure, batch*batches/duration, duration, left, spectrum)
+  end subroutine exponents_of_structure
+
+  !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `ok` is false if it had to be given up;
+  !> `smooth` where a transition is not known to be smooth.
+  subroutine advance_alone(structure, state, events, lasted, ok, smooth)
+    type(structure_t), intent(in) :: structure
+    type(jointed_state_t), intent(inout) :: state
+    type(event_t), allocatable, intent(inout) :: events(:)
+    real(wp), intent(out) :: lasted
+    logical, intent(out) :: ok
+    logical, intent(out), optional :: smooth
+    type(tally_t) :: tally
+    integer :: count_events
+    logical :: certain
+    if (.not. allocated(events)) allocate (events(8))
+    count_events = 0
+    lasted = 0
+    certain = .true.
+    ! Budgets are those of a section, as for one body.
+    call advance_section(structure, state, lasted, events, count_events, tally, ok, certain)
+    events = events(:count_events)
+    if (present(smooth)) smooth = certain
+  end subroutine advance_alone
+
+  !> The same with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `ok` is false also where
+  !> the derivatives are not known.
+  subroutine advance_with_frame(machines, structure, state, frame, growth, events, lasted, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    type(structure_t), intent(in) :: structure
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(inout) :: frame(:, :)
+    real(wp), intent(out) :: growth(:), lasted
+    type(event_t), allocatable, intent(inout) :: events(:)
+    logical, intent(out) :: ok
+    real(wp) :: point(structure%n), by_start(structure%n, structure%n)
+    integer :: k, mode
+    logical :: smooth
+    point = coordinates_of(structure, state)
+    mode = mode_number(structure%frame%moving%machine, state%phase)
+    call advance_alone(structure, state, events, lasted, ok, smooth)
+    ok = ok .and. smooth
+    if (ok) call vary_section(machines, structure, mode, point, events, 1, coordinates_of(structure, state), by_start, ok)
+    if (.not. ok) return
+    do k = 1, structure%n
+      by_start(:, k) = by_start(:, k)*structure%size_of(k)/structure%size_of
+    end do
+    frame = matmul(by_start, frame)
+    call orthogonalise(frame, growth)
+  end subroutine advance_with_frame
+
+  !> The watched position; what may be anywhere is watched by what does not run away.
+  pure real(wp) function place_of(structure, state) result(place)
+    type(structure_t), intent(in) :: structure
+    type(jointed_state_t), intent(in) :: state
+    real(wp) :: point(structure%n)
+    place = state%q(structure%frame%moving%machine%watched)
+    if (structure%places == structure%frame%moving%machine%n) return
+    point = coordinates_of(structure, state)
+    place = point(1)
+  end function place_of
+
+  !> Means and standard errors of the batches (one column per exponent) of a motion of so long a duration [s] that leaves as many
+  !> directions as are `left`.
+  subroutine conclude(structure, batch, duration, left, spectrum)
+    type(structure_t), intent(in) :: structure
+    real(wp), intent(in) :: batch(:, :), duration
+    integer, intent(in) :: left
+    type(spectrum_t), intent(inout) :: spectrum
+    integer :: k
+    do k = 1, structure%n
       spectrum%exponents(k) = sum(batch(:, k))/batches
       spectrum%errors(k) = error_of(batch(:, k))
       if (k > left) spectrum%exponents(k) = -huge(1.0_wp)
     end do
     if (.not. structure%has_clock) then
-      spectrum%exponents = spectrum%exponents(:n - 1)
-      spectrum%errors = spectrum%errors(:n - 1)
+      spectrum%exponents = spectrum%exponents(:structure%n - 1)
+      spectrum%errors = spectrum%errors(:structure%n - 1)
     end if
     spectrum%halves = 2*[sum(batch(:batches/2, 1)), sum(batch(batches/2 + 1:, 1))]/batches
     spectrum%sum_found = sum(batch)/batches
     spectrum%sum_exact = spectrum%sum_exact/duration - damping_rate(structure)
-    spectrum%has_sum = spectrum%has_sum .and. left == n
-    spectrum%periods = sections
-    spectrum%mean_period = duration/sections
-  end subroutine exponents_of_structure
+    spectrum%has_sum = spectrum%has_sum .and. left == structure%n
+  end subroutine conclude
 
   !> Orthonormal columns that span what the first columns of `frame` do, and how long they were.
   pure subroutine orthogonalise(frame, growth)

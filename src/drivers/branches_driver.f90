@@ -4,6 +4,7 @@
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
+  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
@@ -81,14 +82,16 @@ contains
       if (command%contacts) call look_for_contacts(session, search, contacts)
       if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, contacts, trim(bounds%unit))
+      call report_equilibria(session, search, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
-    if (size(search%branches) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
+    if (size(search%branches) + count_equilibria(search) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
       'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
       to_text(search%plan%highest)//'; nothing is written')
     call session%stop_if(error)
     call describe_file(session, 'branches', schema)
     if (session%team%is_root()) call describe_branches(search, trim(bounds%unit), schema)
+    if (session%team%is_root()) call describe_equilibria(search, trim(bounds%unit), schema)
     if (session%team%is_root()) call describe_curves(curves, search%family%path, trim(bounds%unit), schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)
@@ -210,8 +213,9 @@ contains
     if (search%seeds > 0 .and. .not. search%depends) call session%journal%line('no_effect', search%family%path// &
       ' has no effect on any orbit that was found: each is the same at every value')
     families = sum(search%found%equilibria)
-    if (families > 0) call session%journal%line('equilibria', 'equilibria were met '//to_text(families)// &
-                                                ' times; they are not followed')
+    if (families > 0 .and. count_equilibria(search) == 0) then
+      call session%journal%line('equilibria', 'equilibria were met '//to_text(families)//' times; they are not followed')
+    end if
     families = sum(search%found%families)
     if (maxval(search%found%families) > 1) then
       call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
@@ -307,7 +311,10 @@ contains
     integer, allocatable :: number(:)
     character(len=name_length) :: along(1)
     real(wp), allocatable :: watched(:, :)
-    integer :: b, i, k, shown
+    integer :: b, i, shown
+    call schema%add_attribute('', 'parameter', search%family%path)
+    call schema%add_attribute('', 'seeds', search%seeds)
+    if (size(search%branches) == 0) return
     allocate (points(0), number(0))
     do b = 1, size(search%branches)
       points = [points, search%branches(b)%points]
@@ -316,8 +323,6 @@ contains
     watched = reshape([(matmul(search%watch, points(i)%orbit%y), i=1, size(points))], [2, size(points)])
     shown = count_multipliers(points(1)%orbit, search%has_clock)
     along = 'point'
-    call schema%add_attribute('', 'parameter', search%family%path)
-    call schema%add_attribute('', 'seeds', search%seeds)
     call schema%add_dimension('point', size(points, kind=int64))
     call schema%add_dimension('multiplier', int(shown, int64))
     call schema%add_variable('branch', type_int32, along, units='1', long_name='number of the branch', data=real(number, wp))
@@ -345,12 +350,7 @@ contains
     call schema%add_variable('label', type_int8, along, units='1', long_name='what the point is', &
                              flag_values=[(i, i=0, last_label)], flag_meanings=join(label_names, ' '), &
                              data=real(points%label, wp))
-    call schema%add_variable('multiplier_real', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, shown), &
-                                                                 i=1, size(points))])
-    call schema%add_variable('multiplier_imag', type_float64, [along, [character(len=name_length) :: 'multiplier']], units='1', &
-      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, shown), &
-                                                                      i=1, size(points))])
+    call describe_multipliers(points, shown, schema)
 
   contains
 
@@ -361,6 +361,21 @@ contains
     end subroutine add
 
   end subroutine describe_branches
+
+  !> The first so many multipliers of the points.
+  subroutine describe_multipliers(points, shown, schema)
+    type(point_t), intent(in) :: points(:)
+    integer, intent(in) :: shown
+    type(schema_t), intent(inout) :: schema
+    character(len=name_length), parameter :: over(2) = [character(len=name_length) :: 'point', 'multiplier']
+    integer :: i, k
+    call schema%add_variable('multiplier_real', type_float64, over, units='1', &
+      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, shown), &
+                                                                 i=1, size(points))])
+    call schema%add_variable('multiplier_imag', type_float64, over, units='1', &
+      long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, shown), &
+                                                                      i=1, size(points))])
+  end subroutine describe_multipliers
 
   !> Where the section points of orbits are.
   pure function section_text(has_clock) result(text)

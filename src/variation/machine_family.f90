@@ -22,8 +22,8 @@ module machine_family
   use pair_flight, only: body_state
   use structure, only: coordinates_of, structure_t
   use strobe, only: start_strobe, strobe_t
-  use structure_family, only: advance_section, advance_to_section, fly_structure, map_of_structure, start_of_structure, &
-    state_at_start, structure_neighbourhood, structure_of_family
+  use structure_family, only: map_of_structure, state_at_start, structure_neighbourhood, structure_of_family
+  use structure_walk, only: advance_section, advance_to_section, fly_structure, start_of_structure
   use variations, only: neighbourhood_t
   implicit none
   private

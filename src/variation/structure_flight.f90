@@ -16,7 +16,7 @@ module structure_flight
   implicit none
   private
 
-  public :: fly_mode, flow_of, put_state, rates, accelerations, force_slopes, surface_jerk
+  public :: fly_mode, flow_of, put_state, rates, rate_slopes, accelerations, force_slopes, surface_jerk
 
   integer, parameter :: most_steps = 100000
   !> Displacements below this share of the natural size are integrated to an absolute error.

@@ -12,7 +12,7 @@ module variations
   implicit none
   private
 
-  public :: vary, by_difference, period_slope, stencil_offset
+  public :: vary, vary_beside_graze, by_difference, period_slope, stencil_offset
 
   !> Where the machines next to one are, in steps of the parameter, and what their results weigh in the derivative, times the
   !> step: central, or one-sided where the parameter can go no further. Of fourth order.
@@ -29,6 +29,12 @@ module variations
     real(wp) :: step = 1
     integer :: side = 0
   end type neighbourhood_t
+
+  !> Derivative of a map one of whose events is met all but tangentially, at the `rate` of its guard: base - column row/rate.
+  type, public :: split_t
+    real(wp), allocatable :: base(:, :), column(:), row(:)
+    real(wp) :: rate = 0
+  end type split_t
 
 contains
 
@@ -92,6 +98,55 @@ contains
     if (present(by_parameter)) by_parameter = change(:, n + 1)
     ok = all(abs(change) <= huge(1.0_wp))
   end subroutine vary
+
+  !> What `vary` does, by the start, with the event number `graze` apart: its large part is known to more digits than the sum.
+  pure subroutine vary_beside_graze(machines, mode, y, events, t_end, graze, split, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: mode, graze
+    real(wp), intent(in) :: y(:), t_end
+    type(event_t), intent(in) :: events(:)
+    type(split_t), intent(out) :: split
+    logical, intent(out) :: ok
+    ! The last column is carried along as any other.
+    real(wp), dimension(size(y), size(y) + 1) :: change
+    real(wp), dimension(size(y), size(y)) :: r_y
+    real(wp), dimension(size(y)) :: state, reached, g_y, r_t, before, after, jumped
+    real(wp) :: time, value, g_t
+    logical :: forgets
+    integer :: i, n, now
+    n = size(y)
+    state = y
+    time = 0
+    now = mode
+    change = 0
+    ok = .true.
+    call machines%centre%fly(now, time, state, time, reached, change(:, :n))
+    do i = 1, size(events)
+      call cross_flight(machines, now, state, time, events(i)%time, change, reached, .false.)
+      associate (event => events(i))
+        if (i == graze) then
+          before = machines%centre%slope(event%before, event%time, event%arrival(:n))
+          after = machines%centre%slope(event%after, event%time, event%departure(:n))
+          call machines%centre%guard(event, event%time, event%arrival(:n), value, g_y, g_t)
+          call machines%centre%jump(event, event%time, event%arrival(:n), jumped, r_y, r_t)
+          split%row = matmul(g_y, change(:, :n))
+          split%rate = sum(g_y*before) + g_t
+          change(:, :n) = matmul(r_y, change(:, :n))
+          change(:, n + 1) = matmul(r_y, before) + r_t - after
+        else
+          call salt(machines, event, change, .false., forgets, ok)
+        end if
+        if (.not. ok) return
+        state = event%departure(:n)
+        time = event%time
+        now = event%after
+      end associate
+    end do
+    call cross_flight(machines, now, state, time, t_end, change, reached, .false.)
+    split%base = change(:, :n)
+    split%column = change(:, n + 1)
+    ok = all(abs(change) <= huge(1.0_wp)) .and. allocated(split%row)
+  end subroutine vary_beside_graze
 
   !> Takes the variations along a flight.
   pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter, determinant)

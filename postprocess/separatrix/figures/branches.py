@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Branches of periodic orbits over a parameter: stable full, unstable broken, with their bifurcations."""
+"""Branches of orbits and equilibria over a parameter: stable full, unstable broken, with bifurcations."""
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,8 @@ _MARKS = {
     "chatter_onset": ("X", "chatter onset"),
     "stiction_end": ("h", "stiction end"),
     "release": ("<", "release"),
+    "HB": ("H", "Hopf point (HB)"),
+    "BE": (">", "equilibrium at a stop (BE)"),
     "homoclinic_contact": ("d", "homoclinic contact"),
     "boundary_crisis": ("p", "boundary crisis"),
     "not_known": ("x", "end not known"),
@@ -87,7 +89,10 @@ def height(result: xr.Dataset) -> tuple[np.ndarray, str]:
     """Return what is drawn over the parameter, and its name.
 
     The amplitude; between two stops, where that of all that touches both is the play, a point on the section.
+    Of a file of equilibria alone their position.
     """
+    if "x_max" not in result:
+        return np.empty(0), f"position at rest ({unit(result['equilibrium_x'])})"
     amplitude = (result["x_max"].values - result["x_min"].values) / 2
     lengths = unit(result["x_max"])
     both = np.zeros(amplitude.shape, bool)
@@ -119,14 +124,18 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
     ax = figure.add_subplot()
     handles = draw(ax, result)
-    across = result["parameter"].copy()
+    across = result["parameter" if "parameter" in result else "equilibrium_parameter"].copy()
     across.name = str(result.attrs["parameter"]).replace(".", "_")
     ax.set_xlabel(axis_label(across))
     ax.set_ylabel(height(result)[1])
-    count = int(result["branch"].max())
+    counts = []
+    if "branch" in result:
+        counts.append(f"{int(result['branch'].max())} branches from {int(result.attrs['seeds'])} seeds")
+    if "equilibrium_branch" in result:
+        counts.append(f"{int(result['equilibrium_branch'].max())} of equilibria")
     caption = [
         *caption_pieces(result, look, describe_case(result)),
-        f"{count} branches from {int(result.attrs['seeds'])} seeds; there may be others",
+        f"{', '.join(counts)}; there may be others",
         plain(version_text(result)),
     ]
     compose(figure, title, shown(caption, look), handles, columns=4)
@@ -134,12 +143,43 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
 
 
 def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
-    """Draw the branches and their labelled points; return what the legend needs."""
-    across = result["parameter"].values
-    up = height(result)[0]
-    stable, branch = result["stable"].values == 1, result["branch"].values
-    labels = decode_flags(result["label"]).values
-    for look in ("-", "--"):
+    """Draw the branches of orbits and equilibria and their labelled points; return what the legend needs."""
+    up, name = height(result)
+    labels = []
+    if "branch" in result:
+        labels.append(_draw_lines(ax, result, "", up, ("black", "0.45")))
+    if "equilibrium_branch" in result:
+        # An equilibrium has no amplitude.
+        rest = result["equilibrium_x"].values * (0 if name.startswith("amplitude") else 1)
+        labels.append(_draw_lines(ax, result, "equilibrium_", rest, ("C0", "C0")))
+    ax.autoscale_view()
+    handles = []
+    if "branch" in result:
+        handles += [
+            Line2D([], [], color="black", linestyle="-", label="stable"),
+            Line2D([], [], color="0.45", linestyle="--", label="unstable"),
+        ]
+    if "equilibrium_branch" in result:
+        handles += [Line2D([], [], color="C0", linestyle="-", label="equilibrium (broken: unstable)")]
+    for number, (name, (marker, text)) in enumerate(_MARKS.items()):
+        places = [points[chosen == name] for points, chosen in labels if (chosen == name).any()]
+        if not places:
+            continue
+        colour = f"C{number % 10}"
+        ax.plot(*np.concatenate(places).T, marker, color=colour, markersize=4, linestyle="none")
+        handles.append(
+            Line2D([], [], marker=marker, color=colour, linestyle="none", markersize=4, label=text)
+        )
+    return handles
+
+
+def _draw_lines(
+    ax: Axes, result: xr.Dataset, prefix: str, up: np.ndarray, colours: tuple[str, str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw the lines of orbits or equilibria; return all points, and the label of each."""
+    across = result[f"{prefix}parameter"].values
+    stable, branch = result[f"{prefix}stable"].values == 1, result[f"{prefix}branch"].values
+    for look, colour in zip(("-", "--"), colours, strict=True):
         # A piece between two points is stable where both are.
         joined = (branch[1:] == branch[:-1]) & (
             stable[1:] & stable[:-1] if look == "-" else ~(stable[1:] & stable[:-1])
@@ -148,25 +188,6 @@ def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
         ends = np.flatnonzero(np.diff(np.concatenate([[0], joined.astype(int), [0]]))).reshape(-1, 2)
         lines = [np.column_stack([across[first : last + 1], up[first : last + 1]]) for first, last in ends]
         ax.add_collection(
-            LineCollection(
-                lines,
-                colors="black" if look == "-" else "0.45",
-                linestyles=look,
-                linewidths=1.2 if look == "-" else 0.9,
-            )
+            LineCollection(lines, colors=colour, linestyles=look, linewidths=1.2 if look == "-" else 0.9)
         )
-    ax.autoscale_view()
-    handles = [
-        Line2D([], [], color="black", linestyle="-", label="stable"),
-        Line2D([], [], color="0.45", linestyle="--", label="unstable"),
-    ]
-    for number, (name, (marker, text)) in enumerate(_MARKS.items()):
-        chosen = labels == name
-        if not chosen.any():
-            continue
-        colour = f"C{number % 10}"
-        ax.plot(across[chosen], up[chosen], marker, color=colour, markersize=4, linestyle="none")
-        handles.append(
-            Line2D([], [], marker=marker, color=colour, linestyle="none", markersize=4, label=text)
-        )
-    return handles
+    return np.column_stack([across, up]), decode_flags(result[f"{prefix}label"]).values

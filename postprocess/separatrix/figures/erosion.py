@@ -132,6 +132,8 @@ def _branches(axes: np.ndarray, branches: xr.Dataset, dim: str) -> list[Line2D]:
         raise SeparatrixError(f"branches: found them over {over}, allowed over {dim}", USAGE)
     handles = branch_diagram.draw(axes[0], branches)
     axes[0].set_ylabel(branch_diagram.height(branches)[1])
+    if "label" not in branches:
+        return handles
     labels = decode_flags(branches["label"]).values
     for name, line in _ENDS.items():
         for value in branches["parameter"].values[labels == name]:

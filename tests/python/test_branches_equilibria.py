@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Equilibria of a machine without a clock in what `branches` says, in its file and its figure."""
+
+import json
+from pathlib import Path
+
+import pytest
+from program import succeed
+from separatrix.errors import SeparatrixError
+from separatrix.figures.branches import figures
+from separatrix.open import decode_flags, open_result
+
+BODY = """
+[body.block]
+mass = 1
+load = 0.1
+[spring.spring]
+between = ["block"]
+stiffness = 2
+damping = 0.4
+[contact.wall]
+between = ["block"]
+law = "newton"
+restitution = 0.5
+upper = 1
+[run]
+duration = 300
+"""
+
+
+def test_a_body_comes_to_lie_against_its_stop(separatrix: Path, tmp_path: Path) -> None:
+    """F = k x until the stop is reached, where nothing is free to move; no orbit but these."""
+    (tmp_path / "case.toml").write_text(BODY)
+    words = ("--parameter", "body.block.load", "--from", "0", "--to", "3", "--searches", "1", "-o", "out.h5")
+    said = succeed(separatrix, "branches", "case.toml", *words, "--json", folder=tmp_path).out
+    lines = [json.loads(line) for line in said.splitlines()]
+    points = [line for line in lines if line["event"] == "equilibrium"]
+    stops = [point for point in points if point["label"] == "BE"]
+    assert [point["parameter"] for point in stops] == pytest.approx([2, 2], abs=1e-11)
+    assert sorted(len(point["eigenvalues"]) for point in stops) == [0, 4]
+    pressed = {line["pressed"]: line["ends"] for line in lines if line["event"] == "equilibria_branch"}
+    assert pressed == {0: ["end_of_range", "BE"], 1: ["BE", "end_of_range"]}
+    with open_result(tmp_path / "out.h5") as result:
+        assert "branch" not in result
+        free = result["equilibrium_pressed"].values == 0
+        load, place = result["equilibrium_parameter"].values, result["equilibrium_x"].values
+        assert place[free] == pytest.approx(load[free] / 2, abs=1e-12)
+        assert place[~free] == pytest.approx(1, abs=1e-12)
+        assert result["eigenvalue_real"].values[free] == pytest.approx(-0.2, abs=1e-12)
+        assert result["eigenvalue_imag"].values[free, 0] == pytest.approx((2 - 0.04) ** 0.5, abs=1e-12)
+        assert (decode_flags(result["equilibrium_stable"]).values == "stable").all()
+        drawn = figures(result, "")["branches"].axes[0]
+        assert drawn.get_ylabel().startswith("position at rest")
+        assert sum(len(lines.get_segments()) for lines in drawn.collections) == 2
+        with pytest.raises(SeparatrixError, match="no periodic orbits"):
+            _ = result.separatrix.labelled_points
