@@ -9,7 +9,7 @@
 #ifndef SEPARATRIX_STRUCTURE_SEARCH_HPP
 #define SEPARATRIX_STRUCTURE_SEARCH_HPP
 
-#include "structure_motion.hpp"
+#include "structure_misses.hpp"
 
 namespace {
 
@@ -203,6 +203,22 @@ inline void put_bases(int terms, int waves, mask where, const structure_bases &f
   }
 }
 
+// Panels that reach the next stop end there, and the flight with them, where gaps are noted: those after it
+// are none of it. Returns their lanes.
+template <class size>
+inline mask cut_at_stop(const structure_machine &m, const size &z, mask walking, const structure_group &g,
+                        structure_bases &next) {
+  vec stop = g.c.until - g.s.start;
+  mask cut = walking & (next.elapsed >= stop);
+  if (!any(cut))
+    return cut;
+  structure_bases b;
+  bases_at(m, z, g, stop, b);
+  put_bases(z.terms, z.waves, cut, b, next);
+  put(next.elapsed, cut, stop);
+  return cut;
+}
+
 // Walks on panel by panel until the proof fails. Flights that last too long end without an event.
 template <class size>
 inline void walk(const structure_machine &m, const size &z, mask walking, mask &sought, structure_walk &p,
@@ -218,16 +234,22 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
       next.cosine[n] = p.b.cosine[n] * g.step.cosine[n] - p.b.sine[n] * g.step.sine[n];
       next.sine[n] = p.b.cosine[n] * g.step.sine[n] + p.b.sine[n] * g.step.cosine[n];
     }
+    mask cut = {};
+    if (z.misses)
+      cut = cut_at_stop(m, z, walking, g, next);
     outlook there;
     functions_at(m, z, g, next, there);
     LANE_COUNT(panels, count(walking));
     put_bases(z.terms, z.waves, walking, next, p.b);
     put_outlook(functions_of(z, g), walking, there, p.far);
-    put(p.end, walking, p.t + g.panel);
-    walking = proven_within(m, z, g, walking, p.here, p.far, g.panel);
-    mask over = walking & (p.panels >= double(most_panels));
+    put(p.end, walking, next.elapsed);
+    walking = proven_within(m, z, g, walking, p.here, p.far, z.misses ? next.elapsed - p.t : g.panel);
+    if (z.misses)
+      note_misses(m, z, walking, p.t, p.end, p.here, p.far, g);
+    mask over = walking & (cut | (p.panels >= double(most_panels)));
     if (any(over)) {
       keep_end(z, over, p, {0, 0}, g);
+      put(g.s.found, over & cut, 2);
       sought = sought & ~over;
       walking = walking & ~over;
     }
@@ -361,6 +383,8 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     if (any(blind))
       halve(m, z, blind, p, g);
     mask within = proven_within(m, z, g, sought, p.here, p.far, p.end - p.t) & ~failed;
+    if (z.misses)
+      note_misses(m, z, within, p.t, p.end, p.here, p.far, g);
     mask found = within & p.at_zero;
     keep_end(z, found, p, p.target, g);
     walking = within & ~p.at_zero;
