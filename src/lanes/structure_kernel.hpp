@@ -37,6 +37,7 @@ void fly_group(const structure_machine &m, const size &z, int first, lane_batch 
   if (!any(sent))
     return;
   load(batch, first, g.s);
+  note_modes(m, z, ~mask{}, g);
   enter_modes(m, z, sent & ~fresh, g);
   structure_bases b;
   mask left = sent & ~fresh & (g.s.found < 0.5);

@@ -32,23 +32,24 @@ inline void still_of(const structure_machine &m, const size &z, const structure_
 
 // 1 where lanes move at all, else 0.
 template <class size>
-inline vec moves_of(const structure_machine &m, const size &z, const structure_fields<vec> &s) {
+inline vec moves_of(const structure_machine &m, const size &z, const structure_group &g) {
   vec moves = 1;
   if (!z.idle)
     return moves;
-  for (int key = 0; key < modes_of(m); key++)
+  for (int key = 0; key < g.modes; key++)
     if (m.mode[key].idle > 0.5)
-      put(moves, in_mode(m, z, key, ~mask{}, s), vec{});
+      put(moves, g.in_mode[key], vec{});
   return moves;
 }
 
 // The lanes of `among`, whose bases are `b`: coordinates and speeds.
 template <class size>
-inline void place_at(const structure_machine &m, const size &z, mask among, const structure_fields<vec> &s,
+inline void place_at(const structure_machine &m, const size &z, mask among, const structure_group &g,
                      const vec (&re)[most_terms], const vec (&im)[most_terms], const structure_bases &b,
                      vec (&q)[most_coordinates], vec (&v)[most_coordinates]) {
-  for (int key = 0; key < modes_of(m); key++) {
-    mask in = in_mode(m, z, key, among, s);
+  const structure_fields<vec> &s = g.s;
+  for (int key = 0; key < g.modes; key++) {
+    mask in = g.in_mode[key] & among;
     if (!any(in))
       continue;
     const structure_mode &t = m.mode[key];
@@ -135,8 +136,8 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
   for (int j = z.joints; j < z.joints + z.pushes; j++)
     waits = waits | (magnitude(g.s.phase[joint_of(m, z.joints, j)]) == 2.0);
   g.waits = any(waits);
-  for (int key = 0; key < modes_of(m); key++) {
-    mask in = in_mode(m, z, key, changed, g.s);
+  for (int key = 0; key < g.modes; key++) {
+    mask in = g.in_mode[key] & changed;
     if (!any(in))
       continue;
     const structure_mode &t = m.mode[key];
@@ -198,6 +199,15 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
         put(g.step.sine[n], fits, t.step_sine[l][n]);
       }
     }
+  }
+}
+
+inline void put_outlook(int functions, const outlook &from, outlook &o) {
+  for (int j = 0; j < functions; j++) {
+    o.f[j] = from.f[j];
+    o.f1[j] = from.f1[j];
+    o.f2[j] = from.f2[j];
+    o.f3[j] = from.f3[j];
   }
 }
 

@@ -94,6 +94,9 @@ struct structure_group {
   // Limits of the functions, bound on their sixth derivatives, mass that a joint feels.
   vec power[most_powers][most_functions], low[most_functions], high[most_functions], sixth[most_functions],
       felt_mass[most_joints];
+  // How many modes there are, and the lanes that are in them.
+  int modes;
+  mask in_mode[most_structure_modes];
   // Some lane waits until a contact without force is free: the last functions are looked at.
   bool waits;
   // The last step of the root search is shorter. Length of the panels [s], and what turns the exponentials
@@ -123,26 +126,25 @@ inline int joint_of(const structure_machine &m, int joints, int j) {
   return owner;
 }
 
-// The lanes of `among` that are in mode number `key`.
+// Notes which of the lanes `where` are in which mode, by their phases.
 template <class size>
-inline mask in_mode(const structure_machine &m, const size &z, int key, mask among,
-                    const structure_fields<vec> &s) {
-  int bit = 0;
-  for (int j = 0; j < z.joints; j++) {
-    if (!switches(m.joint[j]))
-      continue;
-    mask set = m.joint[j].slides > 0.5 ? s.phase[j] == 0.0 : magnitude(s.phase[j]) == 1.0;
-    among = among & (key >> bit & 1 ? set : ~set);
-    bit++;
-  }
-  return among;
-}
-
-inline int modes_of(const structure_machine &m) {
+inline void note_modes(const structure_machine &m, const size &z, mask where, structure_group &g) {
   int modes = 1;
-  for (int j = 0; j < int(m.joints); j++)
-    modes *= switches(m.joint[j]) ? 2 : 1;
-  return modes;
+  mask in[most_structure_modes] = {~mask{}};
+  for (int j = 0; j < z.joints; j++) {
+    const structure_joint &joint = m.joint[j];
+    if (!switches(joint))
+      continue;
+    mask set = joint.slides > 0.5 ? g.s.phase[j] == 0.0 : magnitude(g.s.phase[j]) == 1.0;
+    for (int key = 0; key < modes; key++) {
+      in[key + modes] = in[key] & set;
+      in[key] = in[key] & ~set;
+    }
+    modes *= 2;
+  }
+  g.modes = modes;
+  for (int key = 0; key < modes; key++)
+    g.in_mode[key] = (g.in_mode[key] & ~where) | (in[key] & where);
 }
 
 // At least |re + i im|, at most 8 % more.

@@ -121,20 +121,21 @@ template <class size>
 inline structure_target earliest_fallen(const structure_machine &m, const size &z, const structure_group &g,
                                         const outlook &here, const outlook &far) {
   structure_target target = {0, 0};
-  vec least = 2;
+  // The share is a ratio.
+  vec least_fall = 2, least_span = 1;
   for (int j = 0; j < functions_of(z, g); j++)
     for (int side = -1; side <= 1; side += 2) {
       if (!has_limit(m, z, g, ~mask{}, j, side))
         continue;
       vec w0 = side > 0 ? g.high[j] - here.f[j] : here.f[j] - g.low[j];
       vec w1 = side > 0 ? g.high[j] - far.f[j] : far.f[j] - g.low[j];
-      vec share = w0 / (w0 - w1);
-      mask first = (w1 < 0.0) & (share < least);
+      mask first = (w1 < 0.0) & (w0 * least_span < least_fall * (w0 - w1));
       if (j >= z.joints)
         first = first & (g.low[j] != -unlimited);
       put(target.joint, first, j + 1);
       put(target.side, first, side);
-      put(least, first, share);
+      put(least_fall, first, w0);
+      put(least_span, first, w0 - w1);
     }
   return target;
 }
@@ -359,10 +360,10 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     p.b.cosine[n] = g.first_cosine[n];
     p.b.sine[n] = g.first_sine[n];
   }
-  p.here = g.first;
+  put_outlook(functions_of(z, g), g.first, p.here);
+  put_outlook(functions_of(z, g), g.first, p.far);
   p.target = {magnitude(g.s.left), pick(g.s.left > 0.0, 1, -1)};
   make_zero(z, g, p.target, seek & (g.s.left != 0.0), p.here);
-  p.far = p.here;
   for (int j = 0; j < z.joints; j++)
     if (m.joint[j].even > 0.5)
       put(p.here.f1[j], g.s.rising == double(j + 1), vec{});
