@@ -140,8 +140,8 @@ that the work takes, which other work on the machine changes little; *wall*: on 
 
 {rows}
 
-A row above its bar is marked. The spectrum moves one body along one motion, event by event: its flights
-cannot be computed side by side as those of a map are.
+A row above its bar is marked. The spectrum is gathered from 16 motions on the same attractor, side by side in
+vectors; its transient is flown event by event.
 """
 
 

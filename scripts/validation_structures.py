@@ -364,10 +364,6 @@ NOT_YET = (
         "end of the chatter of a ball between floor and ceiling (Siconos)",
         "events tell where it was completed, not its end",
     ],
-    [
-        "stick-slip microactuator (COCO)",
-        "its force, that of a condenser, depends on place and time at once: no law of ours has that",
-    ],
 )
 
 COMPUTED = (

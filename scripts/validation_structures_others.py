@@ -314,4 +314,13 @@ def pair(program: Program) -> list[Number]:
     return found
 
 
-COMPUTED = (grazes, single_impacts, beads, stack, capsules, beam, bar, cage, pair)
+def microactuator(program: Program) -> list[Number]:
+    """The voltage at which the plate of a frame that sticks just reaches its stop."""
+    points = program.branch_points("microactuator", "spring.condenser.attraction", 0.165, 0.175)
+    graze = min((value for label, value, _, _ in points if label == "GR"), default=0.0)
+    source = "H. Dankowicz, F. Schilder, Recipes for Continuation (2013), 9.3 (COCO)"
+    what = "stick-slip microactuator, graze of the orbit whose frame sticks: V"
+    return [Number(source, what, 0.587516250415, sqrt(2 * graze), 1e-9)]
+
+
+COMPUTED = (grazes, single_impacts, beads, stack, capsules, beam, bar, cage, pair, microactuator)

@@ -33,10 +33,11 @@ NOTHING = "#DDDDDD"
 OTHER = "#777777"
 SCALAR_MAP = "cividis"
 
+# as in a catalogue, whose first attractor mostly meets no stop
 REGIMES = {
     "unresolved": NOTHING,
-    "non_impact": ATTRACTORS[1],
-    "impact": ATTRACTORS[0],
+    "non_impact": ATTRACTORS[0],
+    "impact": ATTRACTORS[1],
     "sticking": ATTRACTORS[5],
     "mixed": ATTRACTORS[2],
     "chattering": ATTRACTORS[6],

@@ -24,6 +24,7 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(SOURCE / "tests" / "generator"), str(SOURCE / "scripts")]
 
+import archive  # noqa: E402
 import records  # noqa: E402
 from design import Unreachable, draw  # noqa: E402
 
@@ -190,12 +191,17 @@ def main() -> int:
     parser.add_argument("--limit", type=float, default=300.0)
     parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--summary", action="store_true")
+    parser.add_argument("--archive", type=Path)
     options = parser.parse_args()
     numbers: Sequence[int] = range(options.cases)
     if options.subset:
         options.seed, numbers = CI_SEED, CI_CASES
     folders = Folders(options.out / f"seed_{options.seed}")
     folders.make()
+    is_first = int(os.environ.get("OMPI_COMM_WORLD_RANK", "0")) == 0
+    if options.archive and is_first and options.archive.is_file():
+        taken = archive.unpack(options.archive, folders)
+        print(f"discovery_campaign: {taken} results taken from {options.archive}")
     if not options.summary:
         if options.prepare:
             missing = [n for n in numbers if not (folders.seals / f"{n:04}.txt").is_file()]
@@ -205,7 +211,10 @@ def main() -> int:
         work(
             missing, lambda number: run_case(folders, options.seed, number, options.limit, not options.subset)
         )
-    if int(os.environ.get("OMPI_COMM_WORLD_RANK", "0")) == 0:
+    if is_first:
+        if options.archive:
+            kept = archive.pack(options.archive, folders, numbers)
+            print(f"discovery_campaign: {kept} results kept in {options.archive}")
         import report
 
         return report.write(folders, options.seed, numbers, options.output)

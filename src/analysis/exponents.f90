@@ -17,12 +17,13 @@ module exponents
   private
 
   public :: lyapunov_exponents, error_of, zero_one_test, type_of_motion, period_of_section
+  public :: conclude, fly_on, has_exact_sum, loses_direction, note_events
 
   integer, parameter, public :: batches = 32
   !> Frequencies of the 0-1 test.
   integer, parameter :: frequencies = 100
   !> Periods in which a direction turns to where it grows most.
-  integer, parameter :: aligning = 100
+  integer, parameter, public :: aligning = 100
 
   !> What a motion may be.
   integer, parameter, public :: motion_not_known = 0, motion_contracting = 1, motion_neutral = 2, motion_chaotic = 3, &
@@ -42,6 +43,8 @@ module exponents
     logical :: returns = .false.
     !> Largest exponent of the first and of the second half.
     real(wp) :: halves(2) = 0
+    !> What the turning of the directions may bring into exponents, where those are of many motions that turn alike [1/s].
+    real(wp) :: memory = 0
     integer(int64) :: impacts = 0
     !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event
     !> tangentially.
@@ -263,19 +266,22 @@ contains
   end function period_of_section
 
   !> What a motion is, by its largest exponent and the 0-1 test `k`, at three standard errors; not known where they do not agree.
+  !> A neutral one must be so within the errors alone.
   pure integer function type_of_motion(spectrum, k) result(motion)
     type(spectrum_t), intent(in) :: spectrum
     real(wp), intent(in) :: k
+    !> Of a logarithm over a section.
+    real(wp), parameter :: rounding = 10*epsilon(1.0_wp)
     motion = motion_not_known
     if (.not. spectrum%known) return
-    associate (largest => spectrum%exponents(1), error => spectrum%errors(1))
-      if (abs(spectrum%halves(1) - spectrum%halves(2)) > 6*sqrt(2.0_wp)*error + 1e-9_wp*abs(largest) .and. error > 0) then
+    associate (largest => spectrum%exponents(1), error => spectrum%errors(1), room => 3*spectrum%errors(1) + spectrum%memory)
+      if (abs(spectrum%halves(1) - spectrum%halves(2)) > 2*sqrt(2.0_wp)*room + 1e-9_wp*abs(largest) .and. error > 0) then
         motion = motion_transient
-      else if (largest > 3*error .and. k > 0.8_wp) then
+      else if (largest > room .and. k > 0.8_wp) then
         motion = motion_chaotic
-      else if (largest < -3*error .and. largest < 0 .and. k < 0.2_wp) then
+      else if (largest < -room .and. largest < 0 .and. k < 0.2_wp) then
         motion = motion_contracting
-      else if (abs(largest) <= 3*error .and. k < 0.2_wp) then
+      else if (abs(largest)*spectrum%mean_period <= 3*error*spectrum%mean_period + rounding .and. k < 0.2_wp) then
         ! One of a family of cycles is a cycle.
         motion = merge(motion_contracting, motion_neutral, spectrum%returns)
       end if

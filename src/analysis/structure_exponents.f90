@@ -5,6 +5,7 @@
 module structure_exponents
   use elementary, only: logarithm
   use exponents, only: batches, error_of, lyapunov_exponents, period_of_section, spectrum_t
+  use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
@@ -39,7 +40,11 @@ contains
     select type (machine => machines%centre)
     type is (one_body_t)
       state = start_state(machine%moving, start(1), start(2), start(3))
-      call lyapunov_exponents(machines, state, transient, sections, spectrum, series)
+      if (gathers_in_lanes(machine, sections)) then
+        call gather_exponents(machines, machine, state, transient, sections, spectrum, series)
+      else
+        call lyapunov_exponents(machines, state, transient, sections, spectrum, series)
+      end if
     type is (structure_t)
       jointed = state_at_start(machine, start)
       call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)

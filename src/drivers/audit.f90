@@ -22,6 +22,8 @@ module audit
     integer :: wider = 0
     !> Every point was run again.
     logical :: whole = .false.
+    !> Points whose impacts and states were compared with those in quadruple precision: settled ones.
+    integer :: compared = 0
     real(wp) :: x_deviation = 0, v_deviation = 0
     !> The positions are angles.
     logical :: is_angle = .false.
@@ -54,6 +56,7 @@ contains
     type(outcome_t), intent(in) :: outcome
     real(wp), intent(in) :: results(6)
     type(audit_t), intent(inout) :: audit
+    audit%compared = audit%compared + 1
     if (outcome%impacts /= nint(results(6), int64)) audit%impact_count_differs = audit%impact_count_differs + 1
     audit%x_deviation = max(audit%x_deviation, abs(outcome%x - results(4)))
     audit%v_deviation = max(audit%v_deviation, abs(outcome%v - results(5)))

@@ -281,8 +281,8 @@ contains
         ', "differing": '//to_text(audit%differing)//', "label_flips": '//to_text(audit%flips)// &
         ', "labels_changing": '//to_text(audit%changes)//', "max_changes_percent": '//to_text(command%max_changes)// &
         ', "label_flip_share_upper_95": '//to_text(share_upper_limit(audit%flips, audit%points, 0.95_wp))// &
-        ', "impact_counts_differ": '//to_text(audit%impact_count_differs)//', "x_deviation": '// &
-        to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//', "inferred": '// &
+        ', "compared": '//to_text(audit%compared)//', "impact_counts_differ": '//to_text(audit%impact_count_differs)// &
+        ', "x_deviation": '//to_text(audit%x_deviation)//', "v_deviation": '//to_text(audit%v_deviation)//', "inferred": '// &
         to_text(audit%inferred)//', "inferred_differing": '//to_text(audit%inferred_differing)//'}'
       return
     end if
@@ -293,6 +293,7 @@ contains
     deviations = ', '//to_text(audit%impact_count_differs)//' other impact counts, largest deviation after the duration '// &
                  to_text(audit%x_deviation, 3)//' '//unit_of('m', audit%is_angle)//', '//to_text(audit%v_deviation, 3)//' '// &
                  unit_of('m/s', audit%is_angle)
+    if (audit%compared == 0) deviations = '; none had settled: impact counts and states are not compared'
     ! Of a boundary the labels on its two sides are all that is asked.
     if (kind == 'boundary') deviations = ''
     if (audit%wider > 0) deviations = '; '//to_text(audit%wider)//' of the others lie further out than the file says, by no '// &

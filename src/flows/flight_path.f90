@@ -113,7 +113,7 @@ contains
           force = force - (k*(now - zero) + c*joint%offset%rate)*joint%row
           rate = rate - k*joint%offset%rate*joint%row
         else if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
-          call joint_force(joint, state%phase(j), 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, r)
+          call joint_force(joint, state%phase(j), 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, r)
           force = force + r*joint%row
         end if
       end associate

@@ -31,11 +31,12 @@ module marched_flight
     real(wp) :: frequency = 0, start = 0
     !> Accelerations, one column each; guards.
     real(wp), allocatable :: acceleration(:, :), guard(:, :)
-    !> Joints whose force is not linear: their coordinates and speeds, what their forces do to accelerations and guards.
+    !> Joints whose force is not linear: their coordinates and speeds, what their forces are multiplied by, what these do to
+    !> accelerations and guards.
     type(joint_t), allocatable :: joints(:)
     integer :: phase(most_joints) = 0
     real(wp) :: touch_speed(most_joints) = 0
-    real(wp), allocatable :: place(:, :), speed(:, :), push(:, :), lean(:, :)
+    real(wp), allocatable :: place(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
   contains
     procedure :: slope => marched_slope
     procedure :: margin => marched_margin
@@ -100,6 +101,7 @@ contains
     system%count_joints = count([(is_curved(machine%joints(j), state%phase(j)), j=1, size(machine%joints))])
     allocate (system%joints(system%count_joints), system%push(n, system%count_joints))
     allocate (system%place(size(path%unknowns), system%count_joints), system%speed(size(path%unknowns), system%count_joints))
+    allocate (system%strength(size(path%unknowns), system%count_joints), source=0.0_wp)
     k = 0
     do j = 1, size(machine%joints)
       if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
@@ -108,6 +110,7 @@ contains
       system%phase(k) = state%phase(j)
       system%touch_speed(k) = state%touch_speed(j)
       system%push(:, k) = held_push(machine, flow, machine%joints(j)%row)
+      call set_strength(machine%joints(j), one, system%strength(:, k))
       system%place(:, k) = flow%place_row(:, j)
       system%speed(:, k) = flow%speed_row(:, j)
       system%place(one + 1, k) = machine%joints(j)%offset%rate
@@ -120,6 +123,21 @@ contains
       system%place(one, k) = s - sum(flow%place_row(one + 2:, j)*path%unknowns(one + 2:))
     end do
   end subroutine set_system
+
+  !> What the force of a spring is multiplied by, as a row; the unknown number `one` is 1.
+  pure subroutine set_strength(joint, one, row)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: one
+    real(wp), intent(inout) :: row(:)
+    integer :: m
+    row(one) = 1
+    if (.not. allocated(joint%strength)) return
+    row(one) = joint%strength%mean
+    do m = 1, size(joint%strength%harmonic)
+      row(one + 2*m) = real(joint%strength%harmonic(m))
+      row(one + 2*m + 1) = -aimag(joint%strength%harmonic(m))
+    end do
+  end subroutine set_strength
 
   !> Stop of a contact [m].
   pure real(wp) function stop_of(joint, phase)
@@ -212,7 +230,9 @@ contains
     n = machine%n
     slope = system%slope(0.0_wp, y)
     length = 1e-3_wp*max(machine%length_scale, maxval(abs(y(n + 1:)))/machine%frequency, &
-                         maxval(abs(slope(n + 1:)))/machine%frequency**2, tiny(length))
+                         maxval(abs(slope(n + 1:)))/machine%frequency**2)
+    ! Where nothing moves any size will do.
+    if (.not. length > 1e9_wp*tiny(length)) length = 1
     scale(:n) = max(length, abs(state%q(:n)))
     scale(n + 1:) = length*machine%frequency
     length = huge(length)
@@ -265,7 +285,7 @@ contains
     integer :: k
     do k = 1, self%count_joints
       call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), sum(self%place(:, k)*z), &
-                       sum(self%speed(:, k)*z), force(k))
+                       sum(self%speed(:, k)*z), sum(self%strength(:, k)*z), force(k))
     end do
   end function forces_at
 

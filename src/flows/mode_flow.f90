@@ -30,7 +30,10 @@ contains
     integer :: j
     harmonics = size(machine%force, 2)
     do j = 1, size(machine%joints)
-      if (allocated(machine%joints(j)%offset%harmonic)) harmonics = max(harmonics, size(machine%joints(j)%offset%harmonic))
+      associate (joint => machine%joints(j))
+        if (allocated(joint%offset%harmonic)) harmonics = max(harmonics, size(joint%offset%harmonic))
+        if (allocated(joint%strength)) harmonics = max(harmonics, size(joint%strength%harmonic))
+      end associate
     end do
   end function harmonics_of
 

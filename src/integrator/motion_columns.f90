@@ -70,18 +70,19 @@ contains
     type(log_t), intent(in) :: log
     type(motion_column_t), allocatable :: columns(:)
     character(len=:), allocatable :: name, column
+    real(wp), allocatable :: samples(:, :)
     logical :: inner
     integer :: i
-    allocate (columns(2*machine%n))
+    allocate (columns(2*machine%n), samples(2*machine%n, log%samples))
+    if (log%samples > 0) samples = log%sample_coordinates(:, :log%samples)
     do i = 1, machine%n
       name = trim(machine%names(i))
       column = replace_all(name, '.', '_')
       inner = index(name, '.') > 0 .and. verify(name(index(name, '.') + 1:), '0123456789') == 0
       call set_column(columns(2*i - 1), column//'_x', trim(merge('1', 'm', inner)), &
-                      trim(merge('coordinate', 'position  ', inner))//' of '//name, log%sample_coordinates(i, :log%samples))
+                      trim(merge('coordinate', 'position  ', inner))//' of '//name, samples(i, :))
       call set_column(columns(2*i), column//'_v', trim(merge('1/s', 'm/s', inner)), &
-                      trim(merge('rate    ', 'velocity', inner))//' of '//name, &
-                      log%sample_coordinates(machine%n + i, :log%samples))
+                      trim(merge('rate    ', 'velocity', inner))//' of '//name, samples(machine%n + i, :))
     end do
   end function coordinate_columns
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // The kernel for processors with AVX-512.
-#include "lane_kernel.hpp"
+#include "lane_variation.hpp"
 
 SEPARATRIX_LANE_KERNEL(separatrix_fly_avx512)
+SEPARATRIX_LANE_VARIATION(separatrix_vary_avx512)

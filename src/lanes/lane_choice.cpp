@@ -12,6 +12,9 @@ extern "C" {
 void separatrix_fly_sse2(const lane_machine *, const lane_regions *, lane_batch *);
 void separatrix_fly_avx2(const lane_machine *, const lane_regions *, lane_batch *);
 void separatrix_fly_avx512(const lane_machine *, const lane_regions *, lane_batch *);
+void separatrix_vary_sse2(const lane_machine *, lane_batch *, lane_tangents *);
+void separatrix_vary_avx2(const lane_machine *, lane_batch *, lane_tangents *);
+void separatrix_vary_avx512(const lane_machine *, lane_batch *, lane_tangents *);
 
 // Doubles in the widest vector that the processor has: 2, 4 or 8.
 int separatrix_lane_width(void) {
@@ -41,5 +44,16 @@ void separatrix_fly_lanes(int width, const lane_machine *machine, const lane_reg
     separatrix_fly_avx2(machine, regions, batch);
   else
     separatrix_fly_sse2(machine, regions, batch);
+}
+
+void separatrix_vary_lanes(int width, const lane_machine *machine, lane_batch *batch,
+                           lane_tangents *tangents) {
+  const untrapped around;
+  if (width >= 8)
+    separatrix_vary_avx512(machine, batch, tangents);
+  else if (width >= 4)
+    separatrix_vary_avx2(machine, batch, tangents);
+  else
+    separatrix_vary_sse2(machine, batch, tangents);
 }
 }

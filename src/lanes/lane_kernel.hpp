@@ -300,10 +300,16 @@ LANE_DEVICE inline mask look_ahead(const machine &m, mask seek, mask upward, vec
   return left;
 }
 
+// Nothing rides along with the bodies; see `lane_variation.hpp` for what may.
+struct nothing_along {
+  LANE_LEAF void cross(const lane_machine &, mask, const lane_group &) {}
+};
+
 // Flies the lanes of one vector until one has stopped or is left to the scalar code. They pass the sections
 // together, so that those set off together, whose first flights take longer to find, stay together.
-template <bool damping>
-LANE_DEVICE void fly(const lane_machine &m, const lane_regions &regions, int first, lane_batch &batch) {
+template <bool damping, class rider>
+LANE_DEVICE void fly(const lane_machine &m, const lane_regions &regions, int first, lane_batch &batch,
+                     rider &along) {
   lane_group g;
   load<false>(batch, first, g);
   begin_flight<damping, false>(m, g);
@@ -318,8 +324,11 @@ LANE_DEVICE void fly(const lane_machine &m, const lane_regions &regions, int fir
         left = look_ahead<damping, false>(m, seek, upward, barrier, g);
       left = left | (flying & (g.flights >= g.budget));
       flying = flying & ~left & (g.start + g.span < g.until);
-      if (any(flying))
-        left = left | take_events<damping, false>(m, flying, upward, barrier, g);
+      if (any(flying)) {
+        mask rare = take_events<damping, false>(m, flying, upward, barrier, g);
+        along.cross(m, flying & ~rare, g);
+        left = left | rare;
+      }
       put(g.status, left, lane_left);
       flying = flying & ~left;
     }
@@ -433,8 +442,10 @@ LANE_DEVICE inline void fly_group(const lane_machine &m, const lane_regions &reg
     fly_through_modes(m, regions, first, batch);
   else if constexpr (kind == layered)
     fly_through_layers(m, regions, first, batch);
-  else
-    fly<kind == damped>(m, regions, first, batch);
+  else {
+    nothing_along along;
+    fly<kind == damped>(m, regions, first, batch, along);
+  }
 }
 
 template <flight kind>

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // The kernel for any processor of its kind.
-#include "lane_kernel.hpp"
+#include "lane_variation.hpp"
 
 SEPARATRIX_LANE_KERNEL(separatrix_fly_sse2)
+SEPARATRIX_LANE_VARIATION(separatrix_vary_sse2)

@@ -199,6 +199,17 @@ struct lane_batch {
   lane_fields<double[lanes]> fields;
 };
 
+// What rides along with the bodies of a batch: two directions of change of the free part Z, the second at
+// right angles to the first, and the product of a+/a- over the turning points. Their lengths grow and shrink
+// with the motion; whoever reads them begins them anew.
+template <class T> struct tangent_fields {
+  T first_re, first_im, second_re, second_im, turns;
+};
+
+struct lane_tangents {
+  tangent_fields<double[lanes]> fields;
+};
+
 // Bodies on a GPU, see `lane_gpu.hpp`: by CUDA, or on the host for tests. 0 = all went well, else `message`
 // says what has failed.
 struct lane_gpu {

@@ -14,14 +14,14 @@ module part_rows
   integer :: i
 
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
-  character(len=law_length), parameter :: springs(3) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
-    'spring:pendulum']
+  character(len=law_length), parameter :: springs(4) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
+    'spring:pendulum', 'spring:electrostatic']
   character(len=law_length), parameter :: frictions(6) = [character(len=law_length) :: 'friction:coulomb', &
     'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic', &
     'friction:coulomb_quadratic']
   character(len=law_length), parameter :: contacts(3) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt', &
     'contact:massless']
-  character(len=law_length), parameter :: joints(12) = [springs, frictions, contacts]
+  character(len=law_length), parameter :: joints(13) = [springs, frictions, contacts]
   !> Contacts with the laws of one body, which keep their parameters.
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
@@ -45,6 +45,8 @@ module part_rows
     law_row_t('part', springs(2), 'k s + k2 s^2 + k3 s^3 and damper c; k < 0, k3 > 0 is a double well', &
               'Duffing, Erzwungene Schwingungen (1918)'), &
     law_row_t('part', springs(3), 'moment sin s of an angle s', 'Huygens, Horologium Oscillatorium (1673)'), &
+    law_row_t('part', springs(4), 'attraction/(gap - s)^2 of two charged plates, s their way towards each other', &
+              'Nathanson et al., IEEE Trans. Electron Devices 14 (1967)'), &
     law_row_t('part', frictions(1), 'dry friction between two bodies, or of one on the ground or a belt', ''), &
     law_row_t('part', frictions(2), 'spring and slider in series (Jenkins)', 'Gastaldi, Berruti, Appl. Sci. (2018)'), &
     law_row_t('part', frictions(3), 'dry friction and b u, u being the sliding speed', ''), &
@@ -95,9 +97,9 @@ module part_rows
     (parameter_row_t('part', points(i), 'row', '1', any_value, 'its displacement for one of each coordinate', &
                      optional=.true., list=.true.), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first_end', '1', not_negative, 'number of the first body between', &
-                     optional=.true.), i=1, 12), &
+                     optional=.true.), i=1, 13), &
     (parameter_row_t('part', joints(i), 'second_end', '1', not_negative, 'number of the second body between', &
-                     optional=.true.), i=1, 12), &
+                     optional=.true.), i=1, 13), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', not_negative, &
                      'number of the first body between', optional=.true.), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', not_negative, &
@@ -109,9 +111,19 @@ module part_rows
     parameter_row_t('part', springs(2), 'cubic', 'N/m^3', any_value, 'k3', optional=.true.), &
     parameter_row_t('part', springs(3), 'moment', 'N m', any_value, &
                     'weight times distance of the centre of mass; negative for an inverted pendulum'), &
-    (parameter_row_t('part', springs(i), 'damping', 'N s/m', not_negative, 'c', optional=.true.), i=1, 3), &
+    parameter_row_t('part', springs(4), 'attraction', 'N m^2', any_value, &
+                    'half of permittivity times area times voltage squared'), &
+    parameter_row_t('part', springs(4), 'gap', 'm', positive, 's at which the plates would meet'), &
+    (parameter_row_t('part', springs(i), 'modulation', '1', any_value, &
+                     'the force of the spring, its damping excepted, is multiplied by 1 + modulation cos(phi) + Fourier series', &
+                     optional=.true.), i=1, 4), &
+    (parameter_row_t('part', springs(i), 'modulation_cosine', '1', any_value, &
+                     'a_1, a_2, ... of cos(n phi), besides the modulation', optional=.true., list=.true.), i=1, 4), &
+    (parameter_row_t('part', springs(i), 'modulation_sine', '1', any_value, 'b_1, b_2, ... of sin(n phi)', &
+                     optional=.true., list=.true.), i=1, 4), &
+    (parameter_row_t('part', springs(i), 'damping', 'N s/m', not_negative, 'c', optional=.true.), i=1, 4), &
     (parameter_row_t('part', springs(i), 'free_length', 'm', any_value, &
-                     'second minus first where the spring is without force', optional=.true.), i=1, 3), &
+                     'second minus first where the spring is without force', optional=.true.), i=1, 4), &
     (parameter_row_t('part', frictions(i), 'force', 'N', not_negative, &
                      'friction while sliding; at high speed where it depends on the speed'), i=1, 6), &
     (parameter_row_t('part', frictions(i), 'static_force', 'N', range_t(-1.0_wp, none_above), &

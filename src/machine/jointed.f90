@@ -45,8 +45,11 @@ module jointed
     type(contact_t) :: contact
     !> Stops of a contact [m], huge means none.
     real(wp) :: upper = huge(1.0_wp), lower = -huge(1.0_wp)
-    !> Spring of elastic friction [N/m]; what is not linear of a spring: -c2 s^2 - c3 s^3 - moment sin s.
-    real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0
+    !> Spring of elastic friction [N/m]; what a spring has besides the structure's stiffness: -c1 s - c2 s^2 - c3 s^3 - moment sin s
+    !> + attraction/(gap - s)^2.
+    real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0, attraction = 0, gap = 1
+    !> What the force of a spring is multiplied by, a function of the time; without one, by 1.
+    type(wave_t), allocatable :: strength
   end type joint_t
 
   !> A controller that moves a place s = row'q after a reference, its force u = P e + I (integral of e) + D e' acting along the row,

@@ -12,7 +12,8 @@ module jointed_state
   implicit none
   private
 
-  public :: turning_at, joint_motion, joint_force, joint_energy, free_force, running_control, key_of, is_held, acts_as_spring, &
+  public :: turning_at, joint_motion, joint_force, spring_force, strength_now, joint_energy, &
+    free_force, running_control, key_of, is_held, acts_as_spring, &
     is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
@@ -121,14 +122,15 @@ contains
     end do
   end function key_of
 
-  !> Force of a joint along its row [N], that of a constraint excepted, and its derivatives with respect to s and u.
-  pure subroutine joint_force(joint, phase, slider, touch_speed, s, u, force, by_place, by_speed)
+  !> Force of a joint along its row [N], that of a constraint excepted, and its derivatives with respect to s and u; the force of a
+  !> spring is multiplied by `strength`.
+  pure subroutine joint_force(joint, phase, slider, touch_speed, s, u, strength, force, by_place, by_speed)
     type(joint_t), intent(in) :: joint
     integer, intent(in) :: phase
-    real(wp), intent(in) :: slider, touch_speed, s, u
+    real(wp), intent(in) :: slider, touch_speed, s, u, strength
     real(wp), intent(out) :: force
     real(wp), intent(out), optional :: by_place, by_speed
-    real(wp) :: direction, p, rate, sine, cosine
+    real(wp) :: direction, p, rate
     force = 0
     if (present(by_place)) by_place = 0
     if (present(by_speed)) by_speed = 0
@@ -158,11 +160,41 @@ contains
         call press(joint%contact, direction, p, rate, force, by_place, by_speed)
       end if
     case (joint_spring)
-      call sine_cosine(s, sine, cosine)
-      force = -s**2*(joint%quadratic + s*joint%cubic) - joint%moment*sine
-      if (present(by_place)) by_place = -s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
+      call spring_force(joint, s, strength, force, by_place)
     end select
   end subroutine joint_force
+
+  !> Force of a spring [N] and its derivative with respect to s.
+  pure subroutine spring_force(joint, s, strength, force, by_place)
+    type(joint_t), intent(in) :: joint
+    real(wp), intent(in) :: s, strength
+    real(wp), intent(out) :: force
+    real(wp), intent(out), optional :: by_place
+    real(wp) :: sine, cosine, pull
+    call sine_cosine(s, sine, cosine)
+    pull = 0
+    if (abs(joint%attraction) > 0) pull = joint%attraction/(joint%gap - s)**2
+    force = strength*(pull - s*(joint%stiffness + s*(joint%quadratic + s*joint%cubic)) - joint%moment*sine)
+    if (.not. present(by_place)) return
+    by_place = -joint%stiffness - s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
+    if (abs(joint%attraction) > 0) by_place = by_place + 2*pull/(joint%gap - s)
+    by_place = strength*by_place
+  end subroutine spring_force
+
+  !> What the force of a spring is multiplied by, with its first two derivatives by the time.
+  pure subroutine strength_now(joint, frequency, turning, strength, rate, curvature)
+    type(joint_t), intent(in) :: joint
+    real(wp), intent(in) :: frequency
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(out) :: strength
+    real(wp), intent(out), optional :: rate, curvature
+    real(wp) :: change
+    strength = 1
+    change = 0
+    if (present(curvature)) curvature = 0
+    if (allocated(joint%strength)) call wave_value(joint%strength, frequency, 0.0_wp, turning, strength, change, curvature)
+    if (present(rate)) rate = change
+  end subroutine strength_now
 
   !> Force of a pressed contact and its derivatives.
   pure subroutine press(law, direction, p, rate, force, by_place, by_speed)
@@ -193,8 +225,11 @@ contains
     case (joint_soft)
       if (abs(phase) == 1) energy = contact_energy(joint%contact, merge(s - joint%upper, joint%lower - s, phase > 0))
     case (joint_spring)
+      ! Where the strength is given, all its work is the drive's.
+      if (allocated(joint%strength)) return
       call sine_cosine(s/2, sine, cosine)
-      energy = s**3*(joint%quadratic/3 + s*joint%cubic/4) + 2*joint%moment*sine**2
+      energy = s**2*(joint%stiffness/2 + s*(joint%quadratic/3 + s*joint%cubic/4)) + 2*joint%moment*sine**2
+      if (abs(joint%attraction) > 0) energy = energy - joint%attraction/(joint%gap - s)
     end select
   end function joint_energy
 
@@ -207,7 +242,7 @@ contains
     real(wp), intent(out) :: force(:)
     real(wp), intent(in), optional :: a(:)
     real(wp), intent(out), optional :: rate(:)
-    real(wp) :: s, u, given, r, by_place, by_speed
+    real(wp) :: s, u, given, r, by_place, by_speed, strength, growth, gained
     integer :: j, m, n
     n = machine%n
     force = machine%load - matmul(machine%damping, state%v(:n)) - matmul(machine%stiffness, state%q(:n))
@@ -225,9 +260,14 @@ contains
       associate (joint => machine%joints(j))
         if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r, by_place, by_speed)
+        call strength_now(joint, machine%frequency, turning, strength, growth)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
         force = force + r*joint%row
-        if (present(rate)) rate = rate + (by_place*u + by_speed*(sum(joint%row*a) + given))*joint%row
+        if (.not. present(rate)) cycle
+        rate = rate + (by_place*u + by_speed*(sum(joint%row*a) + given))*joint%row
+        if (.not. allocated(joint%strength)) cycle
+        call spring_force(joint, s, growth, gained)
+        rate = rate + gained*joint%row
       end associate
     end do
   end subroutine free_force

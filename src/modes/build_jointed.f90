@@ -16,7 +16,7 @@ module build_jointed
   use matrices, only: solve
   use places, only: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of
   use status, only: exit_bad_case
-  use waves, only: wave_of
+  use waves, only: modulation_of, wave_of
   implicit none
   private
 
@@ -56,15 +56,11 @@ contains
     if (allocated(error)) return
     do i = 1, size(choices)
       select case (choices(i)%name)
-      case ('spring:linear')
-        call add_link(machine, row_of(rows, choices(i)), value_of(choices(i), 'stiffness'), value_of(choices(i), 'damping'), &
-                      value_of(choices(i), 'free_length'))
-      case ('spring:polynomial', 'spring:pendulum')
-        call add_spring(machine, choices(i), row_of(rows, choices(i)))
       case ('drive:force')
         wave = wave_of(choices(i))
         call add_force(machine, rows(:, place_of(choices(i))), wave%mean, wave%harmonic)
       case default
+        if (index(choices(i)%name, 'spring:') == 1) call add_spring(machine, choices(i), row_of(rows, choices(i)), error)
         if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
         if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices(i), row_of(rows, choices(i)), &
                                                                       given_of(choices, coordinate), error)
@@ -150,27 +146,45 @@ contains
     varies = abs(value_of(choice, 'amplitude')) > 0 .or. size(list_of(choice, 'cosine')) + size(list_of(choice, 'sine')) > 0
   end function varies
 
-  !> A spring whose force is not linear: its linear part belongs to the structure.
-  pure subroutine add_spring(machine, choice, row)
+  !> A spring: its linear part belongs to the structure, the rest is a joint; so is what its modulation adds.
+  pure subroutine add_spring(machine, choice, row, error)
     type(jointed_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
     real(wp), intent(in) :: row(:)
+    type(error_t), allocatable, intent(out) :: error
     type(joint_t) :: joint
+    type(wave_t) :: modulation
     real(wp) :: stiffness
     stiffness = 0
     joint%name = path_of(choice)
     joint%kind = joint_spring
     joint%row = row
     joint%offset%mean = -value_of(choice, 'free_length')
-    if (choice%name == 'spring:pendulum') then
-      joint%moment = value_of(choice, 'moment')
-    else
+    select case (choice%name)
+    case ('spring:linear')
+      stiffness = value_of(choice, 'stiffness')
+    case ('spring:polynomial')
       stiffness = value_of(choice, 'stiffness')
       joint%quadratic = value_of(choice, 'quadratic')
       joint%cubic = value_of(choice, 'cubic')
+    case ('spring:pendulum')
+      joint%moment = value_of(choice, 'moment')
+    case ('spring:electrostatic')
+      joint%attraction = value_of(choice, 'attraction')
+      joint%gap = value_of(choice, 'gap')
+    end select
+    call add_link(machine, row, stiffness, value_of(choice, 'damping'), value_of(choice, 'free_length'))
+    if (any(abs([joint%moment, joint%quadratic, joint%cubic, joint%attraction]) > 0)) call add_joint(machine, joint)
+    modulation = modulation_of(choice)
+    if (.not. any(abs(modulation%harmonic) > 0)) return
+    if (.not. machine%frequency > 0) then
+      call fail(error, exit_bad_case, path_of(choice)//'.modulation: found without a frequency, allowed beside a [drive.NAME] '// &
+                'that has one; its amplitude may be 0')
+      return
     end if
-    call add_link(machine, joint%row, stiffness, value_of(choice, 'damping'), value_of(choice, 'free_length'))
-    if (abs(joint%moment) + abs(joint%quadratic) + abs(joint%cubic) > 0) call add_joint(machine, joint)
+    joint%stiffness = stiffness
+    joint%strength = modulation
+    call add_joint(machine, joint)
   end subroutine add_spring
 
   pure subroutine add_friction(machine, choice, row, error)

@@ -7,7 +7,7 @@ module jointed_log
   use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
   use jointed, only: joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
-  use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, turning_at
+  use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, strength_now, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, record_event, record_sample, &
@@ -153,7 +153,7 @@ contains
     type(jointed_state_t), intent(in) :: state
     real(wp), intent(out) :: friction, damping, contact, work
     complex(wp) :: turning(harmonics_of(machine))
-    real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate
+    real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate, strength
     type(jointed_state_t) :: bodies
     integer :: i, j, m
     turning = turning_at(machine%frequency, state%time, size(turning))
@@ -185,8 +185,10 @@ contains
           cycle
         end if
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r)
+        call strength_now(joint, machine%frequency, turning, strength)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r)
         work = work - r*rate
+        if (allocated(joint%strength)) work = work + r*u
         if (joint%kind == joint_soft) then
           if (abs(state%phase(j)) == 1) contact = contact + damping_of_contact(joint, state%phase(j), state%touch_speed(j), s, u)
         else if (state%phase(j) /= 0 .and. joint%kind /= joint_spring) then

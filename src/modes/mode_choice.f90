@@ -70,7 +70,7 @@ contains
   pure real(wp) function level_of_sliding(machine, j) result(level)
     type(jointed_t), intent(in) :: machine
     integer, intent(in) :: j
-    call joint_force(machine%joints(j), 1, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, level)
+    call joint_force(machine%joints(j), 1, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, level)
     level = -level
   end function level_of_sliding
 

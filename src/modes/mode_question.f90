@@ -6,7 +6,7 @@
 module mode_question
   use boxed_forces, only: depends_on, solve_boxed
   use jointed, only: joint_contact, joint_friction, jointed_t, most_joints
-  use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t, running_control
+  use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t, running_control, spring_force, strength_now
   use kinds, only: wp
   implicit none
   private
@@ -93,7 +93,7 @@ contains
     type(jointed_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(in) :: force(:)
-    real(wp) :: size_of_y(most_joints), parts(machine%n), s, u, r, by_place, by_speed
+    real(wp) :: size_of_y(most_joints), parts(machine%n), s, u, r, by_place, by_speed, strength
     integer :: i, n
     n = machine%n
     parts = abs(force) + abs(machine%load) + matmul(abs(machine%damping), abs(state%v(:n))) &
@@ -111,7 +111,9 @@ contains
         + abs(machine%joints(i)%row)*machine%joints(i)%friction%break_away
       ! The force of a stiff joint is the small difference of large ones.
       call joint_motion(machine, i, state%q, state%v, state%time, turning, s, u)
-      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, r, by_place, by_speed)
+      call strength_now(machine%joints(i), machine%frequency, turning, strength)
+      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, strength, r, by_place, &
+                       by_speed)
       associate (row => abs(machine%joints(i)%row))
         parts = parts + row*(abs(by_place)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
       end associate
@@ -129,7 +131,7 @@ contains
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(in) :: a(:), jerk(:)
     real(wp), intent(out) :: rate(:)
-    real(wp) :: s, u, r, by_place, by_speed
+    real(wp) :: s, u, r, by_place, by_speed, strength, growth, curvature
     integer :: m, j
     rate = -matmul(machine%damping, jerk) - matmul(machine%stiffness, a)
     do m = 1, size(machine%force, 2)
@@ -139,9 +141,15 @@ contains
       associate (joint => machine%joints(j))
         if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r, by_place, by_speed)
+        call strength_now(joint, machine%frequency, turning, strength, growth, curvature)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
         rate = rate + (by_place*(sum(joint%row*a) + surface(machine, j, state, turning, 2)) &
                        + by_speed*(sum(joint%row*jerk) + surface(machine, j, state, turning, 3)))*joint%row
+        if (.not. allocated(joint%strength)) cycle
+        call spring_force(joint, s, growth, r, by_place)
+        rate = rate + 2*by_place*u*joint%row
+        call spring_force(joint, s, curvature, r)
+        rate = rate + r*joint%row
       end associate
     end do
   end subroutine second_rate

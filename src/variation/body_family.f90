@@ -200,9 +200,9 @@ contains
     call events_of_body(body, start, log, state, collapsed, events, last_mode)
   end subroutine fly_periods
 
-  !> Moves a body from one section to the next: derivatives of its state there by that before, and the events on the way. `log` is
-  !> the caller's, opened once, and holds them too. `ok` is false if the trajectory had to be given up or the derivatives
-  !> are not known.
+  !> Moves a body to the next section, from one or from where it is: derivatives of its state there by that before, and the
+  !> events on the way. `log` is the caller's, opened once, and holds them too. `ok` is false if the trajectory had to be given
+  !> up or the derivatives are not known.
   pure subroutine vary_period(machines, body, state, log, events, by_start, ok)
     type(neighbourhood_t), intent(in) :: machines
     type(one_body_t), intent(in) :: body
@@ -224,7 +224,8 @@ contains
     call events_of_body(body, start, log, state, .false., events, mode)
     ok = .not. rests_unheld(body, start%mode, events)
     if (.not. ok) return
-    call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok)
+    call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok, &
+              t_start=start%time)
   end subroutine vary_period
 
   !> Mode after the last event of a motion that began in `mode`.

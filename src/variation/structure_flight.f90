@@ -8,7 +8,8 @@ module structure_flight
   use guarded_march, only: begin_march, guard_t, march_failed, march_t, march_time_over, most_equations, system_t, take_step
   use jointed, only: joint_contact, joint_elastic, jointed_t
   use jointed_flows, only: jointed_motion_t, ready, with_matrix
-  use jointed_state, only: free_force, is_held, is_marched, joint_force, joint_motion, jointed_state_t, key_of, turning_at
+  use jointed_state, only: free_force, is_held, is_marched, joint_force, joint_motion, jointed_state_t, key_of, &
+    spring_force, strength_now, turning_at
   use kinds, only: wp
   use mode_flow, only: build_flow, mode_flow_t
   use motion_state, only: flight_adaptive
@@ -305,7 +306,7 @@ contains
     type(jointed_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: by_state(:, :), by_time(:)
-    real(wp) :: s, u, given, r, by_place, by_speed, surface, rate
+    real(wp) :: s, u, given, r, by_place, by_speed, surface, rate, strength, growth
     integer :: i, j, m
     associate (machine => frame%moving%machine, d => frame%directions, p => frame%places, n => frame%moving%machine%n)
       by_state = 0
@@ -324,9 +325,14 @@ contains
             cycle
           end if
           call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
-          call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, r, by_place, by_speed)
+          call strength_now(joint, machine%frequency, turning, strength, growth)
+          call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
           surface = u - sum(joint%row*state%v(:n))
           rate = by_place*surface + by_speed*given
+          if (allocated(joint%strength)) then
+            call spring_force(joint, s, growth, r)
+            rate = rate + r
+          end if
           by_time = by_time + rate*joint%row
           do i = 1, p
             by_state(:, i) = by_state(:, i) + by_place*sum(joint%row*d(:, i))*joint%row

@@ -46,11 +46,11 @@ contains
     slope = (own_weight(machines%side)*own + matmul(near, weight_of(:, machines%side)))/machines%step
   end function by_difference
 
-  !> Derivatives of the state at `t_end` [s] of the motion that starts at the section in `mode` with `y` and has `events`:
-  !> by the start in `by_start`, by the parameter in `by_parameter`. `ok` is false if the flights do not lead from event to event
-  !> within `tolerance` (in each coordinate), or where an event is met tangentially. `determinant`: of `by_start`, as the product
-  !> over the flights and events, which keeps its digits where `by_start` has large entries.
-  pure subroutine vary(machines, mode, y, events, t_end, tolerance, by_start, ok, by_parameter, determinant)
+  !> Derivatives of the state at `t_end` [s] of the motion that starts at the section, or at `t_start`, in `mode` with `y` and
+  !> has `events`: by the start in `by_start`, by the parameter in `by_parameter`. `ok` is false if the flights do not lead from
+  !> event to event within `tolerance` (in each coordinate), or where an event is met tangentially. `determinant`: of `by_start`,
+  !> as the product over the flights and events, which keeps its digits where `by_start` has large entries.
+  pure subroutine vary(machines, mode, y, events, t_end, tolerance, by_start, ok, by_parameter, determinant, t_start)
     type(neighbourhood_t), intent(in) :: machines
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:), t_end, tolerance(:)
@@ -58,6 +58,7 @@ contains
     real(wp), intent(out) :: by_start(:, :)
     logical, intent(out) :: ok
     real(wp), intent(out), optional :: by_parameter(:), determinant
+    real(wp), intent(in), optional :: t_start
     real(wp), dimension(size(y), size(y) + 1) :: change
     real(wp), dimension(size(y)) :: state, reached
     real(wp) :: time
@@ -67,6 +68,7 @@ contains
     ok = .true.
     state = y
     time = 0
+    if (present(t_start)) time = t_start
     now = mode
     change = 0
     ! What a start at rest may change is what the rest lets it.

@@ -381,7 +381,7 @@ def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_
     program.library.cache_clear()
 
 
-def start(source_dir, folder, pause: float) -> subprocess.Popen:
+def start(source_dir, folder, pause: float, *more: str) -> subprocess.Popen:
     """A campaign with an answer that is always the same."""
     package = folder / "stand_in" / "separatrix"
     (package / "discovery").mkdir(parents=True, exist_ok=True)
@@ -411,6 +411,7 @@ def start(source_dir, folder, pause: float) -> subprocess.Popen:
         folder / "out",
         "--output",
         folder / "page.md",
+        *more,
     ]
     environment = {**os.environ, "PYTHONPATH": str(folder / "stand_in"), "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen([sys.executable, "-c", code, *words], env=environment, stdout=subprocess.DEVNULL)
@@ -441,6 +442,17 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
     assert all(len(measured.findall(page)) == 1 for page in results.values())
     untimed = {name: measured.sub("", page) for name, page in results.items()}
     assert untimed["whole"] == untimed["killed"]
+
+
+def test_the_page_can_be_written_again_from_the_archive_alone(source_dir, tmp_path):
+    archive = tmp_path / "archive.jsonl.xz"
+    whole, again = tmp_path / "whole", tmp_path / "again"
+    assert start(source_dir, whole, 0.0, "--archive", str(archive)).wait(timeout=300) == 0
+    kept = archive.read_bytes()
+    assert start(source_dir, again, 0.0, "--summary", "--archive", str(archive)).wait(timeout=300) == 0
+    assert (again / "page.md").read_text() == (whole / "page.md").read_text()
+    assert archive.read_bytes() == kept
+    assert not any((again / "out" / f"seed_{SEED}" / "cases").iterdir())
 
 
 def test_another_truth_than_the_sealed_one_is_noticed(campaign, source_dir, tmp_path):

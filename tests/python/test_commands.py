@@ -268,6 +268,19 @@ def test_verify(separatrix, results, kind):
         assert facts["x_deviation"] < 1e-6
 
 
+def test_verify_says_that_no_point_had_settled(separatrix, tmp_path):
+    """A deviation of 0 m would be one that nobody has looked at."""
+    write_case(tmp_path)
+    small = [word for place in (1, 2) for word in ("--set", f"axis[{place}].count=2")]
+    keys = ("contact.restitution=1", "friction.kinetic_coefficient=0", "friction.static_coefficient=0")
+    lossless = [word for key in (*keys, "run.duration=27", "run.extension=1") for word in ("--set", key)]
+    succeed(separatrix, "basin", "case.toml", "-o", "map.h5", *small, *lossless, folder=tmp_path)
+    said = succeed(separatrix, "verify", "map.h5", folder=tmp_path).out
+    assert "none had settled: impact counts and states are not compared" in said
+    facts = json.loads(succeed(separatrix, "verify", "map.h5", "--json", folder=tmp_path).out)
+    assert facts["compared"] == 0
+
+
 def test_verify_runs_each_point_of_a_small_map_once(separatrix, tmp_path):
     write_case(tmp_path)
     small = [word for place in (1, 2) for word in ("--set", f"axis[{place}].count=3")]

@@ -4,12 +4,14 @@
 
 import csv
 import sys
-from math import cos, exp, sin
+from math import cos, exp, pi, sin
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from program import succeed
+from scipy.special import mathieu_a
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "referee"))
 import random_structures
@@ -112,6 +114,43 @@ MACHINES = {
             soft=[Soft([-1, 1], 0.3, 1, hertz), Soft([-1, 1], -0.4, -1, hertz)],
         ),
     ),
+    "modulated mesh, stop": (
+        TIES.format(
+            spring='law = "polynomial"\nstiffness = 1\ncubic = 0.3\ndamping = 0.05\n'
+            "modulation = 0.4\nmodulation_sine = [0, 0.3]"
+        )
+        + STOP,
+        lambda: Structure(
+            [1, 1.3],
+            lambda t, q, v: np.array(
+                [
+                    -(q[0] + 0.3 * q[0] ** 3) * (1 + 0.4 * cos(0.8 * t) + 0.3 * sin(1.6 * t))
+                    - 0.05 * v[0]
+                    + 1.2 * (q[1] - q[0]),
+                    -1.2 * (q[1] - q[0]) + 0.9 * cos(0.8 * t),
+                ]
+            ),
+            rigid=[Rigid([-1, 1], 0.25, 1, lambda u: max(0.0, 1 - 0.1 * u))],
+        ),
+    ),
+    "condenser, stop": (
+        TIES.format(spring='law = "electrostatic"\nattraction = 0.1\ngap = 4\nmodulation_cosine = [0, -1]')
+        + STOP
+        + '[spring.ground]\nbetween = ["first"]\nstiffness = 1.1\ndamping = 0.03\n',
+        lambda: Structure(
+            [1, 1.3],
+            lambda t, q, v: np.array(
+                [
+                    0.1 * (1 - cos(1.6 * t)) / (4 - q[0]) ** 2
+                    - 1.1 * q[0]
+                    - 0.03 * v[0]
+                    + 1.2 * (q[1] - q[0]),
+                    -1.2 * (q[1] - q[0]) + 0.9 * cos(0.8 * t),
+                ]
+            ),
+            rigid=[Rigid([-1, 1], 0.25, 1, lambda u: max(0.0, 1 - 0.1 * u))],
+        ),
+    ),
     "pendulum, stop": (
         TIES.format(spring='law = "pendulum"\nmoment = 3\ndamping = 0.1') + STOP,
         lambda: Structure(
@@ -137,6 +176,64 @@ def test_events_are_those_of_the_referee(separatrix, name, tmp_path):
     theirs = [at for _, _, at in referee.events]
     assert len(ours) >= 5
     assert ours == pytest.approx(theirs, abs=1e-9)
+
+
+@pytest.mark.parametrize("spring", ['law = "polynomial"\ncubic = 1', "modulation = 0.5"])
+def test_what_nothing_moves_stays(separatrix, spring, tmp_path):
+    """No force, no speed, no length that is known: the motion was given up, and the program crashed."""
+    (tmp_path / "case.toml").write_text(
+        f"""
+[body.bob]
+mass = 1
+[spring.ground]
+between = ["bob"]
+stiffness = 1
+{spring}
+[drive.clock]
+law = "force"
+body = "bob"
+frequency = 2
+[run]
+duration = 20
+window = 10
+"""
+    )
+    succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert len(file["x"]) > 100
+        assert not np.any(file["x"][:])
+
+
+@pytest.mark.parametrize(("order", "q"), [(1, 0.3), (1, 1.5), (2, 0.8)])
+def test_a_modulated_spring_is_mathieus(separatrix, order, q, tmp_path):
+    """x'' + (a - 2 q cos 2t) x = 0 at a characteristic number of order n has trace 2 (-1)^n over pi."""
+    a = mathieu_a(order, q)
+    (tmp_path / "case.toml").write_text(
+        f"""
+[body.bob]
+mass = 1
+[spring.ground]
+between = ["bob"]
+stiffness = {a}
+modulation = {-2 * q / a}
+[drive.clock]
+law = "force"
+body = "bob"
+frequency = 2
+[run]
+duration = {pi}
+window = {pi}
+"""
+    )
+    trace, balance = 0.0, []
+    for x, v in ((1, 0), (0, 1)):
+        words = ["--set", f"start.x0={x}", "--set", f"start.v0={v}", "-o", "out.h5", "--force"]
+        succeed(separatrix, "trajectory", "case.toml", *words, folder=tmp_path)
+        with h5py.File(tmp_path / "out.h5") as file:
+            trace += file["v" if v else "x"][-1]
+            balance += [file["energy"][-1] - file["energy"][0] - file["drive_work"][-1]]
+    assert trace == pytest.approx(2 * (-1) ** order, abs=1e-9)
+    assert balance == pytest.approx([0, 0], abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps what a campaign found in one file, from which the campaign goes on and the page can be written again.
+
+A line of JSON for each case, compressed by LZMA: its number, its seal, the text of its truth, its result.
+Records are not kept: the seed draws them again.
+"""
+
+import json
+import lzma
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def unpack(archive: Path, folders: object) -> int:
+    """Write what the archive has and the folders lack; return the number of results."""
+    written = 0
+    with lzma.open(archive, "rt") as lines:
+        for line in lines:
+            kept = json.loads(line)
+            number = kept["number"]
+            if folders.result(number).is_file():
+                continue
+            if kept["truth"] is not None:
+                (folders.sealed / f"{number:04}.json").write_text(kept["truth"])
+            (folders.seals / f"{number:04}.txt").write_text(f"{kept['result']['seal']}\n")
+            folders.result(number).write_text(json.dumps(kept["result"]) + "\n")
+            written += 1
+    return written
+
+
+def pack(archive: Path, folders: object, numbers: Sequence[int]) -> int:
+    """Write the archive anew from the folders; return the number of results."""
+    lines = []
+    for number in numbers:
+        if not folders.result(number).is_file():
+            continue
+        sealed = folders.sealed / f"{number:04}.json"
+        truth = sealed.read_text() if sealed.is_file() else None
+        result = json.loads(folders.result(number).read_text())
+        lines.append(json.dumps({"number": number, "truth": truth, "result": result}) + "\n")
+    draft = archive.with_name(archive.name + ".new")
+    draft.parent.mkdir(parents=True, exist_ok=True)
+    with lzma.open(draft, "wt", preset=9) as out:
+        out.writelines(lines)
+    draft.rename(archive)
+    return len(lines)
