@@ -19,9 +19,11 @@ module guard_search
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
   !> Remainder of the quintic: |y - H| <= max|y^(6)| L^6/46080 in the middle of a panel.
   real(wp), parameter :: remainder = 46080
-  integer, parameter :: most_steps = 200
+  integer, parameter :: most_steps = 200, most_turning_steps = 20
   !> After so many panels their length is looked at again: what was fast may have died away.
   integer, parameter :: panels_between = 8
+  !> Where misses are noted a panel is no longer than so many radians of the fastest part: a rate turns once within.
+  real(wp), parameter, public :: most_radians = 2.5_wp
 
 contains
 
@@ -42,7 +44,7 @@ contains
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp), dimension(0:3, search%functions) :: here, there
     real(wp), dimension(most_guards) :: certified, root
-    real(wp) :: a, b, length, tie
+    real(wp) :: a, b, length, longest, tie
     logical :: idle(most_guards)
     integer :: g, panels
     evaluations = 1
@@ -53,6 +55,10 @@ contains
       here(:, g) = derivatives(search, g, a, growth, turning)
     end do
     length = panel_length(search, 0.0_wp, duration)
+    longest = huge(longest)
+    if (wants_margin) longest = most_radians/max(size(search%turn, 1)*search%frequency, &
+                                                 maxval(search%size_of_exponent(:search%terms)), tiny(longest))
+    length = min(length, longest)
     panels = 0
     tie = 8*spacing(max(origin, origin + duration))
     time = duration
@@ -84,7 +90,7 @@ contains
       panels = panels + 1
       if (mod(panels, panels_between) == 0 .and. time > a) then
         b = panel_length(search, a, time - a)
-        if (b > 2*length) length = b
+        if (b > 2*length) length = min(b, longest)
       end if
     end do
   end subroutine find_first
@@ -150,7 +156,7 @@ contains
     real(wp), intent(inout) :: extremes(2), top_speed
     integer, intent(inout) :: evaluations
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
-    real(wp) :: last(0:3), d(0:3)
+    real(wp) :: last(0:3), d(0:3), at
     last = there
     if (stale) then
       call bases_at(search, b, growth, turning)
@@ -159,44 +165,43 @@ contains
     end if
     call note_extremes(search, last, extremes, top_speed)
     if (here(1)*last(1) < 0) then
-      d = turning_point(search, search%functions, 1, a, b, here, last, extremes(2) - extremes(1))
+      call turning_point(search, search%functions, 1, a, b, here, last, extremes(2) - extremes(1), at, d)
       call note_extremes(search, d, extremes, top_speed)
     end if
     if (wants_speed .and. here(2) > 0 .and. last(2) < 0) then
-      d = turning_point(search, search%functions, 2, a, b, here, last, 0.0_wp)
+      call turning_point(search, search%functions, 2, a, b, here, last, 0.0_wp, at, d)
       call note_extremes(search, d, extremes, top_speed)
     end if
   end subroutine watch
 
-  !> Derivatives of function `g` where number `order` of them is zero, between `a` and `b`, from those there: a safeguarded secant.
-  !> The value is good to a share of `range` where that is more than 0.
-  pure function turning_point(search, g, order, a, b, here, last, range) result(found)
+  !> Where derivative number `order` of function `g` is zero between `a` and `b`, from those there, and all of them: Newton's steps
+  !> in a bracket. The value is good to a share of itself and of `range`.
+  pure subroutine turning_point(search, g, order, a, b, here, last, range, t, found)
     type(search_t), intent(in) :: search
     integer, intent(in) :: g, order
     real(wp), intent(in) :: a, b, here(0:3), last(0:3), range
-    real(wp) :: found(0:3), low, high, at_low, at_high, t
+    real(wp), intent(out) :: t, found(0:3)
+    real(wp) :: low, high, next
     complex(wp) :: now(search%terms), turn(size(search%turn, 1))
     integer :: i
     low = a
     high = b
-    at_low = here(order)
-    at_high = last(order)
-    do i = 1, 8
-      t = low + (high - low)*min(0.95_wp, max(0.05_wp, at_low/(at_low - at_high)))
+    t = a + (b - a)*min(0.95_wp, max(0.05_wp, here(order)/(here(order) - last(order))))
+    do i = 1, most_turning_steps
       call bases_at(search, t, now, turn)
       found = derivatives(search, g, t, now, turn)
-      if (order == 1 .and. abs(found(1))*(high - low) <= 1e-10_wp*(range + abs(found(0)))) exit
-      if (found(order)*at_low > 0) then
-        low = t
-        at_low = found(order)
-      else
-        high = t
-        at_high = found(order)
-      end if
+      if (order == 1 .and. abs(found(1))*(high - low) <= 1e-10_wp*(range + abs(found(0)))) return
+      if (found(order)*here(order) > 0) low = t
+      if (.not. found(order)*here(order) > 0) high = t
+      next = t - found(order)/found(order + 1)
+      if (.not. (next > low .and. next < high)) next = low + (high - low)/2
+      if (abs(next - t) <= 1e-12_wp*(b - a)) return
+      t = next
     end do
-  end function turning_point
+  end subroutine turning_point
 
-  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, but have not `fallen`.
+  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, where some have `fallen`. The rate of a gap has one
+  !> extreme on a panel at most: where it has, either side is looked at.
   pure subroutine note_misses(search, list, a, b, here, fallen, margin, evaluations)
     type(search_t), intent(in) :: search
     type(joint_guard_t), intent(in) :: list(:)
@@ -205,18 +210,35 @@ contains
     real(wp), intent(inout) :: margin
     integer, intent(inout) :: evaluations
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
-    real(wp) :: last(0:3)
+    real(wp) :: last(0:3), middle(0:3), between
+    logical :: bends
     integer :: g
     do g = 1, search%guards
-      if (fallen(g) .or. .not. here(1, g) < 0 .or. .not. any(list(g)%meaning == [meets_upper, meets_lower])) cycle
+      if (.not. any(list(g)%meaning == [meets_upper, meets_lower])) cycle
       call bases_at(search, b, growth, turning)
       evaluations = evaluations + 1
       last = derivatives(search, g, b, growth, turning)
-      if (last(1) < -rounding*(bound(search, g, 1, a, b - a) + search%blur(1, g))) cycle
-      if (last(1) > 0) last = turning_point(search, g, 1, a, b, here(:, g), last, 0.0_wp)
-      margin = min(margin, max(last(0), 0.0_wp))
+      bends = here(2, g)*last(2) < 0
+      between = a
+      middle = here(:, g)
+      if (bends) call turning_point(search, g, 2, a, b, here(:, g), last, 0.0_wp, between, middle)
+      if (bends) call note_miss(search, g, a, between, here(:, g), middle, margin)
+      if (.not. fallen(g)) call note_miss(search, g, between, b, middle, last, margin)
     end do
   end subroutine note_misses
+
+  !> Gap `g`, if it stops closing between `a` and `b`, with its derivatives there.
+  pure subroutine note_miss(search, g, a, b, here, last, margin)
+    type(search_t), intent(in) :: search
+    integer, intent(in) :: g
+    real(wp), intent(in) :: a, b, here(0:), last(0:)
+    real(wp), intent(inout) :: margin
+    real(wp) :: least(0:3), at
+    if (.not. here(1) < 0 .or. last(1) < -rounding*(bound(search, g, 1, a, b - a) + search%blur(1, g))) return
+    least = last
+    if (last(1) > 0) call turning_point(search, g, 1, a, b, here, last, 0.0_wp, at, least)
+    margin = min(margin, max(least(0), 0.0_wp))
+  end subroutine note_miss
 
   !> Length of the panels from the time `t` on: the quintic is to be good to about a thousandth of each guard's size.
   pure real(wp) function panel_length(search, t, duration) result(length)

@@ -19,8 +19,9 @@ inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh
   mask unknown = fresh;
   put(g.s.start, fresh, g.s.time);
   put(g.s.found, fresh, 0);
-  for (int key = 0; key < modes_of(m); key++) {
-    mask in = in_mode(m, z, key, fresh, g.s);
+  note_modes(m, z, fresh, g);
+  for (int key = 0; key < g.modes; key++) {
+    mask in = g.in_mode[key] & fresh;
     const structure_mode &t = m.mode[key];
     if (t.known < 0.5 || !any(in))
       continue;
@@ -199,10 +200,10 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
   }
   for (int j = 0; j < z.joints; j++)
     phase[j] = g.s.phase[j];
-  const vec moves = moves_of(m, z, g.s);
+  const vec moves = moves_of(m, z, g);
   harmonics_at(m, z, g.s.start + g.s.span, b);
   b.elapsed = g.s.span;
-  place_at(m, z, due, g.s, g.s.end_re, g.s.end_im, b, g.s.q, g.s.v);
+  place_at(m, z, due, g, g.s.end_re, g.s.end_im, b, g.s.q, g.s.v);
   put(g.s.time, due, g.s.start + g.s.span);
   put(g.s.left, due, 0);
   put(g.s.rising, due, 0);
@@ -294,8 +295,8 @@ inline void take_stops(const structure_machine &m, const size &z, mask there, bo
     re[k] = g.s.re[k] * b.re[k] - g.s.im[k] * b.im[k];
     im[k] = g.s.re[k] * b.im[k] + g.s.im[k] * b.re[k];
   }
-  place_at(m, z, there, g.s, re, im, b, g.s.q, g.s.v);
-  const vec moves = moves_of(m, z, g.s);
+  place_at(m, z, there, g, re, im, b, g.s.q, g.s.v);
+  const vec moves = moves_of(m, z, g);
   mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5) & (moves > 0.5);
   for (int i = 0; i < z.coordinates; i++)
     passing = passing & (magnitude(g.s.q[i]) <= m.domain);

@@ -13,6 +13,9 @@ namespace {
 
 enum { structure_members = sizeof(structure_batch::fields) / sizeof(double[lanes]) };
 
+// Stops are further apart than this share of a period.
+const double stop_share = 1e-9;
+
 inline void load(const structure_batch &batch, int first, structure_fields<vec> &s) {
   for (int i = 0; i < structure_members; i++)
     memcpy((vec *)&s + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
@@ -34,6 +37,7 @@ void fly_group(const structure_machine &m, const size &z, int first, lane_batch 
   if (!any(sent))
     return;
   load(batch, first, g.s);
+  note_modes(m, z, ~mask{}, g);
   enter_modes(m, z, sent & ~fresh, g);
   structure_bases b;
   mask left = sent & ~fresh & (g.s.found < 0.5);
@@ -54,7 +58,11 @@ void fly_group(const structure_machine &m, const size &z, int first, lane_batch 
     if (any(seek))
       left = find_first(m, z, seek, g);
     left = left | (sent & (g.c.flights >= g.c.budget));
-    mask flying = sent & ~left, due = flying & (g.s.start + g.s.span < g.c.until), stops = flying & ~due;
+    mask flying = sent & ~left, due = flying & (g.s.start + g.s.span < g.c.until);
+    // A flight that ended at a stop goes on only from there.
+    if (z.misses)
+      due = due & ((g.s.found < 1.5) | (g.s.start + g.s.span < g.c.until - stop_share * m.period));
+    mask stops = flying & ~due;
     if (any(due) && 2 * count(stops) < count(flying))
       left = left | take_events(m, z, due, g);
     else if (any(stops))
@@ -75,8 +83,8 @@ template <class size> void fly_all(const structure_machine &m, lane_batch &contr
 inline void fly_structures(const structure_machine &m, lane_batch &control, structure_batch &batch) {
   const any_size z(m);
 #if defined(__AVX__)
-  const bool plain =
-      z.joints == 2 && z.pushes == 0 && z.waves == 1 && z.terms == z.coordinates && z.powers == 1 && !z.idle;
+  const bool plain = z.joints == 2 && z.pushes == 0 && z.waves == 1 && z.terms == z.coordinates &&
+                     z.powers == 1 && !z.idle && !z.misses;
   if (plain && z.terms == 2)
     fly_all<fixed_size<2, 2, 2, 1>>(m, control, batch);
   else if (plain && z.terms == 4)

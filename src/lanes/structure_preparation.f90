@@ -7,6 +7,7 @@ module structure_preparation
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine
   use friction_law, only: falls
+  use guard_search, only: most_radians
   use jointed, only: joint_contact, joint_friction, joint_soft, joint_t, jointed_t
   use jointed_flows, only: jointed_motion_t
   use kinds, only: wp
@@ -59,6 +60,7 @@ contains
       m%chatter_time = longest_chatter*machine%period
       m%burst_gap = burst_gap*machine%period
       m%shortest = 10*m%burst_gap
+      m%misses = merge(1, 0, moving%drifts)
       do j = 1, size(machine%joints)
         call set_joint(machine, j, m%joint(j))
         if (.not. never_pulls(machine%joints(j))) cycle
@@ -68,49 +70,50 @@ contains
       switches = pack([(j, j=1, size(machine%joints))], machine%joints%kind /= joint_contact)
       do key = 0, 2**size(switches) - 1
         call set_mode(moving, switches, key, m%mode(key + 1))
-        if (m%mode(key + 1)%known > 0) call set_panels(moving%harmonics, machine%frequency, m%mode(key + 1))
+        if (m%mode(key + 1)%known > 0) call set_panels(moving, m%mode(key + 1))
       end do
       flow%available = m%mode(1)%known > 0
     end associate
   end subroutine prepare_structure_lanes
 
   !> Panels over which quintics err by no more than about 2 % of what a function swings: as the fastest exponent of a mode [rad/s]
-  !> asks for, and longer.
-  pure subroutine set_panels(harmonics, frequency, mode)
-    integer, intent(in) :: harmonics
-    real(wp), intent(in) :: frequency
+  !> asks for, and longer; where misses are noted, such that the rate of a gap turns once within.
+  pure subroutine set_panels(moving, mode)
+    type(jointed_motion_t), intent(in) :: moving
     type(structure_mode_t), intent(inout) :: mode
     real(wp) :: fastest, sine, cosine, shrink
     integer :: l, k, terms
-    terms = nint(mode%terms)
-    fastest = harmonics*frequency
-    if (terms > 0) fastest = max(fastest, maxval(hypot(mode%decay(:terms), mode%turn(:terms))))
-    mode%close = taylor_span/fastest
-    do l = 1, panel_lengths
-      mode%panel(l) = coarse/fastest*stretches(l)
-      mode%steepest(l) = (coarse/mode%panel(l))**6
-      if (l == panel_lengths) mode%steepest(l) = huge(1.0_wp)
-      do k = 1, harmonics
-        call sine_cosine(k*frequency*mode%panel(l), mode%step_sine(k, l), mode%step_cosine(k, l))
+    associate (harmonics => moving%harmonics, frequency => moving%machine%frequency)
+      terms = nint(mode%terms)
+      fastest = harmonics*frequency
+      if (terms > 0) fastest = max(fastest, maxval(hypot(mode%decay(:terms), mode%turn(:terms))))
+      mode%close = taylor_span/fastest
+      do l = 1, panel_lengths
+        mode%panel(l) = coarse/fastest*stretches(l)
+        if (moving%drifts) mode%panel(l) = most_radians/fastest
+        mode%steepest(l) = (coarse/mode%panel(l))**6
+        if (l == panel_lengths) mode%steepest(l) = huge(1.0_wp)
+        do k = 1, harmonics
+          call sine_cosine(k*frequency*mode%panel(l), mode%step_sine(k, l), mode%step_cosine(k, l))
+        end do
+        do k = 1, terms
+          call sine_cosine(mode%turn(k)*mode%panel(l), sine, cosine)
+          shrink = exponential(-mode%decay(k)*mode%panel(l))
+          mode%step_re(k, l) = shrink*cosine
+          mode%step_im(k, l) = shrink*sine
+        end do
       end do
-      do k = 1, terms
-        call sine_cosine(mode%turn(k)*mode%panel(l), sine, cosine)
-        shrink = exponential(-mode%decay(k)*mode%panel(l))
-        mode%step_re(k, l) = shrink*cosine
-        mode%step_im(k, l) = shrink*sine
-      end do
-    end do
+    end associate
   end subroutine set_panels
 
-  !> Whether the structure is one that the kernel has room and laws for. The event loop notes by how much structures that drift
-  !> between stops miss them; lanes do not.
+  !> Whether the structure is one that the kernel has room and laws for.
   pure logical function fits_lanes(moving) result(fits)
     type(jointed_motion_t), intent(in) :: moving
     integer :: j
     associate (machine => moving%machine)
       fits = machine%driven .and. machine%frequency > 0 .and. machine%linear .and. machine%n <= lane_coordinates .and. &
         moving%harmonics > 0 .and. moving%harmonics <= lane_waves .and. &
-        moving%section == 0 .and. .not. moving%drifts .and. &
+        moving%section == 0 .and. &
         size(machine%joints) <= lane_joints .and. moving%options%flight /= flight_adaptive
       fits = fits .and. .not. allocated(machine%controller) .and. .not. allocated(machine%impulses)
       if (.not. fits) return

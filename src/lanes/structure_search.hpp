@@ -9,7 +9,7 @@
 #ifndef SEPARATRIX_STRUCTURE_SEARCH_HPP
 #define SEPARATRIX_STRUCTURE_SEARCH_HPP
 
-#include "structure_motion.hpp"
+#include "structure_misses.hpp"
 
 namespace {
 
@@ -121,20 +121,21 @@ template <class size>
 inline structure_target earliest_fallen(const structure_machine &m, const size &z, const structure_group &g,
                                         const outlook &here, const outlook &far) {
   structure_target target = {0, 0};
-  vec least = 2;
+  // The share is a ratio.
+  vec least_fall = 2, least_span = 1;
   for (int j = 0; j < functions_of(z, g); j++)
     for (int side = -1; side <= 1; side += 2) {
       if (!has_limit(m, z, g, ~mask{}, j, side))
         continue;
       vec w0 = side > 0 ? g.high[j] - here.f[j] : here.f[j] - g.low[j];
       vec w1 = side > 0 ? g.high[j] - far.f[j] : far.f[j] - g.low[j];
-      vec share = w0 / (w0 - w1);
-      mask first = (w1 < 0.0) & (share < least);
+      mask first = (w1 < 0.0) & (w0 * least_span < least_fall * (w0 - w1));
       if (j >= z.joints)
         first = first & (g.low[j] != -unlimited);
       put(target.joint, first, j + 1);
       put(target.side, first, side);
-      put(least, first, share);
+      put(least_fall, first, w0);
+      put(least_span, first, w0 - w1);
     }
   return target;
 }
@@ -203,6 +204,22 @@ inline void put_bases(int terms, int waves, mask where, const structure_bases &f
   }
 }
 
+// Panels that reach the next stop end there, and the flight with them, where gaps are noted: those after it
+// are none of it. Returns their lanes.
+template <class size>
+inline mask cut_at_stop(const structure_machine &m, const size &z, mask walking, const structure_group &g,
+                        structure_bases &next) {
+  vec stop = g.c.until - g.s.start;
+  mask cut = walking & (next.elapsed >= stop);
+  if (!any(cut))
+    return cut;
+  structure_bases b;
+  bases_at(m, z, g, stop, b);
+  put_bases(z.terms, z.waves, cut, b, next);
+  put(next.elapsed, cut, stop);
+  return cut;
+}
+
 // Walks on panel by panel until the proof fails. Flights that last too long end without an event.
 template <class size>
 inline void walk(const structure_machine &m, const size &z, mask walking, mask &sought, structure_walk &p,
@@ -218,16 +235,22 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
       next.cosine[n] = p.b.cosine[n] * g.step.cosine[n] - p.b.sine[n] * g.step.sine[n];
       next.sine[n] = p.b.cosine[n] * g.step.sine[n] + p.b.sine[n] * g.step.cosine[n];
     }
+    mask cut = {};
+    if (z.misses)
+      cut = cut_at_stop(m, z, walking, g, next);
     outlook there;
     functions_at(m, z, g, next, there);
     LANE_COUNT(panels, count(walking));
     put_bases(z.terms, z.waves, walking, next, p.b);
     put_outlook(functions_of(z, g), walking, there, p.far);
-    put(p.end, walking, p.t + g.panel);
-    walking = proven_within(m, z, g, walking, p.here, p.far, g.panel);
-    mask over = walking & (p.panels >= double(most_panels));
+    put(p.end, walking, next.elapsed);
+    walking = proven_within(m, z, g, walking, p.here, p.far, z.misses ? next.elapsed - p.t : g.panel);
+    if (z.misses)
+      note_misses(m, z, walking, p.t, p.end, p.here, p.far, g);
+    mask over = walking & (cut | (p.panels >= double(most_panels)));
     if (any(over)) {
       keep_end(z, over, p, {0, 0}, g);
+      put(g.s.found, over & cut, 2);
       sought = sought & ~over;
       walking = walking & ~over;
     }
@@ -337,10 +360,10 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     p.b.cosine[n] = g.first_cosine[n];
     p.b.sine[n] = g.first_sine[n];
   }
-  p.here = g.first;
+  put_outlook(functions_of(z, g), g.first, p.here);
+  put_outlook(functions_of(z, g), g.first, p.far);
   p.target = {magnitude(g.s.left), pick(g.s.left > 0.0, 1, -1)};
   make_zero(z, g, p.target, seek & (g.s.left != 0.0), p.here);
-  p.far = p.here;
   for (int j = 0; j < z.joints; j++)
     if (m.joint[j].even > 0.5)
       put(p.here.f1[j], g.s.rising == double(j + 1), vec{});
@@ -361,6 +384,8 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
     if (any(blind))
       halve(m, z, blind, p, g);
     mask within = proven_within(m, z, g, sought, p.here, p.far, p.end - p.t) & ~failed;
+    if (z.misses)
+      note_misses(m, z, within, p.t, p.end, p.here, p.far, g);
     mask found = within & p.at_zero;
     keep_end(z, found, p, p.target, g);
     walking = within & ~p.at_zero;

@@ -49,7 +49,7 @@ module structure_types
   !> Mirrors `structure_machine` of structure_types.hpp.
   type, bind(c), public :: structure_machine_t
     real(c_double) :: coordinates = 0, joints = 0, pushes = 0, waves = 0, drive_frequency = 0, period = 0, domain = 0
-    real(c_double) :: slowest = 0, chatter_share = 0, chatter_time = 0, burst_gap = 0, shortest = 0
+    real(c_double) :: slowest = 0, chatter_share = 0, chatter_time = 0, burst_gap = 0, shortest = 0, misses = 0
     type(structure_joint_t) :: joint(lane_joints)
     type(structure_mode_t) :: mode(lane_structure_modes)
   end type structure_machine_t

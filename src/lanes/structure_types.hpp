@@ -104,6 +104,8 @@ struct structure_machine {
   // A flight of this length [s] ends a burst of impacts; impacts after one shorter than `shortest` are left
   // to the scalar code.
   double burst_gap, shortest;
+  // By how much stops are missed is noted.
+  double misses;
   structure_joint joint[most_joints];
   structure_mode mode[most_structure_modes];
 };
@@ -121,8 +123,8 @@ template <class T> struct structure_fields {
   T start, re[most_terms], im[most_terms], held[most_joints];
   // Places and paces along the directions without a spring.
   T place[most_drifts], pace[most_drifts];
-  // What ends it: 1 = found, when, joint (1, ...; 0 = none, the flight goes on), side; amplitudes then;
-  // functions of the joints and their rates then.
+  // What ends it: 1 = found, 2 = the next stop, when, joint (1, ...; 0 = none, the flight goes on), side;
+  // amplitudes then; functions of the joints and their rates then.
   T found, span, joint, side, end_re[most_terms], end_im[most_terms], end_f[most_functions],
       end_f1[most_functions];
   // Counted like those of `lane_fields`.

@@ -13,7 +13,7 @@ module trajectories
   use motion, only: motion_t
   use status, only: reason_left_domain
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_event, go_to_stop, outcome_t, pass_stop, &
-    phase_over, phase_window, run_trajectory, sections_ahead, span_t
+    phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
   implicit none
   private
@@ -211,7 +211,7 @@ contains
       end associate
       if (passenger%course%phase /= phase_over) then
         call put_into_lane(journey%moving, journey%flow, lane, passenger%course, .true., lanes)
-        call send_on(journey, passenger%course, outcomes(passenger%start), lane, lanes%batch)
+        call send_on(journey, catalogue, passenger%course, outcomes(passenger%start), lane, lanes%batch)
         return
       end if
     end do
@@ -236,15 +236,17 @@ contains
     end do
   end subroutine set_regions
 
-  !> Tells a lane where to stop.
-  pure subroutine send_on(journey, course, outcome, lane, batch)
+  !> Tells a lane where to stop: at every section where a motion may have settled in a family of which lanes do not know.
+  pure subroutine send_on(journey, catalogue, course, outcome, lane, batch)
     type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
     type(course_t), intent(in) :: course
     type(outcome_t), intent(in) :: outcome
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
     batch%until(lane) = course%until
     batch%sections(lane) = sections_ahead(journey%moving, journey%span, course)
+    if (course%phase == phase_extension .and. any(catalogue%any_place)) batch%sections(lane) = 0
     batch%budget(lane) = real(journey%moving%options%event_budget - course%tally%events, wp)
     batch%leaves(lane) = merge(1, 0, ends_captured(journey%span, course))
     batch%elapsed(lane) = course%elapsed
@@ -283,7 +285,7 @@ contains
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
       batch%status(lane) = lane_flying
       if (taken) call put_into_lane(journey%moving, journey%flow, lane, course, .false., lanes)
-      call send_on(journey, course, outcome, lane, batch)
+      call send_on(journey, catalogue, course, outcome, lane, batch)
     end associate
   end subroutine attend
 
