@@ -9,10 +9,10 @@ module c_trajectory
   use case_setup, only: span_of
   use case_type, only: case_t
   use constants, only: unreachable
-  use contact_law, only: barrier_positions
+  use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use machine_facts, only: has_driver
+  use machine_facts, only: has_driver, stops_of
   use model_type, only: model_t
   use motion, only: motion_t
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
@@ -150,6 +150,7 @@ contains
     type(log_t), intent(in) :: log
     integer, intent(in) :: kept
     real(wp), intent(inout) :: sample(:, :)
+    type(contact_t) :: stops
     real(wp), allocatable :: column(:)
     sample(:3, :kept) = log%sample_data(:, :kept)
     sample(4, :kept) = log%sample_mode(:kept)
@@ -161,7 +162,8 @@ contains
       sample(6, :kept) = ieee_value(1.0_wp, ieee_quiet_nan)
     end if
     sample(7, :kept) = 0
-    if (moving%machine%contact%soft) then
+    stops = stops_of(moving)
+    if (stops%soft) then
       column = contact_forces(moving, log)
       sample(7, :kept) = column(:kept)
     end if
@@ -190,11 +192,13 @@ contains
     type(outcome_t), intent(in) :: outcome
     real(wp), intent(inout) :: summary(:)
     real(wp) :: barriers(2)
-    barriers = barrier_positions(moving%machine%contact)
+    type(contact_t) :: stops
+    stops = stops_of(moving)
+    barriers = barrier_positions(stops)
     where (abs(barriers) > unreachable) barriers = sign(ieee_value(1.0_wp, ieee_positive_inf), barriers)
     associate (f => outcome%window, book => log%book)
       summary(7:12) = [f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed]
-      summary(13:18) = [moving%machine%period, barriers, merge(1.0_wp, 0.0_wp, moving%machine%contact%soft), &
+      summary(13:18) = [moving%machine%period, barriers, merge(1.0_wp, 0.0_wp, stops%soft), &
                         merge(1.0_wp, 0.0_wp, has_driver(moving)), real(outcome%reason, wp)]
       summary(19:23) = [book%at_start, book%friction, book%damping, book%contact, book%work]
       if (outcome%reason == reason_time_over) summary(24:25) = [book%at_end, closing_error(book)]

@@ -16,7 +16,7 @@ module case_warnings
   use jointed, only: joint_contact, jointed_t
   use journal, only: journal_t
   use kinds, only: int64, wp
-  use machine_facts, only: contact_sizes
+  use machine_facts, only: contact_sizes, stops_of
   use motion, only: motion_t
   use strobe, only: section_obstacle
   use text, only: to_text
@@ -37,6 +37,7 @@ contains
     type(journal_t), intent(inout) :: journal
     type(grid_t) :: grid
     type(motion_t) :: moving
+    type(contact_t) :: stops
     type(error_t), allocatable :: error
     character(len=:), allocatable :: obstacle
     grid = grid_of(the_case, the_case%axes(:0))
@@ -51,7 +52,8 @@ contains
     end if
     if (any(index(the_case%laws%name, 'structure:') == 1)) call warn_about_modes(the_case, journal)
     call warn_about_impulses(the_case, journal)
-    if (moving%machine%contact%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
+    stops = stops_of(moving)
+    if (stops%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
   !> Says if a blow falls after the end.
@@ -138,12 +140,14 @@ contains
     type(case_t), intent(in) :: the_case
     type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
+    type(contact_t) :: stops
     real(wp) :: force, mass, rate, lasts
     logical :: closed_form
     call contact_sizes(moving, mass, force, closed_form)
-    rate = steps_per_second(moving%machine%contact, mass, force)
+    stops = stops_of(moving)
+    rate = steps_per_second(stops, mass, force)
     ! In closed form, one a radian of the fastest motion.
-    if (closed_form) rate = max(sqrt(moving%machine%contact%stiffness/mass), moving%machine%contact%damping/mass)
+    if (closed_form) rate = max(sqrt(stops%stiffness/mass), stops%damping/mass)
     lasts = the_case%integrator%step_budget/rate
     if (lasts >= the_case%run%duration) return
     call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &

@@ -15,6 +15,7 @@ module points_driver
   use fleet, only: prepare_flow
   use grid, only: grid_t, machine_with, make_grid, point_start, sample_axis, slice_motion
   use kinds, only: int64, int8, wp
+  use machine_facts, only: stops_of
   use map_file, only: map_file_t
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t, type_float64, type_int32
@@ -74,7 +75,7 @@ contains
     call open_list_journey(work%grid, session%the_case, work%journey, error)
     work%block = block_size(work%journey)
     if (.not. allocated(error)) work%ratio = work%journey%moving%machine%drive%ratio
-    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%journey%moving%machine%contact, &
+    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, stops_of(work%journey%moving), &
                                                      session%the_case%laws, work%list, error)
     if (.not. allocated(error)) work%starts = starts_of(work%grid, work%list)
     if (.not. allocated(error)) call check_periods(work%journey%span, shortest_period(work), error)

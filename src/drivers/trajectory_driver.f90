@@ -10,13 +10,14 @@ module trajectory_driver
   use case_type, only: case_t
   use command_line, only: command_t
   use constants, only: unreachable
-  use contact_law, only: barrier_positions
+  use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
+  use machine_facts, only: stops_of
   use motion, only: motion_t
   use motion_columns, only: event_columns, motion_column_t, sample_columns
   use motion_history, only: contact_forces, kinetic_energies
@@ -169,12 +170,14 @@ contains
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: barriers(2)
-    barriers = barrier_positions(moving%machine%contact)
+    type(contact_t) :: stops
+    stops = stops_of(moving)
+    barriers = barrier_positions(stops)
     call schema%add_attribute('', 'drive_period', moving%machine%period)
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
     if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
     if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
-    if (moving%machine%contact%soft) then
+    if (stops%soft) then
       call schema%add_attribute('', 'peak_force', log%peak_force)
       call schema%add_attribute('', 'peak_penetration', log%peak_penetration)
       call schema%add_attribute('', 'contact_work', log%contact_work)
@@ -204,6 +207,7 @@ contains
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
+    type(contact_t) :: stops
     call schema%add_dimension('time', int(log%samples, int64))
     call schema%add_variable('time', type_float64, ['time'], units='s', long_name='time since the start', &
                              data=log%sample_data(1, :log%samples))
@@ -212,7 +216,8 @@ contains
     call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
                              data=log%sample_data(3, :log%samples))
     call add_columns(sample_columns(moving, crank_angle, log), 'time', '', schema)
-    if (moving%machine%contact%soft) then
+    stops = stops_of(moving)
+    if (stops%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
         long_name='force of the barriers on the body', data=contact_forces(moving, log))
     end if

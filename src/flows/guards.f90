@@ -76,7 +76,7 @@ contains
         case (joint_contact)
           if (phase == 0) then
             if (.not. lies_still(machine, flow, state, j)) call gap_guards(machine, state, j, list, count_guards)
-          else
+          else if (joint%upper > joint%lower) then
             call put(list, count_guards, joint_guard_t(j, lets_go, force=-d, held=held))
           end if
         case (joint_soft)

@@ -10,8 +10,8 @@ module linear_flight
   use jointed, only: jointed_t
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
-  use linear_flow, only: first_zero, order
   use mode_flow, only: mode_flow_t
+  use series_zero, only: first_zero, order
   implicit none
   private
 
@@ -124,24 +124,38 @@ contains
   pure subroutine watch_series(place, speed, fraction, watch)
     real(wp), intent(in) :: place(0:), speed(0:), fraction
     type(watch_t), intent(inout) :: watch
-    real(wp) :: at, low, high
-    integer :: i
+    real(wp) :: at, factors(ubound(speed, 1))
+    integer :: k
+    factors = [(k, k=1, size(factors))]
     watch%extremes = [min(watch%extremes(1), place(0), value(place, fraction)), &
                       max(watch%extremes(2), place(0), value(place, fraction))]
     watch%top_speed = max(watch%top_speed, speed(0), value(speed, fraction))
-    if (value(speed, 0.0_wp)*value(speed, fraction) >= 0) return
+    if (watch%wants_speed) then
+      at = zero_of(factors*speed(1:), fraction)
+      watch%top_speed = max(watch%top_speed, value(speed, at))
+    end if
+    at = zero_of(speed, fraction)
+    watch%extremes = [min(watch%extremes(1), value(place, at)), max(watch%extremes(2), value(place, at))]
+  end subroutine watch_series
+
+  !> Where a series changes its sign up to a fraction of a stretch, 0 if it does not.
+  pure real(wp) function zero_of(p, fraction) result(at)
+    real(wp), intent(in) :: p(0:), fraction
+    real(wp) :: low, high
+    integer :: i
+    at = 0
+    if (value(p, 0.0_wp)*value(p, fraction) >= 0) return
     low = 0
     high = fraction
     do i = 1, 40
       at = (low + high)/2
-      if (value(speed, at)*value(speed, low) > 0) then
+      if (value(p, at)*value(p, low) > 0) then
         low = at
       else
         high = at
       end if
     end do
-    watch%extremes = [min(watch%extremes(1), value(place, at)), max(watch%extremes(2), value(place, at))]
-  end subroutine watch_series
+  end function zero_of
 
   !> Gaps that stop closing on a stretch up to a `fraction` of it, from their series; those that fall there have a `root` at it.
   pure subroutine note_misses(list, gap, root, fraction, margin)

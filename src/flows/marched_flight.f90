@@ -11,7 +11,7 @@ module marched_flight
     watched_system_t
   use guards, only: guards_of, joint_guard_t, most_guards
   use jointed, only: joint_soft, joint_t, jointed_t, most_joints
-  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, turning_at
+  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, strength_now, turning_at
   use elementary, only: exponential, logarithm, sine_cosine
   use kinds, only: wp
   use linear_flight, only: watch_t
@@ -64,7 +64,7 @@ contains
     real(wp), intent(in) :: tolerance
     type(marched_flight_t), intent(out) :: flight
     type(path_t) :: path
-    real(wp) :: y(2*machine%n), scale(2*machine%n)
+    real(wp) :: y(2*machine%n), scale(2*machine%n), contact_time, duration
     integer :: n
     n = machine%n
     call guards_of(machine, flow, state, flight%list, flight%count_guards)
@@ -77,8 +77,11 @@ contains
     call set_guards(machine, flow, state, path, flight)
     y(:n) = 0
     y(n + 1:) = state%v(:n)
-    call set_sizes(machine, flight%system, state, y, scale)
-    call begin_march(flight%march, flight%system, tolerance, scale, machine%period, 0.0_wp, y)
+    call set_sizes(machine, flight%system, state, y, scale, contact_time)
+    duration = machine%period
+    ! Held bodies move as they are told: only the force of the contact knows how fast that is.
+    if (size(flow%held) > 0) duration = min(duration, 3*contact_time)
+    call begin_march(flight%march, flight%system, tolerance, scale, duration, 0.0_wp, y)
   end subroutine begin_flight
 
   !> What is integrated.
@@ -174,7 +177,8 @@ contains
     y(:n) = 0
     y(n + 1:) = state%v(:n)
     accelerations = matmul(abs(path%matrix(n + 1:2*n, :)), abs(path%unknowns)) &
-                    + matmul(abs(flight%system%push), abs(forces_at(flight%system, unknowns(flight%system, 0.0_wp, y))))
+                    + matmul(abs(flight%system%push), abs(forces_at(flight%system, unknowns(flight%system, 0.0_wp, y))) &
+                                                      + digits_of_forces(machine, flight%system, state, path%turning))
     associate (system => flight%system)
       allocate (system%guard(size(path%unknowns), flight%count_guards), &
                 system%lean(system%count_joints, flight%count_guards), source=0.0_wp)
@@ -204,6 +208,26 @@ contains
     end associate
   end subroutine set_guards
 
+  !> Sizes of what the forces of the joints that are not linear are small differences of [N]: stiff ones, far from the origin.
+  pure function digits_of_forces(machine, system, state, turning) result(sizes)
+    type(jointed_t), intent(in) :: machine
+    type(marched_t), intent(in) :: system
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp) :: sizes(system%count_joints), s, u, strength, r, by_place, by_speed
+    integer :: j, k
+    k = 0
+    do j = 1, size(machine%joints)
+      if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
+      k = k + 1
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      call strength_now(machine%joints(j), machine%frequency, turning, strength)
+      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, &
+                       by_speed)
+      sizes(k) = abs(by_place)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:machine%n))))
+    end do
+  end function digits_of_forces
+
   !> A margin that depends on displacements and speeds alone is a linear guard.
   pure subroutine take_as_linear(system, g, guard)
     type(marched_t), intent(in) :: system
@@ -218,13 +242,14 @@ contains
   end subroutine take_as_linear
 
   !> Sizes of displacements and speeds below which errors are absolute: shares of those of the motion, digits that the
-  !> coordinates do not have excepted, or those of the contacts that are pressed.
-  pure subroutine set_sizes(machine, system, state, y, scale)
+  !> coordinates do not have excepted, or those of the contacts that are pressed. `contact_time` is that in which their forces
+  !> change [s], huge without one.
+  pure subroutine set_sizes(machine, system, state, y, scale, contact_time)
     type(jointed_t), intent(in) :: machine
     type(marched_t), intent(in) :: system
     type(jointed_state_t), intent(in) :: state
     real(wp), intent(in) :: y(:)
-    real(wp), intent(out) :: scale(:)
+    real(wp), intent(out) :: scale(:), contact_time
     real(wp) :: slope(size(y)), z(2*machine%n + 2 + 2*system%harmonics), length, mass, force, p, u
     integer :: k, n
     n = machine%n
@@ -236,6 +261,7 @@ contains
     scale(:n) = max(length, abs(state%q(:n)))
     scale(n + 1:) = length*machine%frequency
     length = huge(length)
+    contact_time = huge(contact_time)
     z = unknowns(system, 0.0_wp, y)
     do k = 1, system%count_joints
       if (system%joints(k)%kind /= joint_soft) cycle
@@ -249,7 +275,9 @@ contains
         if (.not. p < length .or. .not. p > tiny(p)) cycle
         length = p
         scale(:n) = p
-        scale(n + 1:) = max(u, sqrt(law%stiffness/mass*exponential((law%exponent + 1)*logarithm(p))))
+        scale(n + 1:) = sqrt(law%stiffness/mass*exponential((law%exponent + 1)*logarithm(p)))
+        contact_time = p/max(maxval(scale(n + 1:)), tiny(p))
+        scale(n + 1:) = max(u, scale(n + 1:))
       end associate
     end do
   end subroutine set_sizes

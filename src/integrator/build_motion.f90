@@ -4,7 +4,6 @@
 !> From laws to a machine ready to move, of one body, two, or several.
 module build_motion
   use build_jointed, only: is_jointed, jointed_of
-  use constants, only: two_pi
   use errors, only: error_t, fail
   use jointed, only: jointed_t
   use jointed_motion, only: prepare_jointed
@@ -14,7 +13,7 @@ module build_motion
   use motion_state, only: flight_adaptive, options_t
   use oscillator, only: build_oscillator, oscillator_t
   use pair, only: build_pair, is_pair, pair_t
-  use pair_modes, only: prepare_pair
+  use pair_as_structure, only: flown_structure
   use status, only: exit_bad_case
   implicit none
   private
@@ -23,55 +22,52 @@ module build_motion
 
 contains
 
-  !> The machine that `laws` describe. Two bodies are in `moving%pair`; `moving%machine` then has their section,
-  !> contact and stops, and nothing that moves.
+  !> The machine that `laws` describe.
   pure subroutine machine_of(laws, options, moving, error)
     type(law_choice_t), intent(in) :: laws(:)
     type(options_t), intent(in) :: options
     type(motion_t), intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
     type(oscillator_t) :: machine
-    type(pair_t) :: pair
+    type(jointed_t) :: structure
     if (is_jointed(laws)) then
-      call jointed_machine_of(laws, options, moving, error)
-      return
-    end if
-    if (.not. is_pair(laws)) then
+      call jointed_of(laws, structure, error)
+    else if (is_pair(laws)) then
+      if (options%flight == flight_adaptive) then
+        call fail(error, exit_bad_case, 'integrator.flight = "adaptive": two bodies are flown in closed form; use "auto"')
+        return
+      end if
+      call structure_of_two(laws, structure, error)
+    else
       call build_oscillator(laws, machine, error)
       if (.not. allocated(error)) call prepare_motion(machine, options, moving, error)
       return
     end if
-    call build_pair(laws, pair, error)
-    if (allocated(error)) return
-    if (options%flight == flight_adaptive) then
-      call fail(error, exit_bad_case, 'integrator.flight = "adaptive": two bodies are flown in closed form; use "auto"')
-      return
-    end if
-    moving%options = options
-    moving%machine%mass = pair%driven_mass
-    moving%machine%period = pair%period
-    moving%machine%drive_frequency = two_pi/pair%period
-    moving%machine%contact = pair%contact
-    allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%pair)
-    call prepare_pair(pair, options, moving%pair)
+    if (.not. allocated(error)) call set_structure(structure, options, moving)
   end subroutine machine_of
 
-  !> A machine of several bodies, in `moving%jointed`; `moving%machine` has its section, and the mass that is watched.
-  pure subroutine jointed_machine_of(laws, options, moving, error)
+  !> The structure of two bodies that friction couples.
+  pure subroutine structure_of_two(laws, machine, error)
     type(law_choice_t), intent(in) :: laws(:)
+    type(jointed_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(pair_t) :: pair
+    call build_pair(laws, pair, error)
+    if (.not. allocated(error)) call flown_structure(pair, machine, error)
+  end subroutine structure_of_two
+
+  !> A machine of several bodies, in `moving%jointed`; `moving%machine` has its section, and the mass that is watched.
+  pure subroutine set_structure(machine, options, moving)
+    type(jointed_t), intent(in) :: machine
     type(options_t), intent(in) :: options
     type(motion_t), intent(out) :: moving
-    type(error_t), allocatable, intent(out) :: error
-    type(jointed_t) :: machine
-    call jointed_of(laws, machine, error)
-    if (allocated(error)) return
     moving%options = options
     moving%machine%mass = machine%mass(machine%watched, machine%watched)
     moving%machine%period = machine%period
     moving%machine%drive_frequency = machine%frequency
     allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%jointed)
     call prepare_jointed(machine, options, moving%jointed)
-  end subroutine jointed_machine_of
+  end subroutine set_structure
 
   !> Period of the section of the machine that `laws` describe [s].
   pure subroutine period_of(laws, period, error)

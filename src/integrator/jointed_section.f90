@@ -19,6 +19,9 @@ module jointed_section
   public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed, &
     watched_speed, free_jointed, keeps_clear
 
+  !> Sums of the elements of orthonormal directions that are rounding.
+  real(wp), parameter :: nothing = 1e-9_wp
+
 contains
 
   !> Number of coordinates on the section.
@@ -127,7 +130,8 @@ contains
     end do
   end function is_allowed
 
-  !> The state on the section with the coordinates `point`; what they leave open is zero.
+  !> The state on the section with the coordinates `point`; what they leave open is zero: of two bodies that nothing ties to the
+  !> ground place and velocity of the driving one.
   pure function jointed_at(moving, point) result(state)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
@@ -140,6 +144,12 @@ contains
     speeds = size(moving%speeds, 2)
     q = matmul(moving%directions, point(:places))
     v = matmul(moving%speeds, point(places + 1:places + speeds))
+    if (allocated(moving%machine%driver)) then
+      associate (at => moving%machine%driver%at)
+        if (at > 0 .and. all(abs(sum(moving%directions, 1)) < nothing)) q = q - q(at)
+        if (at > 0 .and. all(abs(sum(moving%speeds, 1)) < nothing)) v = v - v(at)
+      end associate
+    end if
     call start_jointed(moving, q, v, 0.0_wp, state, ok)
     turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
     k = places + speeds
@@ -161,7 +171,7 @@ contains
   pure function jointed_point(moving, state) result(point)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(in) :: state
-    real(wp) :: point(most_coordinates), s, u
+    real(wp) :: point(most_coordinates), q(moving%machine%n), s, u
     complex(wp) :: turning(moving%harmonics)
     integer :: n, places, speeds, j, k
     point = 0
@@ -169,7 +179,9 @@ contains
     n = moving%machine%n
     places = size(moving%directions, 2)
     speeds = size(moving%speeds, 2)
-    point(:places) = matmul(transpose(moving%directions), state%q(:n))
+    q = state%q(:n)
+    if (allocated(moving%machine%driver)) q = q - moving%machine%driver%running*state%clock
+    point(:places) = matmul(transpose(moving%directions), q)
     point(places + 1:places + speeds) = matmul(transpose(moving%speeds), state%v(:n))
     k = places + speeds
     turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)

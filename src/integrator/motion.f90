@@ -24,7 +24,6 @@ module motion
     sample_due, sample_time, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
-  use pair_modes, only: pair_motion_t
   use pressed_flight, only: fly_pressed_body, prepare_pressed, pressed_flow_t
   use rest, only: chatter_time, hold, mode_from_rest
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
@@ -54,8 +53,6 @@ module motion
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
     real(wp) :: layer = 0
-    !> Two bodies, which have an event loop of their own.
-    type(pair_motion_t), allocatable :: pair
     !> The section is where the motion turns round, in the place of a time.
     logical :: by_event = .false.
     !> Several bodies with joints.

@@ -6,6 +6,7 @@
 module motion_columns
   use jointed, only: joint_section, jointed_t
   use kinds, only: wp
+  use machine_facts, only: has_driver
   use motion, only: motion_t
   use motion_history, only: foot_positions
   use motion_state, only: log_t
@@ -31,10 +32,10 @@ contains
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(motion_column_t), allocatable :: columns(:)
-    if (allocated(moving%jointed)) then
-      columns = coordinate_columns(moving%jointed%machine, log)
-    else if (allocated(moving%pair)) then
+    if (has_driver(moving)) then
       columns = driver_columns(log%sample_driver(:, :log%samples))
+    else if (allocated(moving%jointed)) then
+      columns = coordinate_columns(moving%jointed%machine, log)
     else
       allocate (columns(1))
       call set_column(columns(1), 'drive', 'm', 'position of the foot of the spring', foot_positions(moving, crank_angle, log))
@@ -46,10 +47,10 @@ contains
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     type(motion_column_t), allocatable :: columns(:)
-    if (allocated(moving%jointed)) then
-      columns = joint_columns(moving%jointed%machine, log)
-    else if (allocated(moving%pair)) then
+    if (has_driver(moving)) then
       columns = driver_columns(log%event_driver(:, :log%events))
+    else if (allocated(moving%jointed)) then
+      columns = joint_columns(moving%jointed%machine, log)
     else
       allocate (columns(0))
     end if

@@ -7,9 +7,9 @@ module motion_history
   use drive_law, only: foot_motion
   use jointed, only: integral_of
   use kinds, only: wp
+  use machine_facts, only: has_driver, stops_of
   use motion, only: motion_t
   use motion_state, only: log_t
-  use pair, only: driven_by_motion
   implicit none
   private
 
@@ -24,10 +24,10 @@ contains
     real(wp) :: forces(log%samples)
     real(wp), allocatable :: place(:, :)
     place = log%sample_data(2:3, :log%samples)
-    if (allocated(moving%pair)) then
-      if (moving%pair%machine%carried) place = place - log%sample_driver(:, :log%samples)
+    if (has_driver(moving)) then
+      if (moving%jointed%machine%driver%carries) place = place - log%sample_driver(:, :log%samples)
     end if
-    forces = force_on_body(contact_at_speed(moving%machine%contact, log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
+    forces = force_on_body(contact_at_speed(stops_of(moving), log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
   end function contact_forces
 
   !> Positions of the foot of the spring [m] at the samples of a motion that began at `crank_angle` [rad].
@@ -42,7 +42,7 @@ contains
     end do
   end function foot_positions
 
-  !> Kinetic energy [J] at the samples: that of a driving body whose motion is given is left out.
+  !> Kinetic energy [J] at the samples: that of a body whose motion is given is left out.
   pure function kinetic_energies(moving, log) result(kinetic)
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log
@@ -60,10 +60,6 @@ contains
       return
     end if
     kinetic = 0.5_wp*moving%machine%mass*log%sample_data(3, :log%samples)**2
-    if (.not. allocated(moving%pair)) return
-    if (moving%pair%machine%drive /= driven_by_motion) then
-      kinetic = kinetic + 0.5_wp*moving%pair%machine%mass*log%sample_driver(2, :log%samples)**2
-    end if
   end function kinetic_energies
 
 end module motion_history

@@ -5,7 +5,8 @@
 !> Coordinates are the place of the driving body, where it is free and anything ties it to the ground, and that of the driven one,
 !> relative to the driving one where that carries the stops or nothing ties either to the ground.
 module pair_as_structure
-  use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion
+  use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, index_of, &
+    set_sizes
   use constants, only: two_pi, unreachable
   use elementary, only: sine_cosine
   use control, only: add_controller, add_impulse
@@ -13,13 +14,11 @@ module pair_as_structure
   use jointed, only: controller_t, impulse_t, joint_contact, joint_friction, joint_soft, joint_t, jointed_t, wave_t
   use kinds, only: wp
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion, pair_t
-  use pair_modes, only: pair_motion_t, pair_state_t
-  use pair_motion, only: start_pair
   use status, only: exit_bad_case
   implicit none
   private
 
-  public :: structure_of_pair, start_as_structure, pair_of_structure, flown_structure, flown_start
+  public :: structure_of_pair, start_as_structure, start_of_section, flown_structure
 
 contains
 
@@ -63,7 +62,7 @@ contains
   end subroutine structure_of_pair
 
   !> The structure of any two bodies, for flights: coordinates are the places of both on the ground, or of the driven one where the
-  !> motion of the other is given, relative to it where that carries the stops.
+  !> motion of the other is given.
   pure subroutine flown_structure(pair, machine, error)
     type(pair_t), intent(in) :: pair
     type(jointed_t), intent(out) :: machine
@@ -82,14 +81,7 @@ contains
     call add_body(machine, 'driving', pair%mass, 0.0_wp)
     call add_body(machine, 'driven', pair%driven_mass, 0.0_wp)
     machine%watched = 2
-    if (given .and. pair%carried) then
-      machine%mass(1, 1) = pair%mass + pair%driven_mass
-      machine%mass(1, 2) = pair%driven_mass
-      machine%mass(2, 1) = pair%driven_mass
-      call add_joints(pair, driven, driven, machine)
-    else
-      call add_joints(pair, driven - driving, merge(driven - driving, driven, pair%carried), machine)
-    end if
+    call add_joints(pair, driven - driving, merge(driven - driving, driven, pair%carried), machine)
     if (given) then
       call give_motion(machine, 'driving', wave)
     else
@@ -104,26 +96,37 @@ contains
       end if
     end if
     call finish(machine, error)
-    if (allocated(error) .or. .not. abs(pair%blow) > 0) return
+    if (allocated(error)) return
+    call name_driver(pair, wave, machine)
+    if (.not. abs(pair%blow) > 0) return
     call add_impulse(machine, impulse_t(row=merge(1.0_wp, 0.0_wp, machine%names == 'driven'), amount=pair%blow, &
                                         time=pair%blow_time))
   end subroutine flown_structure
 
-  !> Places and velocities (rows) of the coordinates of `flown_structure` at a start of both bodies, the drive at `angle` [rad].
-  pure function flown_start(pair, driven, driver, angle) result(start)
+  !> What is told of the driving body, and where it starts.
+  pure subroutine name_driver(pair, wave, machine)
     type(pair_t), intent(in) :: pair
-    real(wp), intent(in) :: driven(2), driver(2), angle
-    real(wp), allocatable :: start(:, :)
-    if (pair%drive == driven_by_motion) then
-      start = reshape(driven, [2, 1])
-      if (pair%carried) start(:, 1) = driven - given_motion(pair, angle)
-    else
-      start = reshape([driver, driven], [2, 2])
-      if (abs(pair%integral) > 0 .and. .not. pair%sample_time > 0 .and. pair%drive == driven_by_controller) then
-        start = reshape([driver, driven, 0.0_wp, 0.0_wp], [2, 3])
+    type(wave_t), intent(in) :: wave
+    type(jointed_t), intent(inout) :: machine
+    allocate (machine%driver)
+    associate (driver => machine%driver)
+      driver%at = index_of(machine, 'driving')
+      driver%carries = pair%carried
+      allocate (driver%running(machine%n), driver%push(machine%n), source=0.0_wp)
+      if (driver%at == 0) then
+        driver%motion = wave
+        if (pair%carried) driver%stops_run = pair%velocity
+        call set_sizes(machine, pair%driven_mass*(abs(pair%amplitude) + abs(pair%quadrature))*pair%frequency**2)
+        return
       end if
-    end if
-  end function flown_start
+      machine%start(:, driver%at) = [pair%driver_x0, pair%driver_v0]
+      driver%rest_energy = 0.5_wp*pair%stiffness*pair%free_length**2
+      if (pair%drive == driven_by_force) driver%push(driver%at) = pair%mean
+      if (pair%drive /= driven_by_controller) return
+      driver%running(driver%at) = pair%velocity
+      if (pair%carried) driver%running(machine%watched) = pair%velocity
+    end associate
+  end subroutine name_driver
 
   !> What a structure cannot be, or what has no section by the drive.
   pure subroutine refuse(pair, error)
@@ -153,12 +156,14 @@ contains
     real(wp), intent(in) :: friction_row(:), contact_row(:)
     type(jointed_t), intent(inout) :: machine
     type(joint_t) :: friction, contact
-    if (pair%friction > 0) then
+    ! Stops without room leave friction along them nothing to do.
+    if (pair%friction > 0 .and. .not. (pair%carried .and. .not. pair%contact%soft .and. .not. pair%upper > pair%lower)) then
       friction%name = 'body.friction'
       friction%kind = joint_friction
       friction%row = friction_row
       friction%friction%kinetic = pair%friction
-      friction%friction%break_away = pair%friction
+      ! A tie of forces sticks.
+      friction%friction%break_away = pair%friction*(1 + 32*epsilon(1.0_wp))
       call add_joint(machine, friction)
     end if
     if (pair%upper >= unreachable .and. pair%lower <= -unreachable) return
@@ -195,22 +200,22 @@ contains
     if (pair%drive == driven_by_force .and. .not. floats(pair)) other = [other, driver, driven]
   end function start_as_structure
 
-  !> The state of two bodies on the section from places `q` and velocities `v` of their structure.
-  pure type(pair_state_t) function pair_of_structure(moving, q, v) result(state)
-    type(pair_motion_t), intent(in) :: moving
+  !> The start, see `start_strobe`, of two bodies on the section with the places `q` and velocities `v` of their structure.
+  pure function start_of_section(pair, q, v) result(start)
+    type(pair_t), intent(in) :: pair
     real(wp), intent(in) :: q(:), v(:)
+    real(wp), allocatable :: start(:)
     real(wp) :: driver(2), driven(2)
-    associate (pair => moving%machine)
-      driver = 0
-      if (pair%drive == driven_by_motion) then
-        driver = given_motion(pair, 0.0_wp)
-      else if (.not. floats(pair)) then
-        driver = [q(1), v(1)]
-      end if
-      driven = [q(size(q)), v(size(v))]
-      if (pair%carried .or. floats(pair)) driven = driven + driver
-    end associate
-    state = start_pair(moving, driven(1), driven(2), driver, 0.0_wp)
-  end function pair_of_structure
+    driver = 0
+    if (pair%drive == driven_by_motion) then
+      driver = given_motion(pair, 0.0_wp)
+    else if (.not. floats(pair)) then
+      driver = [q(1), v(1)]
+    end if
+    driven = [q(size(q)), v(size(v))]
+    if (pair%carried .or. floats(pair)) driven = driven + driver
+    start = [driven, 0.0_wp]
+    if (pair%drive == driven_by_force) start = [start, driver, driven]
+  end function start_of_section
 
 end module pair_as_structure

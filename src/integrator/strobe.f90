@@ -1,13 +1,13 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The one interface to machines of one body, two (friction pairs) or several with joints: a state that moves from section to
-!> section, and the coordinates that fix it there. Which of the three a machine is, is asked here, in `machine_facts` and in the
+!> The one interface to machines of one body or of several with joints: a state that moves from section to section, and the
+!> coordinates that fix it there. Which of the two a machine is, is asked here, in `machine_facts` and in the
 !> other modules of this folder; nowhere above it. With `by_event` the section is where the motion of a machine without a clock
 !> turns round, see `turn_section`.
 module strobe
   use body_section, only: body_at, body_point, coordinates_of_body, resumed_body, scales_of_body, start_of_body
-  use contact_law, only: barrier_positions, contact_t
+  use contact_law, only: barrier_positions
   use energy, only: energy_of_body, record_with_book
   use jointed_log, only: energy_of_jointed, log_sample, watched_state
   use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
@@ -15,18 +15,15 @@ module strobe
     scales_of_jointed, start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
+  use machine_facts, only: has_driver
   use motion, only: advance, advance_period, motion_t
-  use motion_state, only: log_t, record_sample, reset_tally, state_t, take_turns, tally_t
-  use pair_flight, only: body_state, driver_of, energy_of
-  use pair_modes, only: pair_state_t
-  use pair_motion, only: advance_pair, advance_pair_period
-  use pair_section, only: coordinates_of_pair, free_pair, pair_at, pair_point, resumed_pair, scales_of_pair, start_of_pair, &
-    tells_what_follows
+  use motion_state, only: log_t, reset_tally, state_t, take_turns, tally_t
   use section_size, only: most_coordinates
   use text, only: to_text
   use timed_actions, only: acts_on_time
   use turn_section, only: advance_body_to_turn, advance_jointed_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
     jointed_at_turn, jointed_turn_point, scales_of_turn
+  use two_bodies, only: driver_of => driver_now
   implicit none
   private
 
@@ -34,10 +31,9 @@ module strobe
     section_point, section_state, scales_of, without_stops, stays_clear, speed_number, advance_strobe, advance_strobe_period, &
     advance_past_event, begin_tally, driver_now, energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
 
-  !> `state` is that of the body, of the driven one of two, or of the watched one of several.
+  !> `state` is that of the body, or of the watched one of several.
   type :: strobe_t
     type(state_t) :: state
-    type(pair_state_t) :: pair
     type(jointed_state_t) :: jointed
     !> Time from the last section to this one [s].
     real(wp) :: lasted = 0
@@ -50,14 +46,9 @@ contains
     type(motion_t), intent(in) :: moving
     type(motion_t), intent(out) :: free
     integer, intent(out) :: places
-    logical :: found
     places = 0
     free = moving
     if (allocated(moving%jointed)) call free_jointed(moving%jointed, free%jointed, places)
-    if (.not. allocated(moving%pair)) return
-    free%machine%contact = contact_t()
-    call free_pair(moving%pair, free%pair, found)
-    if (found) places = 1
   end subroutine without_stops
 
   !> Number of a coordinate that is a velocity, of machines of several bodies.
@@ -67,8 +58,8 @@ contains
     if (allocated(moving%jointed)) speed_number = size(moving%jointed%directions, 2) + 1
   end function speed_number
 
-  !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of two bodies, which note
-  !> by how much they miss their stops, the tally knows.
+  !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of one body the tally
+  !> knows by how much it missed them.
   pure logical function stays_clear(moving, strobe, tally, periods, distance)
     type(motion_t), intent(in) :: moving
     class(strobe_t), intent(in) :: strobe
@@ -89,8 +80,6 @@ contains
       n = coordinates_of_turn(moving)
     else if (allocated(moving%jointed)) then
       n = coordinates_of_jointed(moving%jointed)
-    else if (allocated(moving%pair)) then
-      n = coordinates_of_pair(moving%pair)
     else
       n = coordinates_of_body(moving)
     end if
@@ -102,7 +91,6 @@ contains
     type(motion_t), intent(in) :: moving
     has_section = .true.
     if (allocated(moving%jointed)) has_section = fits_section(moving%jointed)
-    if (allocated(moving%pair)) has_section = tells_what_follows(moving%pair)
   end function has_section
 
   !> Why it does not, '' if it does.
@@ -117,9 +105,9 @@ contains
       if (acts_on_time(moving%jointed%machine)) text = 'with impulses, or samples of a controller, the state at crank angle 0 '// &
                                                        'does not tell what follows'
     end if
-    if (allocated(moving%pair)) text = 'with '//trim(merge('drive.sample_time', 'body.blow        ', &
-                                                           moving%pair%machine%sample_time > 0))// &
-                                       ' the state at crank angle 0 does not tell what follows'
+    if (has_driver(moving)) text = 'with '//trim(merge('body.blow        ', 'drive.sample_time', &
+                                                       allocated(moving%jointed%machine%impulses)))// &
+                                   ' the state at crank angle 0 does not tell what follows'
   end function section_obstacle
 
   !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
@@ -131,9 +119,6 @@ contains
     if (allocated(moving%jointed)) then
       strobe%jointed = start_of_jointed(moving%jointed, start(1), start(2), start(3), start(4:))
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-    else if (allocated(moving%pair)) then
-      strobe%pair = start_of_pair(moving%pair, start)
-      strobe%state = body_state(strobe%pair)
     else
       strobe%state = start_of_body(moving, start)
     end if
@@ -144,15 +129,13 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
     type(strobe_t) :: strobe
-    real(wp) :: x, barriers(2)
+    real(wp) :: barriers(2)
     if (allocated(moving%jointed)) then
       strobe = start_strobe(moving, start)
       start_is_allowed = .not. any(strobe%jointed%q /= strobe%jointed%q)
     else
-      x = start(1)
-      if (allocated(moving%pair)) x = x - merge(moving%pair%machine%driver_x0, 0.0_wp, moving%pair%machine%carried)
       barriers = barrier_positions(moving%machine%contact)
-      start_is_allowed = x <= barriers(1) .and. x >= barriers(2)
+      start_is_allowed = start(1) <= barriers(1) .and. start(1) >= barriers(2)
     end if
   end function start_is_allowed
 
@@ -167,14 +150,9 @@ contains
       strobe = resume_jointed(moving, before, angle)
       return
     end if
-    if (.not. allocated(moving%pair) .or. before%pair%mode == 0) then
-      strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
-      if (allocated(moving%pair) .or. allocated(moving%jointed) .or. before%state%mode == 0) return
-      strobe%state = resumed_body(moving, before%state, angle)
-      return
-    end if
-    strobe%pair = resumed_pair(moving%pair, before%pair, angle)
-    strobe%state = body_state(strobe%pair)
+    strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
+    if (allocated(moving%jointed) .or. before%state%mode == 0) return
+    strobe%state = resumed_body(moving, before%state, angle)
   end function resume_strobe
 
   !> The same of several bodies: all keep their places and velocities.
@@ -184,8 +162,11 @@ contains
     real(wp), intent(in) :: angle
     type(strobe_t) :: strobe
     logical :: ok
+    type(jointed_state_t) :: from
+    from = before%jointed
     associate (n => moving%jointed%machine%n)
-      call start_jointed(moving%jointed, before%jointed%q(:n), before%jointed%v(:n), angle, strobe%jointed, ok)
+      if (has_driver(moving)) from%q(:n) = from%q(:n) - moving%jointed%machine%driver%running*from%clock
+      call start_jointed(moving%jointed, from%q(:n), from%v(:n), angle, strobe%jointed, ok)
     end associate
     strobe%jointed%slider = before%jointed%slider
     strobe%jointed%integral = before%jointed%integral
@@ -205,9 +186,6 @@ contains
         strobe%jointed = jointed_at(moving%jointed, point)
       end if
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-    else if (allocated(moving%pair)) then
-      strobe%pair = pair_at(moving%pair, point)
-      strobe%state = body_state(strobe%pair)
     else if (moving%by_event) then
       strobe%state = body_at_turn(moving, point(1))
     else
@@ -225,8 +203,6 @@ contains
       point = turn_point(moving, strobe)
     else if (allocated(moving%jointed)) then
       point = jointed_point(moving%jointed, strobe%jointed)
-    else if (allocated(moving%pair)) then
-      point = pair_point(moving%pair, strobe%pair)
     else
       associate (n => coordinates_of_body(moving))
         point(:n) = body_point(moving, strobe%state)
@@ -254,8 +230,6 @@ contains
       scales = scales_of_turn(moving, half_range)
     else if (allocated(moving%jointed)) then
       scales = scales_of_jointed(moving%jointed, half_range)
-    else if (allocated(moving%pair)) then
-      scales(:coordinates_of_pair(moving%pair)) = scales_of_pair(moving%pair, half_range)
     else
       scales(:coordinates_of_body(moving)) = scales_of_body(moving, half_range)
     end if
@@ -278,9 +252,6 @@ contains
     if (allocated(moving%jointed)) then
       call advance_jointed(moving%jointed, strobe%jointed, time_end, tally, reason, log)
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-    else if (allocated(moving%pair)) then
-      call advance_pair(moving%pair, strobe%pair, time_end, tally, reason, log)
-      strobe%state = body_state(strobe%pair)
     else
       call advance(moving, strobe%state, time_end, tally, reason, log)
     end if
@@ -316,9 +287,6 @@ contains
     if (allocated(moving%jointed)) then
       call advance_jointed_period(moving%jointed, strobe%jointed, tally, reason, log)
       strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-    else if (allocated(moving%pair)) then
-      call advance_pair_period(moving%pair, strobe%pair, tally, reason, log)
-      strobe%state = body_state(strobe%pair)
     else
       call advance_period(moving, strobe%state, tally, reason, log)
       call take_turns(moving%machine%turn, strobe%state, tally)
@@ -343,7 +311,6 @@ contains
   pure type(strobe_t) function copy_of(strobe) result(copy)
     class(strobe_t), intent(in) :: strobe
     copy%state = strobe%state
-    copy%pair = strobe%pair
     copy%jointed = strobe%jointed
     copy%lasted = strobe%lasted
   end function copy_of
@@ -366,7 +333,7 @@ contains
     type(motion_t), intent(in) :: moving
     class(strobe_t), intent(in) :: strobe
     type(tally_t), intent(inout) :: tally
-    call reset_tally(tally, strobe%state, allocated(moving%pair))
+    call reset_tally(tally, strobe%state, has_driver(moving))
   end subroutine begin_tally
 
   !> Position and velocity of the driving body of two [m, m/s], zeros without one.
@@ -375,7 +342,7 @@ contains
     class(strobe_t), intent(in) :: strobe
     real(wp) :: driver(2)
     driver = 0
-    if (allocated(moving%pair)) driver = driver_of(strobe%pair)
+    if (has_driver(moving)) driver = driver_of(moving%jointed%machine, strobe%jointed)
   end function driver_now
 
   !> Energy of the machine [J].
@@ -384,8 +351,6 @@ contains
     class(strobe_t), intent(in) :: strobe
     if (allocated(moving%jointed)) then
       energy = energy_of_jointed(moving%jointed%machine, strobe%jointed)
-    else if (allocated(moving%pair)) then
-      energy = energy_of(moving%pair, strobe%pair)
     else
       energy = energy_of_body(moving%machine, strobe%state)
     end if
@@ -401,8 +366,6 @@ contains
     if (.not. sampled) return
     if (allocated(moving%jointed)) then
       call log_sample(moving%jointed%machine, strobe%jointed, log)
-    else if (allocated(moving%pair)) then
-      call record_sample(log, strobe%state, driver_of(strobe%pair), log%book)
     else
       call record_with_book(moving%machine, strobe%state, log)
     end if

@@ -31,8 +31,6 @@ contains
     type(motion_t), intent(in) :: moving
     if (allocated(moving%jointed)) then
       has_no_clock = moving%jointed%section > 0 .and. fits_section(moving%jointed)
-    else if (allocated(moving%pair)) then
-      has_no_clock = .false.
     else
       associate (machine => moving%machine)
         has_no_clock = machine%turn > 0 .and. .not. machine%drive%ratio > 0 .and. .not. machine%drive%interval > 0 .and. &

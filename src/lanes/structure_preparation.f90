@@ -60,7 +60,7 @@ contains
       m%chatter_time = longest_chatter*machine%period
       m%burst_gap = burst_gap*machine%period
       m%shortest = 10*m%burst_gap
-      m%misses = merge(1, 0, moving%drifts)
+      m%misses = merge(1, 0, moving%notes_misses)
       do j = 1, size(machine%joints)
         call set_joint(machine, j, m%joint(j))
         if (.not. never_pulls(machine%joints(j))) cycle
@@ -90,7 +90,7 @@ contains
       mode%close = taylor_span/fastest
       do l = 1, panel_lengths
         mode%panel(l) = coarse/fastest*stretches(l)
-        if (moving%drifts) mode%panel(l) = most_radians/fastest
+        if (moving%notes_misses) mode%panel(l) = most_radians/fastest
         mode%steepest(l) = (coarse/mode%panel(l))**6
         if (l == panel_lengths) mode%steepest(l) = huge(1.0_wp)
         do k = 1, harmonics
@@ -140,7 +140,7 @@ contains
     type(joint_t), intent(in) :: joint
     associate (drop => joint%friction%break_away - joint%friction%kinetic)
       has_plain_level = joint%friction%kinetic > 0 .and. .not. joint%friction%damping > 0 .and. &
-        (abs(drop) <= 0 .or. drop > 1e-6_wp*joint%friction%kinetic)
+        (abs(drop) <= rounding*joint%friction%kinetic .or. drop > 1e-6_wp*joint%friction%kinetic)
     end associate
   end function has_plain_level
 
@@ -159,7 +159,7 @@ contains
         into%upper = joint%friction%break_away
         into%lower = -joint%friction%break_away
         into%kinetic = joint%friction%kinetic
-        into%even = merge(1, 0, joint%friction%break_away <= joint%friction%kinetic)
+        into%even = merge(1, 0, joint%friction%break_away <= joint%friction%kinetic*(1 + rounding))
         into%tie = rounding*max(machine%force_scale, into%upper)
         return
       end if

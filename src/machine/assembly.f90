@@ -17,7 +17,7 @@ module assembly
   implicit none
   private
 
-  public :: add_body, add_link, add_joint, add_force, give_motion, move_surface, finish, row_between, index_of
+  public :: add_body, add_link, add_joint, add_force, give_motion, move_surface, finish, set_sizes, row_between, index_of
 
   character(len=*), parameter, public :: ground = 'ground'
 
@@ -218,7 +218,7 @@ contains
     else
       machine%frequency = two_pi
     end if
-    call set_sizes(machine)
+    call set_sizes(machine, 0.0_wp)
   end subroutine finish
 
   !> Takes a body whose motion is given out of the coordinates: its springs and dampers become forces, its joints get an
@@ -375,12 +375,13 @@ contains
     machine%joints(j)%friction%damping = 0
   end subroutine take_viscous
 
-  !> Sizes of forces, speeds and lengths for rounding.
-  pure subroutine set_sizes(machine)
+  !> Sizes of forces, speeds and lengths for rounding; `inertia` is the force that surfaces which move give bodies [N].
+  pure subroutine set_sizes(machine, inertia)
     type(jointed_t), intent(inout) :: machine
+    real(wp), intent(in) :: inertia
     real(wp) :: accelerations, largest
     integer :: i
-    largest = sum(abs(machine%load)) + sum(abs(machine%force))
+    largest = inertia + sum(abs(machine%load)) + sum(abs(machine%force))
     do i = 1, size(machine%joints)
       associate (joint => machine%joints(i))
         if (joint%kind == joint_friction .or. joint%kind == joint_elastic) largest = largest + joint%friction%break_away

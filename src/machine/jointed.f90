@@ -72,6 +72,25 @@ module jointed
     real(wp) :: amount = 0, time = 0
   end type impulse_t
 
+  !> A body that drives the watched one through friction and stops alone: what is counted and written down is then told of two
+  !> bodies. They stick where the one does not slide over the other; the energy is that of bodies and springs, without that of
+  !> the drive and of what presses a stop.
+  type, public :: driver_t
+    !> Its coordinate; 0 where its motion is given.
+    integer :: at = 0
+    type(wave_t) :: motion
+    !> The stops are its own.
+    logical :: carries = .false.
+    !> Velocity at which its stops run on [m/s]: the watched coordinate is then counted from where they have come to by the last
+    !> section.
+    real(wp) :: stops_run = 0
+    !> Velocities at which coordinates run on after the reference of a controller [m/s].
+    real(wp), allocatable :: running(:)
+    !> Constant force of the drive [N], and the energy of the spring where all coordinates are zero [J].
+    real(wp), allocatable :: push(:)
+    real(wp) :: rest_energy = 0
+  end type driver_t
+
   type, public :: jointed_t
     !> Number of coordinates.
     integer :: n = 0
@@ -93,6 +112,7 @@ module jointed
     type(controller_t), allocatable :: controller
     !> In the order of their times.
     type(impulse_t), allocatable :: impulses(:)
+    type(driver_t), allocatable :: driver
     integer :: together = together_newton
     !> The coordinate that extremes refer to.
     integer :: watched = 1

@@ -48,7 +48,10 @@ contains
       gamma(count_touching) = -side(j)*u
       speed_before(j) = gamma(count_touching)
       e(count_touching) = 0
-      if (.not. plastic) e(count_touching) = restitution_at(machine%joints(j)%contact, abs(u))
+      ! Between stops without room nothing rebounds.
+      associate (joint => machine%joints(j))
+        if (.not. plastic .and. joint%upper > joint%lower) e(count_touching) = restitution_at(joint%contact, abs(u))
+      end associate
     end do
     do i = 1, count_touching
       do k = 1, count_touching

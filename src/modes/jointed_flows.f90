@@ -23,8 +23,9 @@ module jointed_flows
     real(wp), allocatable :: directions(:, :)
     !> Those of the velocities.
     real(wp), allocatable :: speeds(:, :)
-    !> One position counts, for the stops alone: motions without impacts are families, one at every place between them.
-    logical :: drifts = .false.
+    !> By how much stops are missed is noted: of two bodies, and where one position counts, for the stops alone, as motions without
+    !> impacts are then families, one at every place between them.
+    logical :: notes_misses = .false.
     integer :: harmonics = 0
     !> Number of the joint that is the section of a machine without a clock; 0: the section is a time.
     integer :: section = 0
@@ -50,8 +51,9 @@ contains
     moving%speeds = directions(:machine%n, :places)
     if (machine%driven .and. machine%linear .and. options%flight /= flight_adaptive .and. size(moving%directions, 2) == 1) then
       call directions_of(without_contacts(machine), directions, places)
-      moving%drifts = places == 0
+      moving%notes_misses = places == 0
     end if
+    if (allocated(machine%driver)) moving%notes_misses = any(is_stop(machine%joints%kind))
     joints = size(machine%joints)
     if (.not. machine%driven .and. .not. machine%section_time > 0) then
       moving%section = joints + 1

@@ -6,16 +6,17 @@ module jointed_log
   use control, only: active_force, bodies_of
   use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
-  use jointed, only: joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
+  use jointed, only: joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
   use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, strength_now, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, record_event, record_sample, &
     sample_due, sample_time, state_t
+  use two_bodies, only: contact_at, driver_now, mode_of_two
   implicit none
   private
 
-  public :: energy_of_jointed, watched_state, log_flight, log_event, log_sample, book_change
+  public :: energy_of_jointed, watched_state, log_flight, log_event, log_sample, record_change, book_change
 
   !> Gauss-Legendre nodes on (0, 1) and weights.
   real(wp), parameter :: node(4) = [0.069431844202973712388026755553595_wp, 0.33000947820757186759866712044838_wp, &
@@ -28,7 +29,8 @@ module jointed_log
 
 contains
 
-  !> Energy of the bodies, the springs and the springs of the joints [J]; a constant force has that of its weight.
+  !> Energy of the bodies, the springs and the springs of the joints [J]; a constant force has that of its weight. Of two bodies
+  !> (`driver_t`) what presses a stop and the drive have none.
   pure real(wp) function energy_of_jointed(machine, state) result(energy)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
@@ -46,6 +48,10 @@ contains
         end associate
       end if
     end associate
+    if (allocated(machine%driver)) then
+      energy = energy + machine%driver%rest_energy + sum(machine%driver%push*state%q(:machine%n))
+      return
+    end if
     do j = 1, size(machine%joints)
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       energy = energy + joint_energy(machine%joints(j), state%phase(j), state%slider(j), s)
@@ -71,6 +77,10 @@ contains
     do j = 1, size(machine%joints)
       if (is_held(machine%joints(j), state%phase(j))) body%mode = mode_stick
     end do
+    if (.not. allocated(machine%driver)) return
+    body%x = body%x + machine%driver%stops_run*state%clock
+    body%mode = mode_of_two(machine, state)
+    if (contact_at(machine) > 0) body%touch_speed = state%touch_speed(contact_at(machine))
   end function watched_state
 
   !> Samples and energy of a flight from the state `start`, `duration` [s] long.
@@ -83,6 +93,7 @@ contains
     type(log_t), intent(inout) :: log
     type(jointed_state_t) :: state
     real(wp) :: before, next
+    if (allocated(machine%driver)) call note_peaks(machine, flow, path, start, duration, log)
     state = start
     before = 0
     do while (log%sample_interval > 0)
@@ -97,13 +108,76 @@ contains
     call book_flight(machine, flow, path, start, before, duration, log)
   end subroutine log_flight
 
+  !> Largest force and penetration of a soft stop along a flight.
+  pure subroutine note_peaks(machine, flow, path, start, duration, log)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(jointed_state_t), intent(in) :: start
+    real(wp), intent(in) :: duration
+    type(log_t), intent(inout) :: log
+    !> Looks in a panel; what is left of a panel at every step of a golden section, and the steps.
+    integer, parameter :: looks = 8, steps = 50
+    real(wp), parameter :: golden = 0.61803398874989484820458683436564_wp
+    real(wp) :: low, high, length, found(2), best(2), at(2)
+    integer :: j, i, k, count_looks
+    j = contact_at(machine)
+    if (j == 0) return
+    if (machine%joints(j)%kind /= joint_soft .or. start%phase(j) == 0) return
+    count_looks = looks*panels_of(machine, flow, path, 0.0_wp, duration)
+    length = duration/count_looks
+    best = 0
+    at = 0
+    do i = 0, count_looks
+      found = pressed(i*length)
+      where (found > best) at = i*length
+      best = max(best, found)
+    end do
+    do k = 1, 2
+      low = max(0.0_wp, at(k) - length)
+      high = min(duration, at(k) + length)
+      do i = 1, steps
+        associate (left => high - golden*(high - low), right => low + golden*(high - low))
+          found = pressed(left) - pressed(right)
+          best = max(best, pressed(left))
+          if (found(k) > 0) then
+            high = right
+          else
+            low = left
+          end if
+        end associate
+      end do
+    end do
+    log%peak_force = max(log%peak_force, best(1))
+    log%peak_penetration = max(log%peak_penetration, best(2))
+  contains
+    !> Force and penetration at `t` [s after the start of the path].
+    pure function pressed(t)
+      real(wp), intent(in) :: t
+      real(wp) :: pressed(2), s, u
+      complex(wp) :: turning(harmonics_of(machine))
+      type(jointed_state_t) :: state
+      state = start
+      call path_at(machine, flow, path, t, state%q, state%v)
+      turning = turning_at(machine%frequency, path%start + t, size(turning))
+      call joint_motion(machine, j, state%q, state%v, path%start + t, turning, s, u)
+      call joint_force(machine%joints(j), state%phase(j), 0.0_wp, state%touch_speed(j), s, u, 1.0_wp, pressed(1))
+      pressed(1) = abs(pressed(1))
+      pressed(2) = max(s - machine%joints(j)%upper, machine%joints(j)%lower - s)
+    end function pressed
+  end subroutine note_peaks
+
   !> Writes a state down as a sample.
   pure subroutine log_sample(machine, state, log)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
     type(log_t), intent(inout) :: log
     log%book%at_end = energy_of_jointed(machine, state)
-    call record_sample(log, watched_state(machine, state), book=log%book)
+    if (allocated(machine%driver)) then
+      call record_sample(log, watched_state(machine, state), driver_now(machine, state), log%book)
+    else
+      call record_sample(log, watched_state(machine, state), book=log%book)
+    end if
     call put_column(log%sample_coordinates, log%samples, [state%q(:machine%n), state%v(:machine%n)])
   end subroutine log_sample
 
@@ -115,20 +189,11 @@ contains
     type(jointed_state_t), intent(in) :: start
     real(wp), intent(in) :: first, last
     type(log_t), intent(inout) :: log
-    real(wp) :: length, fastest, friction, damping, contact, work
+    real(wp) :: length, friction, damping, contact, work
     type(jointed_state_t) :: state
     integer :: panels, i, k
     if (.not. last > first) return
-    fastest = machine%frequency*max(1, size(path%turning))
-    if (path%length > 0) then
-      ! A step of a marched flight is a polynomial.
-      fastest = 0
-    else if (flow%modal) then
-      fastest = max(fastest, maxval([0.0_wp, pack(flow%size_of_exponent, -real(flow%exponent)*first < gone)]))
-    else
-      fastest = max(fastest, flow%rate)
-    end if
-    panels = max(1, ceiling(3*fastest*(last - first)))
+    panels = panels_of(machine, flow, path, first, last)
     length = (last - first)/panels
     state = start
     do i = 1, panels
@@ -141,10 +206,30 @@ contains
         log%book%friction = log%book%friction + weight(k)*length*friction
         log%book%damping = log%book%damping + weight(k)*length*damping
         log%book%contact = log%book%contact + weight(k)*length*contact
+        log%contact_work = log%contact_work + weight(k)*length*contact
         log%book%work = log%book%work + weight(k)*length*work
       end do
     end do
   end subroutine book_flight
+
+  !> Panels from `first` to `last` [s after the start of the path], by what is still fast there.
+  pure integer function panels_of(machine, flow, path, first, last) result(panels)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    real(wp), intent(in) :: first, last
+    real(wp) :: fastest
+    fastest = machine%frequency*max(1, size(path%turning))
+    if (path%length > 0) then
+      ! A step of a marched flight is a polynomial.
+      fastest = 0
+    else if (flow%modal) then
+      fastest = max(fastest, maxval([0.0_wp, pack(flow%size_of_exponent, -real(flow%exponent)*first < gone)]))
+    else
+      fastest = max(fastest, flow%rate)
+    end if
+    panels = max(1, ceiling(3*fastest*(last - first)))
+  end function panels_of
 
   !> Powers lost to friction, dampers and contacts, and put in by forces and moving surfaces [W].
   pure subroutine powers(machine, flow, state, friction, damping, contact, work)
@@ -163,6 +248,7 @@ contains
       work = 0
       if (has_continuous_control(machine)) damping = damping - sum(v*matmul(machine%controller%damping, v))
       if (allocated(machine%controller)) work = sum(v*active_force(machine, state))
+      if (allocated(machine%driver)) work = work + sum(v*machine%driver%push)
       do m = 1, size(machine%force, 2)
         work = work + sum(v*real(machine%force(:, m)*turning(m)))
       end do
@@ -190,7 +276,11 @@ contains
         work = work - r*rate
         if (allocated(joint%strength)) work = work + r*u
         if (joint%kind == joint_soft) then
-          if (abs(state%phase(j)) == 1) contact = contact + damping_of_contact(joint, state%phase(j), state%touch_speed(j), s, u)
+          if (allocated(machine%driver)) then
+            contact = contact - r*u
+          else if (abs(state%phase(j)) == 1) then
+            contact = contact + damping_of_contact(joint, state%phase(j), state%touch_speed(j), s, u)
+          end if
         else if (state%phase(j) /= 0 .and. joint%kind /= joint_spring) then
           friction = friction - r*u
         end if
@@ -210,20 +300,40 @@ contains
     power = (contact_force(law, p, phase*u) - contact_force(law, p, 0.0_wp))*phase*u
   end function damping_of_contact
 
-  !> What a transition took from the energy: of contacts, but for sliders that let go.
+  !> What a transition took from the energy: of contacts, but for sliders that let go. A stop that moves does work.
   pure subroutine book_change(machine, before, after, log)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
-    real(wp) :: lost
+    real(wp) :: lost, work
     lost = energy_of_jointed(machine, before) - energy_of_jointed(machine, after)
     if (any(machine%joints%kind == joint_elastic .and. before%phase(:size(machine%joints)) /= after%phase(:size(machine%joints)))) &
       then
       log%book%friction = log%book%friction + lost
     else
-      log%book%contact = log%book%contact + lost
+      work = work_of_stop(machine, before, after)
+      log%book%contact = log%book%contact + lost + work
+      log%book%work = log%book%work + work
     end if
   end subroutine book_change
+
+  !> Work that a stop which moves has done in an impact on it, where it is the only one that is rigid [J].
+  pure real(wp) function work_of_stop(machine, before, after) result(work)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before, after
+    complex(wp) :: turning(harmonics_of(machine))
+    real(wp) :: value, rate
+    integer :: j
+    work = 0
+    if (count(machine%joints%kind == joint_contact) /= 1) return
+    j = findloc(machine%joints%kind, joint_contact, 1)
+    associate (joint => machine%joints(j), n => machine%n)
+      turning = turning_at(machine%frequency, before%time, size(turning))
+      call wave_value(joint%offset, machine%frequency, before%time, turning, value, rate)
+      if (.not. abs(rate) > 0) return
+      work = -rate*sum(joint%row*(after%v(:n) - before%v(:n)))/sum(joint%row*matmul(machine%mobility, joint%row))
+    end associate
+  end function work_of_stop
 
   !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own.
   pure subroutine log_event(machine, kind, j, before, after, log)
@@ -236,8 +346,21 @@ contains
     turning = turning_at(machine%frequency, before%time, size(turning))
     call joint_motion(machine, j, after%q, after%v, before%time, turning, s, u_after)
     call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u)
-    call record_event(log, kind, watched_state(machine, before), after%v(machine%watched))
+    call record_change(machine, kind, before, after, log)
     call put_column(log%event_joint, log%events, [real(j, wp), s, u, u_after])
   end subroutine log_event
+
+  !> Writes an event down as the watched body sees it, and of two where the driving one is.
+  pure subroutine record_change(machine, kind, before, after, log)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: kind
+    type(jointed_state_t), intent(in) :: before, after
+    type(log_t), intent(inout) :: log
+    if (allocated(machine%driver)) then
+      call record_event(log, kind, watched_state(machine, before), after%v(machine%watched), driver_now(machine, before))
+    else
+      call record_event(log, kind, watched_state(machine, before), after%v(machine%watched))
+    end if
+  end subroutine record_change
 
 end module jointed_log

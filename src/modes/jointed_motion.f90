@@ -3,6 +3,7 @@
 
 !> The event loop of a jointed structure: fly to the first guard, make the transition, until a time.
 module jointed_motion
+  use chatter, only: rest_of_chatter
   use constants, only: two_pi
   use control, only: error_of
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up, &
@@ -24,6 +25,7 @@ module jointed_motion
   use still_joints, only: stand_still
   use timed_actions, only: act, acts_on_time, next_action
   use transition_list, only: note_transition, transition_t, transitions_t
+  use two_bodies, only: slides_on
   implicit none
   private
 
@@ -102,9 +104,9 @@ contains
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
-    real(wp) :: before, until
+    real(wp) :: before, until, from
     integer :: count_guards, stalls, holds, key
-    logical :: fallen(most_guards), ok, turned, counts_on, timed
+    logical :: fallen(most_guards), ok, turned, counts_on, timed, slips
     reason = 0
     stalls = 0
     holds = 0
@@ -112,10 +114,12 @@ contains
     if (present(one_event)) counts_on = one_event
     if (.not. counts_on) state%burst = 0
     state%at_section = .false.
-    watch%extremes = [tally%x_min, tally%x_max]
+    from = 0
+    if (allocated(moving%machine%driver)) from = moving%machine%driver%stops_run*state%clock
+    watch%extremes = [tally%x_min, tally%x_max] - from
     watch%top_speed = tally%v_max
     watch%wants_speed = tally%wants_v_max
-    watch%wants_margin = moving%drifts
+    watch%wants_margin = moving%notes_misses
     timed = acts_on_time(moving%machine)
     associate (machine => moving%machine)
       do while (state%time < time_end .and. .not. state%at_section)
@@ -137,7 +141,7 @@ contains
           end if
         end if
         key = key_of(machine, state%phase)
-        call note_slip(moving, state, key, tally)
+        slips = moves(moving, state, key)
         if (ready(moving, key) > 0) then
           call fly(machine, moving%flows(ready(moving, key)), moving%options, state, until, list, count_guards, fallen, watch, &
                    tally%steps, reason, log)
@@ -146,6 +150,7 @@ contains
           call fly(machine, spare, moving%options, state, until, list, count_guards, fallen, watch, tally%steps, reason, log)
         end if
         if (reason /= 0) exit
+        if (slips .and. state%time > before) tally%slips = tally%slips + 1
         if (state%time > before) state%left = 0
         stalls = merge(0, stalls + 1, state%time > before)
         if (.not. state%time - before < burst_gap*machine%period) state%burst = 0
@@ -172,8 +177,8 @@ contains
         if (.not. present(one_event) .or. reason /= 0) cycle
         if (one_event .and. state%time - before > shortest_pause*burst_gap*machine%period) exit
       end do
-      tally%x_min = watch%extremes(1)
-      tally%x_max = watch%extremes(2)
+      tally%x_min = watch%extremes(1) + from
+      tally%x_max = watch%extremes(2) + from
       tally%v_max = watch%top_speed
       tally%grazing_margin = min(tally%grazing_margin, watch%margin)
     end associate
@@ -220,7 +225,7 @@ contains
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:)
     type(log_t), intent(inout) :: log
-    type(jointed_state_t) :: struck
+    type(jointed_state_t) :: struck, late
     complex(wp) :: turning(moving%harmonics)
     logical, dimension(size(moving%machine%joints)) :: told, stood, stands
     integer :: g, j, kind
@@ -255,9 +260,17 @@ contains
         end select
         told(j) = .true.
         call log_event(machine, kind, j, before, struck, log)
-        if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0) then
+        if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0 .and. &
+            machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
           kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
-          call log_event(machine, kind, j, before, struck, log)
+          if (allocated(machine%driver)) then
+            ! Of two bodies at the instant where the impacts accumulate, even where the clock stops before it.
+            late = struck
+            late%time = late%time + rest_of_chatter(moving, before, turning, j, after%phase(j))
+            call log_event(machine, kind, j, late, late, log)
+          else
+            call log_event(machine, kind, j, before, struck, log)
+          end if
         end if
       end do
       ! What an impact or a cascade does to other joints.
@@ -265,13 +278,14 @@ contains
     end associate
   end subroutine log_transition
 
-  !> Friction that holds from here on, or no longer, where that is not `told` yet.
+  !> Friction that holds from here on, or no longer, where that is not `told` yet; of two bodies it goes with what did it.
   pure subroutine log_friction(machine, before, after, stood, stands, told, log)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: before, after
     logical, intent(in) :: stood(:), stands(:), told(:)
     type(log_t), intent(inout) :: log
     integer :: j
+    if (allocated(machine%driver)) return
     do j = 1, size(machine%joints)
       if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
       call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, after, log)
@@ -320,6 +334,11 @@ contains
       if (moving%machine%joints(j)%kind == joint_elastic) state%slider(j) = &
         state%slider(j) - moving%machine%joints(j)%offset%rate*moving%machine%period
     end do
+    if (allocated(moving%machine%driver)) then
+      associate (machine => moving%machine)
+        state%q(machine%watched) = state%q(machine%watched) - machine%driver%stops_run*machine%period
+      end associate
+    end if
     call append_word(tally, word_period)
   end subroutine advance_jointed_period
 
@@ -356,19 +375,20 @@ contains
     call append_word(tally, word_period)
   end subroutine advance_to_turn
 
-  !> Counts a flight in which anything moves.
-  pure subroutine note_slip(moving, state, key, tally)
+  !> Whether anything moves in a flight, or the one of two bodies slides over the other.
+  pure logical function moves(moving, state, key)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(in) :: state
     integer, intent(in) :: key
-    type(tally_t), intent(inout) :: tally
     integer :: at
-    logical :: still
+    if (allocated(moving%machine%driver)) then
+      moves = slides_on(moving%machine, state)
+      return
+    end if
     at = ready(moving, key)
-    still = .false.
-    if (at > 0) still = size(moving%flows(at)%independent) == moving%machine%n
-    if (still) still = .not. any(abs(state%v) > moving%machine%negligible_speed)
-    if (.not. still) tally%slips = tally%slips + 1
-  end subroutine note_slip
+    moves = .true.
+    if (at > 0) moves = size(moving%flows(at)%independent) < moving%machine%n
+    if (.not. moves) moves = any(abs(state%v) > moving%machine%negligible_speed)
+  end function moves
 
 end module jointed_motion

@@ -4,15 +4,16 @@
 !> What follows a fallen guard of a jointed structure: impacts, sticking and sliding, the completion of chatter.
 module jointed_transition
   use blow, only: strike
-  use eigen, only: modulus
+  use chatter, only: look_ahead
   use guards, only: force_ends, force_returns, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, &
     slides_down, slides_up
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, most_joints, offset_of
+  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_joints
   use jointed_flows, only: jointed_motion_t
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use mode_choice, only: accelerations_of, choose_mode, project
   use motion_state, only: append_word, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_stick, word_upper
+  use two_bodies, only: slides_on
   implicit none
   private
 
@@ -76,9 +77,11 @@ contains
     integer :: touching(most_joints), hit(most_joints), j
     logical :: at_rest(most_joints), at_level(most_joints), plastic
     real(wp) :: speed(most_joints), lost
+    integer(int64) :: chatters
     associate (machine => moving%machine)
       turning = turning_at(machine%frequency, state%time, moving%harmonics)
       start = state
+      chatters = tally%chatters
       at_level = .false.
       at_rest = .false.
       touching = 0
@@ -109,14 +112,31 @@ contains
       end do
       if (ok) call settle(moving, state, turning, at_rest, touching, ok, at_level)
       if (ok .and. any(hit /= 0)) call end_chatter(moving, start, touching, hit, turning, state, tally)
-      do j = 1, size(machine%joints)
-        if (machine%joints(j)%kind == joint_friction .and. start%phase(j) /= 0 .and. state%phase(j) == 0) then
-          tally%sticks = tally%sticks + 1
-          call append_word(tally, word_stick)
-        end if
-      end do
+      call count_sticks(machine, start, state, tally%chatters > chatters, tally)
     end associate
   end subroutine transition
+
+  !> Counts friction that has come to stick; of two bodies also where they have come to rest against a stop, the end of a chatter
+  !> being in the word already.
+  pure subroutine count_sticks(machine, before, state, chattered, tally)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before, state
+    logical, intent(in) :: chattered
+    type(tally_t), intent(inout) :: tally
+    integer :: j
+    if (allocated(machine%driver)) then
+      if (.not. slides_on(machine, before) .or. slides_on(machine, state)) return
+      tally%sticks = tally%sticks + 1
+      if (.not. chattered) call append_word(tally, word_stick)
+      return
+    end if
+    do j = 1, size(machine%joints)
+      if (machine%joints(j)%kind == joint_friction .and. before%phase(j) /= 0 .and. state%phase(j) == 0) then
+        tally%sticks = tally%sticks + 1
+        call append_word(tally, word_stick)
+      end if
+    end do
+  end subroutine count_sticks
 
   !> What each fallen guard says of its own joint: its phase, or that it is at rest, touches, is hit.
   pure subroutine change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
@@ -194,6 +214,10 @@ contains
         call joint_motion(machine, j, before%q, before%v, before%time, turning, s, last)
         at_rest(j) = .not. struck .or. &
           abs(u - last) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, before)
+      else if (at_rest(j) .and. struck) then
+        ! Its slide has just ended, unless the impact at the same instant sets it in motion.
+        call joint_motion(machine, j, before%q, before%v, before%time, turning, s, last)
+        at_rest(j) = abs(u - last) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, before)
       end if
       if (abs(u) <= rounding_of_speed(machine, j, state)) at_rest(j) = .true.
       if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
@@ -279,79 +303,28 @@ contains
     end associate
   end subroutine end_chatter
 
-  !> Whether the chatter of contact `j` on `side` ends so soon that nothing changes until then. Friction `at_rest` stays so, that
-  !> `along` the contact turns with every bounce, and no other comes to rest. Bounces up with the acceleration a and down with
-  !> b <= a take u/a + u/sqrt(a b), and the speed shrinks by e sqrt(b/a).
-  pure subroutine look_ahead(moving, state, turning, j, side, at_rest, along, ends)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+  !> A soft contact that only just touches, with no speed, is pressed if the forces press it, else open.
+  pure subroutine hold_soft(machine, j, turning, state)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j
     complex(wp), intent(in) :: turning(:)
-    integer, intent(in) :: j, side
-    logical, intent(out) :: at_rest(:), along(:), ends
-    type(jointed_state_t) :: back
-    real(wp), dimension(moving%machine%n) :: a, jerk, a_back
-    real(wp) :: s, u, given, opening, closing, change, last, speed, e, shrink
-    integer :: i
-    ends = .false.
-    at_rest = .false.
-    along = .false.
-    associate (machine => moving%machine)
+    type(jointed_state_t), intent(inout) :: state
+    real(wp) :: a(machine%n), kick(machine%n), s, u, given
+    integer :: side
+    associate (joint => machine%joints(j))
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
-      call accelerations_of(machine, state, turning, a, jerk)
-      opening = -side*(sum(machine%joints(j)%row*a) + given)
-      change = abs(sum(machine%joints(j)%row*jerk)) + abs(given)*machine%frequency
-      if (.not. opening < 0 .or. .not. -side*u > 0) return
-      e = machine%joints(j)%contact%restitution
-      if (e >= 1) return
-      last = 2*abs(u)/(-opening*(1 - e))
-      closing = opening
-      back = state
-      do i = 1, size(machine%joints)
-        if (machine%joints(i)%kind /= joint_friction .or. state%phase(i) == 0) cycle
-        along(i) = moves_along(machine%joints(i), machine%joints(j))
-        if (along(i)) back%phase(i) = -state%phase(i)
-      end do
-      if (any(along)) then
-        call accelerations_of(machine, back, turning, a_back)
-        closing = -side*(sum(machine%joints(j)%row*a_back) + given)
-        if (.not. (closing < 0 .and. closing >= opening)) return
-        shrink = e*sqrt(closing/opening)
-        last = max(last, (abs(u)/(-opening) + abs(u)/sqrt(closing*opening))/(1 - shrink))
-      end if
-      if (last*change > -closing*moving%chatter_share .or. last > 1e-2_wp*machine%period) return
-      ! No speed goes through zero on the way.
-      do i = 1, size(machine%joints)
-        if (machine%joints(i)%kind /= joint_friction) cycle
-        call joint_motion(machine, i, state%q, state%v, state%time, turning, s, speed, given)
-        at_rest(i) = state%phase(i) == 0
-        if (at_rest(i) .or. along(i)) cycle
-        if (abs(speed) <= 2*last*abs(sum(machine%joints(i)%row*a) + given)) return
-      end do
+      side = 0
+      if (abs(s - joint%upper) <= 1e-12_wp*machine%length_scale) side = 1
+      if (abs(s - joint%lower) <= 1e-12_wp*machine%length_scale) side = -1
+      if (side == 0 .or. abs(u) > machine%negligible_speed) return
+      kick = matmul(machine%mobility, joint%row)
+      state%v(:machine%n) = state%v(:machine%n) - kick*u/sum(joint%row*kick)
+      state%phase(j) = 0
+      call accelerations_of(machine, state, turning, a)
+      if (side*(sum(joint%row*a) + given) > 0) state%phase(j) = side
+      state%left(j) = side
     end associate
-    ends = .true.
-  end subroutine look_ahead
-
-  !> Whether friction slides at the speed of a gap, or a multiple of it.
-  pure logical function moves_along(friction, contact)
-    type(joint_t), intent(in) :: friction, contact
-    real(wp) :: ratio
-    integer :: m
-    ratio = sum(friction%row*contact%row)/sum(contact%row**2)
-    moves_along = abs(ratio) > 0 .and. all(abs(friction%row - ratio*contact%row) <= 8*epsilon(ratio)*abs(friction%row)) .and. &
-      abs(friction%offset%rate - ratio*contact%offset%rate) <= 8*epsilon(ratio)*abs(friction%offset%rate)
-    do m = 1, max(harmonics_in(friction), harmonics_in(contact))
-      associate (own => offset_of(friction, m))
-        moves_along = moves_along .and. modulus(own - ratio*offset_of(contact, m)) <= 8*epsilon(ratio)*modulus(own)
-      end associate
-    end do
-  end function moves_along
-
-  !> Number of harmonics of the given part of a joint coordinate.
-  pure integer function harmonics_in(joint)
-    type(joint_t), intent(in) :: joint
-    harmonics_in = 0
-    if (allocated(joint%offset%harmonic)) harmonics_in = size(joint%offset%harmonic)
-  end function harmonics_in
+  end subroutine hold_soft
 
   !> What cannot be told apart by rounding is held, for a billionth of a period.
   pure subroutine hold(moving, state, turning, at_rest, touching)
@@ -367,6 +340,9 @@ contains
       state%left(j) = 0
     end do
     call project(moving%machine, state, turning)
+    do j = 1, size(moving%machine%joints)
+      if (moving%machine%joints(j)%kind == joint_soft) call hold_soft(moving%machine, j, turning, state)
+    end do
     state%time = state%time + 1e-9_wp*moving%machine%period
   end subroutine hold
 

@@ -188,7 +188,7 @@ contains
     call free_force(machine, trial, turning, force)
     associate (n => question%count)
       call drift_of(machine, question, trial, turning, 2, force, drift)
-      size_of_y = sizes(machine, question, trial, turning, force)
+      size_of_y = sizes(machine, question, trial, turning, 2, force)
       call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
       blur = rounding*size_of_y
@@ -203,7 +203,7 @@ contains
       call free_force(machine, trial, turning, force, a, rate)
       call narrow(question, r, y, side, blur)
       call drift_of(machine, question, trial, turning, 3, rate, drift)
-      size_of_y = sizes(machine, question, trial, turning, abs(force)*machine%frequency + abs(rate))
+      size_of_y = sizes(machine, question, trial, turning, 3, abs(force)*machine%frequency + abs(rate))
       call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
       call keep_loaded(question, y, side, 64*rounding*size_of_y)
@@ -215,7 +215,7 @@ contains
       call second_rate(machine, trial, turning, a, jerk, rate)
       call narrow(question, r, y, side, 64*rounding*size_of_y)
       call drift_of(machine, question, trial, turning, 4, rate, drift)
-      size_of_y = sizes(machine, question, trial, turning, abs(force)*machine%frequency**2 + abs(rate))
+      size_of_y = sizes(machine, question, trial, turning, 4, abs(force)*machine%frequency**2 + abs(rate))
       call solve(question, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
       call keep_loaded(question, y, side, 4096*rounding*size_of_y)
@@ -243,8 +243,11 @@ contains
         phase(j) = 0
         side(question%count) = -before(j)
       else if (touching(j) /= 0) then
-        if (touching(j) > 0) call ask(question, j, -huge(1.0_wp), 0.0_wp)
-        if (touching(j) < 0) call ask(question, j, 0.0_wp, huge(1.0_wp))
+        ! Stops without room hold either way.
+        associate (clamps => .not. machine%joints(j)%upper > machine%joints(j)%lower)
+          call ask(question, j, merge(-huge(1.0_wp), 0.0_wp, touching(j) > 0 .or. clamps), &
+                   merge(huge(1.0_wp), 0.0_wp, touching(j) < 0 .or. clamps))
+        end associate
         phase(j) = touching(j)
       end if
     end do

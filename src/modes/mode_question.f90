@@ -86,12 +86,13 @@ contains
     if (state%time /= state%time) surface = 0
   end function surface
 
-  !> Sizes of what the accelerations in question are sums of, for their rounding.
-  pure function sizes(machine, question, state, turning, force) result(size_of_y)
+  !> Sizes of what the accelerations in question, or their rates (derivative number `order`), are sums of, for their rounding.
+  pure function sizes(machine, question, state, turning, order, force) result(size_of_y)
     type(jointed_t), intent(in) :: machine
     type(question_t), intent(in) :: question
     type(jointed_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
+    integer, intent(in) :: order
     real(wp), intent(in) :: force(:)
     real(wp) :: size_of_y(most_joints), parts(machine%n), s, u, r, by_place, by_speed, strength
     integer :: i, n
@@ -120,9 +121,24 @@ contains
     end do
     size_of_y = 0
     do i = 1, question%count
-      size_of_y(i) = sum(abs(machine%joints(question%joint(i))%row)*matmul(abs(machine%mobility), parts))
+      size_of_y(i) = sum(abs(machine%joints(question%joint(i))%row)*matmul(abs(machine%mobility), parts)) &
+                     + swing_of(machine, question%joint(i), order)
     end do
   end function sizes
+
+  !> Bound on derivative number `order` of the given part of a joint coordinate.
+  pure real(wp) function swing_of(machine, j, order) result(swing)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j, order
+    integer :: m
+    swing = 0
+    associate (offset => machine%joints(j)%offset)
+      if (.not. allocated(offset%harmonic)) return
+      do m = 1, size(offset%harmonic)
+        swing = swing + (abs(real(offset%harmonic(m))) + abs(aimag(offset%harmonic(m))))*(m*machine%frequency)**order
+      end do
+    end associate
+  end function swing_of
 
   !> Second rates of the forces, the laws taken as linear.
   pure subroutine second_rate(machine, state, turning, a, jerk, rate)
@@ -207,7 +223,9 @@ contains
         if ((question%upper(i) - r(i))*mobility <= tolerance) limit = 1
       end if
       if (abs(question%lower(i)) < huge(1.0_wp)) then
-        if ((r(i) - question%lower(i))*mobility <= tolerance) limit = -1
+        ! The rounding of a stiff joint can be more than lies between the limits.
+        if ((r(i) - question%lower(i))*mobility <= tolerance .and. &
+            (limit == 0 .or. r(i) - question%lower(i) < question%upper(i) - r(i))) limit = -1
       end if
     else if (abs(y(i)) <= tolerance) then
       limit = side(i)

@@ -7,11 +7,11 @@ module timed_actions
   use control, only: error_of
   use jointed, only: joint_contact, joint_friction, joint_section, jointed_t, most_joints
   use jointed_flows, only: jointed_motion_t
-  use jointed_log, only: book_change, energy_of_jointed, watched_state
+  use jointed_log, only: book_change, energy_of_jointed, record_change
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use jointed_transition, only: judge_friction, settle
   use kinds, only: wp
-  use motion_state, only: event_blow, log_t, put_column, record_event
+  use motion_state, only: event_blow, log_t, put_column
   implicit none
   private
 
@@ -128,7 +128,7 @@ contains
       if (.not. present(log) .or. .not. ok) return
       log%book%work = log%book%work + energy_of_jointed(machine, pushed) - energy_of_jointed(machine, before)
       call book_change(machine, pushed, state, log)
-      call record_event(log, event_blow, watched_state(machine, before), state%v(machine%watched))
+      call record_change(machine, event_blow, before, state, log)
       ! In the place of a joint stands the number after the last.
       call put_column(log%event_joint, log%events, &
                       [count(machine%joints%kind /= joint_section) + 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])

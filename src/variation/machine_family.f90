@@ -18,8 +18,7 @@ module machine_family
   use motion_state, only: log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
   use pair, only: is_pair
-  use pair_as_structure, only: pair_of_structure
-  use pair_flight, only: body_state
+  use pair_as_structure, only: start_of_section
   use structure, only: coordinates_of, structure_t
   use strobe, only: start_strobe, strobe_t
   use structure_family, only: map_of_structure, state_at_start, structure_neighbourhood, structure_of_family
@@ -128,11 +127,10 @@ contains
     type is (structure_t)
       call start_of_structure(machine, point, strobe%jointed, ok)
       if (.not. ok) return
-      if (allocated(moving%pair)) then
+      if (allocated(machine%pair)) then
         associate (n => machine%frame%moving%machine%n)
-          strobe%pair = pair_of_structure(moving%pair, strobe%jointed%q(:n), strobe%jointed%v(:n))
+          strobe = start_strobe(moving, start_of_section(machine%pair, strobe%jointed%q(:n), strobe%jointed%v(:n)))
         end associate
-        strobe%state = body_state(strobe%pair)
       else
         strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
       end if

@@ -19,6 +19,7 @@ module structure_family
   use law_table, only: change_parameter, law_choice_t
   use motion, only: motion_t
   use motion_state, only: flight_adaptive, tally_t
+  use pair, only: build_pair, is_pair, pair_t
   use pair_as_structure, only: start_as_structure, structure_of_pair
   use status, only: exit_bad_case
   use structure, only: count_joints, phases_in, structure_of, structure_t
@@ -70,16 +71,17 @@ contains
     character(len=:), allocatable :: why
     type(motion_t) :: moving
     type(jointed_t) :: machine
+    type(pair_t) :: pair
     real(wp) :: sizes(2)
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
-    if (allocated(moving%pair)) then
-      call structure_of_pair(moving%pair%machine, machine, error)
+    if (is_pair(laws)) then
+      call build_pair(laws, pair, error)
+      if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
       if (allocated(error)) return
-      allocate (moving%jointed)
       call prepare_jointed(machine, family%options, moving%jointed)
     end if
     why = why_not_varied(moving%jointed)
@@ -93,7 +95,7 @@ contains
     end associate
     if (family%sizes(1) > 0) sizes = family%sizes
     structure = structure_of(moving%jointed, sizes)
-    if (allocated(moving%pair)) structure%pair = moving%pair%machine
+    if (is_pair(laws)) structure%pair = pair
   end subroutine structure_of_family
 
   !> The state at a start as `start_strobe` has it.

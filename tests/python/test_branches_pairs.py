@@ -66,8 +66,9 @@ def test_stable_orbits_are_the_attractors_of_a_map(separatrix: Path, tmp_path: P
             distance = abs(own - place[:, np.newaxis]).max(axis=0)
             assert distance.min() < 1e-8
             # those of the map are differences of flights
-            expected = np.sort_complex(of_map[distance.argmin()])
-            assert np.sort_complex(multipliers) == pytest.approx(expected, abs=3e-5)
+            # (rounded, for the order of a conjugate pair)
+            expected = np.sort_complex(np.round(of_map[distance.argmin()], 4))
+            assert np.sort_complex(np.round(multipliers, 4)) == pytest.approx(expected, abs=2e-4)
 
 
 def test_multipliers_of_a_motion_that_chatters_and_sticks(separatrix: Path, tmp_path: Path):

@@ -11,14 +11,10 @@ module machines
   use motion, only: advance, advance_period, motion_t, prepare_motion
   use motion_state, only: flight_auto, log_t, options_t, state_t, tally_t
   use oscillator, only: build_oscillator, oscillator_t
-  use pair, only: build_pair, pair_t
-  use pair_modes, only: pair_motion_t, pair_state_t, prepare_pair
-  use pair_motion, only: advance_pair, advance_pair_period
   implicit none
   private
 
-  public :: laws_from, set_parameter, build, build_from, build_pair_from, published_laws, move_on, move_pair, seed_random, &
-    uniform
+  public :: laws_from, set_parameter, build, build_from, published_laws, move_on, seed_random, uniform
 
 contains
 
@@ -152,39 +148,6 @@ contains
     end do
     if (left > 0) call advance(moving, state, state%time + left, tally, reason, log)
   end subroutine move_on
-
-  !> Two bodies ready to move; ends the test program if they are refused.
-  function build_pair_from(text, event_budget) result(moving)
-    character(len=*), intent(in) :: text
-    integer(int64), intent(in), optional :: event_budget
-    type(pair_motion_t) :: moving
-    type(pair_t) :: machine
-    type(options_t) :: options
-    type(error_t), allocatable :: error
-    if (present(event_budget)) options%event_budget = event_budget
-    call build_pair(laws_from(text), machine, error)
-    if (allocated(error)) error stop 'machines: '//error%message
-    call prepare_pair(machine, options, moving)
-  end function build_pair_from
-
-  !> Moves two bodies on by `duration` [s] over any number of sections.
-  subroutine move_pair(moving, state, duration, tally, reason, log)
-    type(pair_motion_t), intent(in) :: moving
-    type(pair_state_t), intent(inout) :: state
-    real(wp), intent(in) :: duration
-    type(tally_t), intent(inout) :: tally
-    integer, intent(out) :: reason
-    type(log_t), intent(inout), optional :: log
-    real(wp) :: left
-    left = duration
-    reason = 0
-    do while (left >= moving%machine%period - state%time)
-      left = left - (moving%machine%period - state%time)
-      call advance_pair_period(moving, state, tally, reason, log)
-      if (reason /= 0) return
-    end do
-    if (left > 0) call advance_pair(moving, state, state%time + left, tally, reason, log)
-  end subroutine move_pair
 
   !> The same random numbers in every run.
   subroutine seed_random(seed)

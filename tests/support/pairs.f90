@@ -1,0 +1,135 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Two bodies coupled by dry friction for the tests, written as text: the structure that they are, and the names that theory has
+!> for their motion.
+module pairs
+  use build_motion, only: machine_of
+  use errors, only: error_t
+  use jointed, only: joint_soft
+  use jointed_log, only: watched_state
+  use jointed_motion, only: start_jointed
+  use jointed_state, only: joint_motion, turning_at
+  use kinds, only: int64, wp
+  use machines, only: laws_from
+  use motion, only: motion_t
+  use motion_state, only: log_t, options_t, tally_t
+  use strobe, only: advance_strobe, advance_strobe_period, driver_now, energy_now, strobe_t
+  use two_bodies, only: contact_at
+  implicit none
+  private
+
+  public :: build_pair_from, start_pair, move_pair, advance_pair, advance_pair_period, energy_of
+
+  integer, parameter, public :: at_x1 = 1, at_v1 = 2, at_x2 = 3, at_v2 = 4
+
+  !> Where both bodies are, in which mode, and whether a stop is pressed (+1 the upper, -1 the lower one) and how deep.
+  type, extends(strobe_t), public :: pair_state_t
+    real(wp) :: y(4) = 0, penetration = 0
+    integer :: mode = 0, pressed = 0
+  end type pair_state_t
+
+contains
+
+  !> Two bodies ready to move; ends the test program if they are refused.
+  function build_pair_from(text, event_budget) result(moving)
+    character(len=*), intent(in) :: text
+    integer(int64), intent(in), optional :: event_budget
+    type(motion_t) :: moving
+    type(options_t) :: options
+    type(error_t), allocatable :: error
+    if (present(event_budget)) options%event_budget = event_budget
+    call machine_of(laws_from(text), options, moving, error)
+    if (allocated(error)) error stop 'pairs: '//error%message
+  end function build_pair_from
+
+  !> m2 at `x`, `v` and m1 at `driver` (place, velocity), with the drive at `angle` [rad]. `driver` is not looked at where the
+  !> motion of m1 is given.
+  function start_pair(moving, x, v, driver, angle) result(state)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: x, v, driver(2), angle
+    type(pair_state_t) :: state
+    real(wp) :: start(2, moving%jointed%machine%n)
+    logical :: ok
+    associate (machine => moving%jointed%machine)
+      start = 0
+      if (machine%driver%at > 0) start(:, machine%driver%at) = driver
+      start(:, machine%watched) = [x, v]
+      call start_jointed(moving%jointed, start(1, :), start(2, :), angle, state%jointed, ok)
+    end associate
+    if (.not. ok) error stop 'pairs: no mode to start in'
+    call look(moving, state)
+  end function start_pair
+
+  !> Moves on by `duration` [s] over any number of sections.
+  subroutine move_pair(moving, state, duration, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp), intent(in) :: duration
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: left
+    left = duration
+    reason = 0
+    do while (left >= moving%machine%period - state%jointed%time)
+      left = left - (moving%machine%period - state%jointed%time)
+      call advance_pair_period(moving, state, tally, reason, log)
+      if (reason /= 0) return
+    end do
+    if (left > 0) call advance_pair(moving, state, state%jointed%time + left, tally, reason, log)
+  end subroutine move_pair
+
+  !> To a time within the period.
+  subroutine advance_pair(moving, state, time_end, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    real(wp), intent(in) :: time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    call advance_strobe(moving, state, time_end, tally, reason, log)
+    call look(moving, state)
+  end subroutine advance_pair
+
+  subroutine advance_pair_period(moving, state, tally, reason, log)
+    type(motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    call advance_strobe_period(moving, state, tally, reason, log)
+    call look(moving, state)
+  end subroutine advance_pair_period
+
+  real(wp) function energy_of(moving, state)
+    type(motion_t), intent(in) :: moving
+    type(pair_state_t), intent(in) :: state
+    energy_of = energy_now(moving, state)
+  end function energy_of
+
+  !> What the state is called.
+  subroutine look(moving, state)
+    type(motion_t), intent(in) :: moving
+    type(pair_state_t), intent(inout) :: state
+    complex(wp) :: turning(moving%jointed%harmonics)
+    real(wp) :: s, u
+    integer :: stop
+    associate (machine => moving%jointed%machine, now => state%jointed)
+      state%state = watched_state(machine, now)
+      state%y = [driver_now(moving, state), state%state%x, state%state%v]
+      state%mode = state%state%mode
+      state%pressed = 0
+      state%penetration = 0
+      stop = contact_at(machine)
+      if (stop == 0) return
+      if (machine%joints(stop)%kind /= joint_soft) return
+      state%pressed = sign(min(1, abs(now%phase(stop))), now%phase(stop))
+      if (state%pressed == 0) return
+      turning = turning_at(machine%frequency, now%time, size(turning))
+      call joint_motion(machine, stop, now%q, now%v, now%time, turning, s, u)
+      state%penetration = max(s - machine%joints(stop)%upper, machine%joints(stop)%lower - s)
+    end associate
+  end subroutine look
+
+end module pairs
