@@ -9,9 +9,9 @@ module c_coordinates
   use c_text, only: answer, to_c
   use coordinate_segments, only: coordinate_report_t, coordinate_samples_t, propagate_coordinates
   use errors, only: error_t, fail
-  use jointed, only: integral_of, is_stop
-  use jointed_motion, only: jointed_motion_t
+  use jointed, only: integral_of, is_stop, jointed_t
   use kinds, only: wp
+  use machine_facts, only: is_one_body, structure_in
   use model_type, only: check_values, model_options, model_t
   use motion, only: motion_t
   use status, only: exit_bad_case, exit_usage
@@ -31,18 +31,14 @@ contains
     character(kind=c_char), intent(inout) :: name(*), message(*)
     integer(c_size_t), value :: name_size, message_size
     type(error_t), allocatable :: error
-    type(motion_t) :: moving
-    call build(model, moving, error)
+    type(jointed_t) :: machine
+    call build(model, machine, error)
     if (.not. allocated(error)) then
-      if (.not. allocated(moving%jointed)) allocate (moving%jointed)
-      associate (machine => moving%jointed%machine)
-        if (index < 0 .or. index >= machine%n) then
-          call fail(error, exit_usage, 'coordinate index: found '//to_text(int(index))//', the structure has '// &
-                    to_text(machine%n))
-        else
-          call to_c(trim(machine%names(index + 1)), name, name_size)
-        end if
-      end associate
+      if (index < 0 .or. index >= machine%n) then
+        call fail(error, exit_usage, 'coordinate index: found '//to_text(int(index))//', the structure has '//to_text(machine%n))
+      else
+        call to_c(trim(machine%names(index + 1)), name, name_size)
+      end if
     end if
     code = answer(error, message, message_size)
   end function separatrix_coordinate
@@ -53,35 +49,32 @@ contains
     character(kind=c_char), intent(inout) :: name(*), message(*)
     integer(c_size_t), value :: name_size, message_size
     type(error_t), allocatable :: error
-    type(motion_t) :: moving
+    type(jointed_t) :: machine
     integer, allocatable :: contacts(:)
     integer :: i
-    call build(model, moving, error)
+    call build(model, machine, error)
     if (.not. allocated(error)) then
-      allocate (contacts(0))
-      if (allocated(moving%jointed)) then
-        associate (joints => moving%jointed%machine%joints)
-          contacts = pack([(i, i=1, size(joints))], is_stop(joints%kind))
-        end associate
-      end if
+      contacts = pack([(i, i=1, size(machine%joints))], is_stop(machine%joints%kind))
       if (index < 0 .or. index >= size(contacts)) then
         call fail(error, exit_usage, 'contact index: found '//to_text(int(index))//', the structure has '// &
                   to_text(size(contacts)))
       else
-        call to_c(trim(moving%jointed%machine%joints(contacts(index + 1))%name), name, name_size)
+        call to_c(trim(machine%joints(contacts(index + 1))%name), name, name_size)
       end if
     end if
     code = answer(error, message, message_size)
   end function separatrix_contact
 
-  !> The machine of a model as it is.
-  subroutine build(model, moving, error)
+  !> The structure of a model as it is.
+  subroutine build(model, machine, error)
     type(c_ptr), intent(in) :: model
-    type(motion_t), intent(out) :: moving
+    type(jointed_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(model_t), pointer :: self
+    type(motion_t) :: moving
     call c_f_pointer(model, self)
     call machine_of(self%the_case%laws, model_options(self, self%the_case%integrator%tolerance), moving, error)
+    if (.not. allocated(error)) machine = structure_in(moving)
   end subroutine build
 
   integer(c_int) function separatrix_coordinate_segments(model, chosen_count, chosen, values, direction_count, directions, &
@@ -138,6 +131,7 @@ contains
     type(coordinate_report_t), intent(out) :: report
     type(error_t), allocatable, intent(out) :: error
     type(family_t) :: family
+    type(jointed_t) :: machine
     call check_values(self, chosen, values, error)
     if (.not. allocated(error)) call check_directions(directions, derivatives, error)
     if (.not. allocated(error)) call check_tolerance(tolerance, error)
@@ -145,28 +139,28 @@ contains
     call prepare_family(self%the_case%laws, model_options(self, tolerance), self%parameters(chosen), values, directions, &
                         derivatives, family, error)
     if (allocated(error)) return
-    if (.not. allocated(family%moving%jointed)) then
+    if (is_one_body(family%moving)) then
       call fail(error, exit_bad_case, 'body.law: found "'//trim(self%the_case%laws(1)%name)//'", allowed for segments of '// &
                 'coordinates structure')
       return
     end if
-    call check_machine(family%moving%jointed, size(start, 1) - 1, error)
-    if (.not. allocated(error)) call check_length(family%moving%jointed%machine%period, times, error)
+    machine = structure_in(family%moving)
+    call check_machine(machine, size(start, 1) - 1, error)
+    if (.not. allocated(error)) call check_length(machine%period, times, error)
     if (.not. allocated(error)) call propagate_coordinates(family, start, first, times, derivatives, samples, report)
   end subroutine fly
 
   !> A start has all that the motion depends on. Code 65, or 64 for the wrong number of coordinates.
-  subroutine check_machine(moving, rows, error)
-    type(jointed_motion_t), intent(in) :: moving
+  subroutine check_machine(machine, rows, error)
+    type(jointed_t), intent(in) :: machine
     integer, intent(in) :: rows
     type(error_t), allocatable, intent(out) :: error
-    if (rows /= 2*moving%machine%n) then
-      call fail(error, exit_usage, 'coordinate_count: found '//to_text(rows/2)//', the structure has '// &
-                to_text(moving%machine%n))
-    else if (acts_on_time(moving%machine)) then
+    if (rows /= 2*machine%n) then
+      call fail(error, exit_usage, 'coordinate_count: found '//to_text(rows/2)//', the structure has '//to_text(machine%n))
+    else if (acts_on_time(machine)) then
       call fail(error, exit_bad_case, 'drive: found impulses, or samples of a controller, at times of their own: segments '// &
                 'have other starts')
-    else if (integral_of(moving%machine) > 0) then
+    else if (integral_of(machine) > 0) then
       call fail(error, exit_bad_case, 'drive: found a controller that adds up what it sees, which no start of a segment says')
     end if
   end subroutine check_machine

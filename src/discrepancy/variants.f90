@@ -10,8 +10,10 @@ module variants
   use build_motion, only: machine_of
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
+  use jointed, only: jointed_t
   use kinds, only: wp
   use law_table, only: law_choice_t
+  use machine_facts, only: is_one_body, structure_in
   use motion, only: motion_t
   use motion_state, only: flight_adaptive, options_t
   use natural_scale, only: natural_size, scales_of, scales_of_structure, scales_t
@@ -92,10 +94,10 @@ contains
     call build(plan, values, .false., family%moving, error)
     if (allocated(error)) return
     if (.not. derivatives) return
-    if (allocated(family%moving%jointed)) then
-      plan%scales = scales_of_structure(family%moving%jointed%machine)
-    else
+    if (is_one_body(family%moving)) then
       plan%scales = scales_of(family%moving%machine)
+    else
+      plan%scales = scales_of_structure(structure_in(family%moving))
     end if
     share = share_of(options, all_exact(family%moving))
     family%start_step = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
@@ -123,10 +125,12 @@ contains
   !> Whether no mode of a machine is flown adaptively.
   pure logical function all_exact(moving)
     type(motion_t), intent(in) :: moving
-    if (allocated(moving%jointed)) then
-      all_exact = moving%jointed%machine%linear .and. moving%jointed%options%flight /= flight_adaptive
-    else
+    type(jointed_t) :: machine
+    if (is_one_body(moving)) then
       all_exact = moving%exact .and. .not. moving%layer > 0 .and. .not. moving%machine%contact%soft
+    else
+      machine = structure_in(moving)
+      all_exact = machine%linear .and. moving%options%flight /= flight_adaptive
     end if
   end function all_exact
 

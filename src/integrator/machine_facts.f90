@@ -4,6 +4,7 @@
 !> What those who look at a motion have to know of the machine, whatever it is: one body, two or several.
 module machine_facts
   use contact_law, only: contact_t
+  use jointed, only: jointed_t
   use jointed_state, only: acts_as_spring
   use kinds, only: wp
   use motion, only: motion_t
@@ -11,7 +12,7 @@ module machine_facts
   implicit none
   private
 
-  public :: is_one_body, has_driver, rides_along, rest_lasts, smallest_motion, stops_of, contact_sizes
+  public :: is_one_body, structure_in, has_driver, rides_along, rest_lasts, smallest_motion, stops_of, contact_sizes
 
 contains
 
@@ -20,6 +21,13 @@ contains
     type(motion_t), intent(in) :: moving
     is_one_body = .not. allocated(moving%jointed)
   end function is_one_body
+
+  !> The structure that moves; that of one body has no coordinates.
+  pure type(jointed_t) function structure_in(moving) result(machine)
+    type(motion_t), intent(in) :: moving
+    allocate (machine%joints(0))
+    if (allocated(moving%jointed)) machine = moving%jointed%machine
+  end function structure_in
 
   !> Whether there is a driving body beside the one that is looked at.
   pure logical function has_driver(moving)

@@ -87,10 +87,12 @@ def test_quickstart_does_nothing_on_an_option(source_dir, option, code):
 
 
 def test_only_the_integrator_asks_what_kind_of_machine_it_moves(source_dir):
-    """`strobe` is the interface to machines of any kind; variations have their own, lanes have `fleet`."""
+    """`strobe` is the interface to machines of any kind; variations have their own, lanes have `fleet`, and segments of
+    structures, coordinate by coordinate, are of structures alone."""
     asks = re.compile(r"%\s*(pair|jointed)\b")
     sources = (source_dir / "src").glob("*/*.f90")
     asking = ("integrator", "variation", "modes")
-    above = [p for p in sources if p.parent.name not in asking and p.name != "fleet.f90"]
+    knowing = ("fleet.f90", "coordinate_segments.f90")
+    above = [p for p in sources if p.parent.name not in asking and p.name not in knowing]
     assert len(above) > 150
     assert [p.name for p in above if asks.search(p.read_text())] == []
