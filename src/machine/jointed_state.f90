@@ -30,6 +30,8 @@ module jointed_state
     integer :: left(most_joints) = 0
     !> Impacts in a row with next to no time between them; lanes and the event loop hand it to each other.
     integer :: burst = 0
+    !> Fastest impact of the burst, the first excepted [m/s].
+    real(wp) :: burst_speed = 0
     !> Time of the section since the start [s]; impulses given, samples of a controller taken, the force that it holds [N] and
     !> the integral of what it has seen [m s].
     real(wp) :: clock = 0, control = 0, integral = 0

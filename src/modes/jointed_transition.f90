@@ -92,8 +92,7 @@ contains
       end do
       ok = .true.
       if (any(hit /= 0)) then
-        state%burst = state%burst + 1
-        plastic = state%burst > long_burst
+        call judge_burst(machine, hit, turning, state, plastic)
         if (plastic) call add_near(moving, state, turning, touching)
         call strike(machine, state, turning, touching, plastic, speed, lost, ok)
         do j = 1, size(machine%joints)
@@ -115,6 +114,27 @@ contains
       call count_sticks(machine, start, state, tally%chatters > chatters, tally)
     end associate
   end subroutine transition
+
+  !> Counts an impact in the burst that it belongs to; a long one that dies away is `plastic`: without loss it may go on for ever.
+  pure subroutine judge_burst(machine, hit, turning, state, plastic)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: hit(:)
+    complex(wp), intent(in) :: turning(:)
+    type(jointed_state_t), intent(inout) :: state
+    logical, intent(out) :: plastic
+    real(wp) :: fastest, s, u
+    integer :: j
+    fastest = 0
+    do j = 1, size(machine%joints)
+      if (hit(j) == 0) cycle
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      fastest = max(fastest, abs(u))
+    end do
+    if (state%burst <= 1) state%burst_speed = 0
+    state%burst = state%burst + 1
+    if (state%burst > 1) state%burst_speed = max(state%burst_speed, fastest)
+    plastic = state%burst > long_burst .and. fastest <= state%burst_speed/2
+  end subroutine judge_burst
 
   !> Counts friction that has come to stick; of two bodies also where they have come to rest against a stop, the end of a chatter
   !> being in the word already.
