@@ -75,7 +75,8 @@ contains
             if (joint%kind == joint_contact) cycle
             state%phase(j) = touching(j)
             state%touch_speed(j) = abs(u)
-            if (touching(j) /= 0) state%left(j) = touching(j)
+            ! One that is pressed already has no guard at zero.
+            if (touching(j) /= 0 .and. min(abs(s - joint%upper), abs(s - joint%lower)) <= near) state%left(j) = touching(j)
             touching(j) = 0
           case (joint_spring)
             state%phase(j) = 1

@@ -62,6 +62,8 @@ def test_stable_orbits_are_the_attractors_of_a_map(separatrix: Path, tmp_path: P
         of_branches = (branches["multiplier_real"].values + 1j * branches["multiplier_imag"].values)[here]
         of_map = catalogue["multiplier_real"].values + 1j * catalogue["multiplier_imaginary"].values
         assert here.any()
+        # one begins its section in the pressed contact: its mirror image was found, it was not
+        assert (result["attractor"].values > 0).all()
         for place, multipliers in zip(found.T, of_branches, strict=True):
             distance = abs(own - place[:, np.newaxis]).max(axis=0)
             assert distance.min() < 1e-8
