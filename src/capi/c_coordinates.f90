@@ -157,6 +157,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (rows /= 2*machine%n) then
       call fail(error, exit_usage, 'coordinate_count: found '//to_text(rows/2)//', the structure has '//to_text(machine%n))
+    else if (runs_on(machine)) then
+      call fail(error, exit_bad_case, 'drive: found a stop that runs on, which no start of a segment says')
     else if (acts_on_time(machine)) then
       call fail(error, exit_bad_case, 'drive: found impulses, or samples of a controller, at times of their own: segments '// &
                 'have other starts')
@@ -164,5 +166,12 @@ contains
       call fail(error, exit_bad_case, 'drive: found a controller that adds up what it sees, which no start of a segment says')
     end if
   end subroutine check_machine
+
+  !> Whether stops of two bodies move on for ever.
+  pure logical function runs_on(machine)
+    type(jointed_t), intent(in) :: machine
+    runs_on = .false.
+    if (allocated(machine%driver)) runs_on = abs(machine%driver%stops_run) > 0
+  end function runs_on
 
 end module c_coordinates

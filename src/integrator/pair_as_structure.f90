@@ -1,9 +1,10 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Two bodies coupled by dry friction as a jointed structure: what is known of the variations of structures then holds for them.
-!> Coordinates are the place of the driving body, where it is free and anything ties it to the ground, and that of the driven one,
-!> relative to the driving one where that carries the stops or nothing ties either to the ground.
+!> Two bodies coupled by dry friction as a jointed structure. `flown_structure` is what flies: the places of both bodies on the
+!> ground, or that of the driven one alone. `structure_of_pair` is what is varied, of as few coordinates as its section has: the
+!> place of the driving body, where it is free and anything ties it to the ground, and that of the driven one, relative to the
+!> driving one where that carries the stops or nothing ties either to the ground.
 module pair_as_structure
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, index_of, &
     set_sizes

@@ -9,6 +9,7 @@ module jointed_log
   use jointed, only: joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
   use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, strength_now, turning_at
   use kinds, only: wp
+  use matrices, only: solve
   use mode_flow, only: harmonics_of, mode_flow_t
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, record_event, record_sample, &
     sample_due, sample_time, state_t
@@ -311,29 +312,44 @@ contains
       then
       log%book%friction = log%book%friction + lost
     else
-      work = work_of_stop(machine, before, after)
+      work = work_of_stops(machine, before, after)
       log%book%contact = log%book%contact + lost + work
       log%book%work = log%book%work + work
     end if
   end subroutine book_change
 
-  !> Work that a stop which moves has done in an impact on it, where it is the only one that is rigid [J].
-  pure real(wp) function work_of_stop(machine, before, after) result(work)
+  !> Work that stops which move have done in an impact [J]: the impulses of all contacts at their stops give the change of the
+  !> speeds.
+  pure real(wp) function work_of_stops(machine, before, after) result(work)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: before, after
     complex(wp) :: turning(harmonics_of(machine))
-    real(wp) :: value, rate
-    integer :: j
+    real(wp), dimension(machine%n, most_joints) :: row, kick
+    real(wp), dimension(most_joints) :: rate, impulse
+    real(wp) :: value, s, u, near
+    integer :: j, k
+    logical :: found
     work = 0
-    if (count(machine%joints%kind == joint_contact) /= 1) return
-    j = findloc(machine%joints%kind, joint_contact, 1)
-    associate (joint => machine%joints(j), n => machine%n)
-      turning = turning_at(machine%frequency, before%time, size(turning))
-      call wave_value(joint%offset, machine%frequency, before%time, turning, value, rate)
-      if (.not. abs(rate) > 0) return
-      work = -rate*sum(joint%row*(after%v(:n) - before%v(:n)))/sum(joint%row*matmul(machine%mobility, joint%row))
+    k = 0
+    turning = turning_at(machine%frequency, before%time, size(turning))
+    associate (n => machine%n)
+      do j = 1, size(machine%joints)
+        associate (joint => machine%joints(j))
+          if (joint%kind /= joint_contact) cycle
+          call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u)
+          near = 1e-9_wp*max(machine%length_scale, sum(abs(joint%row*before%q(:n))))
+          if (s < joint%upper - near .and. s > joint%lower + near) cycle
+          k = k + 1
+          row(:, k) = joint%row
+          kick(:, k) = matmul(machine%mobility, joint%row)
+          call wave_value(joint%offset, machine%frequency, before%time, turning, value, rate(k))
+        end associate
+      end do
+      if (.not. any(abs(rate(:k)) > 0)) return
+      call solve(matmul(transpose(row(:, :k)), kick(:, :k)), matmul(after%v(:n) - before%v(:n), row(:, :k)), impulse(:k), found)
+      if (found) work = -sum(rate(:k)*impulse(:k))
     end associate
-  end function work_of_stop
+  end function work_of_stops
 
   !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own.
   pure subroutine log_event(machine, kind, j, before, after, log)

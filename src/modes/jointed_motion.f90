@@ -265,9 +265,11 @@ contains
             machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
           kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
           if (allocated(machine%driver)) then
-            ! Of two bodies at the instant where the impacts accumulate, even where the clock stops before it.
+            ! Of two bodies at the instant where the impacts accumulate, even where the clock stops before it; what is given or
+            ! sampled first comes first.
             late = struck
-            late%time = late%time + rest_of_chatter(moving, before, turning, j, after%phase(j))
+            late%time = min(late%time + rest_of_chatter(moving, before, turning, j, after%phase(j)), &
+                            next_action(machine, before))
             call log_event(machine, kind, j, late, late, log)
           else
             call log_event(machine, kind, j, before, struck, log)

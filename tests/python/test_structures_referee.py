@@ -243,3 +243,46 @@ def test_machines_that_nobody_chose(separatrix, seed, tmp_path):
     assert events >= 5
     assert not lost
     assert of_one_time < 8
+
+
+CAVITY = """
+[body.frame]
+mass = 1
+[body.particle]
+mass = 1
+{contacts}
+[drive.frame]
+law = "motion"
+body = "frame"
+amplitude = 0.5
+frequency = 1
+[watch]
+body = "particle"
+[start]
+x0 = 0.1
+v0 = 1
+[run]
+duration = 40
+window = 7
+"""
+STOP_OF = """
+[contact.{name}]
+between = ["frame", "particle"]
+law = "newton"
+restitution = 0.6
+{stops}
+"""
+
+
+def test_the_work_of_moving_stops_is_that_of_each(separatrix, tmp_path):
+    """Two stops that move, as one contact or as two: the same losses, and the same work of the drive."""
+    both = STOP_OF.format(name="cavity", stops="upper = 1\nlower = -1")
+    two = STOP_OF.format(name="floor", stops="lower = -1") + STOP_OF.format(name="roof", stops="upper = 1")
+    books = []
+    for contacts in (both, two):
+        (tmp_path / "case.toml").write_text(CAVITY.format(contacts=contacts))
+        succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", folder=tmp_path)
+        with h5py.File(tmp_path / "out.h5") as file:
+            books.append([file.attrs[f"energy_{name}"] for name in ("lost_to_contacts", "put_in")])
+    assert books[0][0] > 1
+    assert books[0] == pytest.approx(books[1], rel=1e-9)
