@@ -75,7 +75,9 @@ inline vec at_rest(const gap_course &from, const gap_course &to) {
 template <class size>
 inline void note_least(const structure_machine &m, const size &z, mask asked, int j, int side,
                        const gap_course &from, const gap_course &to, structure_group &g) {
-  mask turns = asked & (from.rate < 0.0) & (to.rate >= -at_rest(from, to));
+  // Where friction holds what the contact is between, rates are rounding.
+  const double none = m.joint[j].tie * m.drive_frequency;
+  mask turns = asked & (from.rate < -none) & (to.rate >= -at_rest(from, to));
   if (!any(turns))
     return;
   mask inside = turns & (to.rate > 0.0);
