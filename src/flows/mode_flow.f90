@@ -8,7 +8,7 @@
 module mode_flow
   use boxed_forces, only: dependent, shared_inverse
   use eigen, only: general_eigen, modulus, solve_complex, symmetric_eigen, undamped_modes
-  use jointed, only: integral_of, joint_contact, joint_soft, jointed_t, offset_of
+  use jointed, only: harmonics_in, integral_of, joint_contact, joint_soft, jointed_t, offset_of
   use jointed_state, only: is_held
   use kinds, only: wp
   use matrices, only: solve
@@ -31,8 +31,8 @@ contains
     harmonics = size(machine%force, 2)
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
-        if (allocated(joint%offset%harmonic)) harmonics = max(harmonics, size(joint%offset%harmonic))
-        if (allocated(joint%strength)) harmonics = max(harmonics, size(joint%strength%harmonic))
+        harmonics = max(harmonics, harmonics_in(joint%offset))
+        if (allocated(joint%strength)) harmonics = max(harmonics, harmonics_in(joint%strength))
       end associate
     end do
   end function harmonics_of

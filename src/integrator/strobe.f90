@@ -23,7 +23,7 @@ module strobe
   use timed_actions, only: acts_on_time
   use turn_section, only: advance_body_to_turn, advance_jointed_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
     jointed_at_turn, jointed_turn_point, scales_of_turn
-  use two_bodies, only: driver_of => driver_now
+  use two_bodies, only: driver_of => driver_now, keeps_within
   implicit none
   private
 
@@ -133,6 +133,7 @@ contains
     if (allocated(moving%jointed)) then
       strobe = start_strobe(moving, start)
       start_is_allowed = .not. any(strobe%jointed%q /= strobe%jointed%q)
+      if (start_is_allowed .and. has_driver(moving)) start_is_allowed = keeps_within(moving%jointed%machine, strobe%jointed)
     else
       barriers = barrier_positions(moving%machine%contact)
       start_is_allowed = start(1) <= barriers(1) .and. start(1) >= barriers(2)

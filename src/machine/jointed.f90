@@ -12,7 +12,7 @@ module jointed
   implicit none
   private
 
-  public :: wave_value, offset_of, is_stop, integral_of
+  public :: wave_value, harmonics_in, offset_of, is_stop, integral_of
 
   !> One joint more than a machine may have: the section of a motion without a clock.
   integer, parameter, public :: most_degrees = 16, most_joints = 13
@@ -152,6 +152,13 @@ contains
       if (present(curvature)) curvature = curvature - w**2*real(now)
     end do
   end subroutine wave_value
+
+  !> Number of harmonics of a wave.
+  pure integer function harmonics_in(wave)
+    type(wave_t), intent(in) :: wave
+    harmonics_in = 0
+    if (allocated(wave%harmonic)) harmonics_in = size(wave%harmonic)
+  end function harmonics_in
 
   !> Whether a joint is a stop, rigid or soft.
   pure elemental logical function is_stop(kind)

@@ -12,9 +12,8 @@ module jointed_state
   implicit none
   private
 
-  public :: turning_at, joint_motion, joint_force, spring_force, strength_now, joint_energy, &
-    free_force, running_control, key_of, is_held, acts_as_spring, &
-    is_curved, is_marched
+  public :: turning_at, joint_motion, joint_force, spring_force, strength_now, joint_energy, free_force, &
+    running_control, key_of, is_held, acts_as_spring, is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not

@@ -5,7 +5,7 @@
 module chatter
   use contact_law, only: restitution_at
   use eigen, only: modulus
-  use jointed, only: joint_friction, joint_t, offset_of
+  use jointed, only: harmonics_in, joint_friction, joint_t, jointed_t, most_joints, offset_of
   use jointed_flows, only: jointed_motion_t
   use jointed_state, only: joint_motion, jointed_state_t
   use kinds, only: wp
@@ -43,12 +43,7 @@ contains
       if (e >= 1) return
       last = 2*abs(u)/(-opening*(1 - e))
       closing = opening
-      back = state
-      do i = 1, size(machine%joints)
-        if (machine%joints(i)%kind /= joint_friction .or. state%phase(i) == 0) cycle
-        along(i) = moves_along(machine%joints(i), machine%joints(j))
-        if (along(i)) back%phase(i) = -state%phase(i)
-      end do
+      call turn_back(machine, state, j, back, along)
       if (any(along)) then
         call accelerations_of(machine, back, turning, a_back)
         closing = -side*(sum(machine%joints(j)%row*a_back) + given)
@@ -78,13 +73,9 @@ contains
     integer, intent(in) :: j, side
     type(jointed_state_t) :: out
     real(wp) :: a(moving%machine%n), s, u, given, opening, closing, e
-    integer :: i
+    logical :: along(most_joints)
     associate (machine => moving%machine)
-      out = before
-      do i = 1, size(machine%joints)
-        if (machine%joints(i)%kind /= joint_friction .or. before%phase(i) == 0) cycle
-        if (moves_along(machine%joints(i), machine%joints(j))) out%phase(i) = -before%phase(i)
-      end do
+      call turn_back(machine, before, j, out, along)
       call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u, given)
       call accelerations_of(machine, before, turning, a)
       closing = side*(sum(machine%joints(j)%row*a) + given)
@@ -97,6 +88,23 @@ contains
     rest = e*abs(u)*(1/opening + 1/sqrt(opening*closing))/(1 - e*sqrt(closing/opening))
   end function rest_of_chatter
 
+  !> The state in which the friction `along` contact `j` slides the other way.
+  pure subroutine turn_back(machine, state, j, back, along)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    integer, intent(in) :: j
+    type(jointed_state_t), intent(out) :: back
+    logical, intent(out) :: along(:)
+    integer :: i
+    back = state
+    along = .false.
+    do i = 1, size(machine%joints)
+      if (machine%joints(i)%kind /= joint_friction .or. state%phase(i) == 0) cycle
+      along(i) = moves_along(machine%joints(i), machine%joints(j))
+      if (along(i)) back%phase(i) = -state%phase(i)
+    end do
+  end subroutine turn_back
+
   !> Whether friction slides at the speed of a gap, or a multiple of it.
   pure logical function moves_along(friction, contact)
     type(joint_t), intent(in) :: friction, contact
@@ -105,18 +113,11 @@ contains
     ratio = sum(friction%row*contact%row)/sum(contact%row**2)
     moves_along = abs(ratio) > 0 .and. all(abs(friction%row - ratio*contact%row) <= 8*epsilon(ratio)*abs(friction%row)) .and. &
       abs(friction%offset%rate - ratio*contact%offset%rate) <= 8*epsilon(ratio)*abs(friction%offset%rate)
-    do m = 1, max(harmonics_in(friction), harmonics_in(contact))
+    do m = 1, max(harmonics_in(friction%offset), harmonics_in(contact%offset))
       associate (own => offset_of(friction, m))
         moves_along = moves_along .and. modulus(own - ratio*offset_of(contact, m)) <= 8*epsilon(ratio)*modulus(own)
       end associate
     end do
   end function moves_along
-
-  !> Number of harmonics of the given part of a joint coordinate.
-  pure integer function harmonics_in(joint)
-    type(joint_t), intent(in) :: joint
-    harmonics_in = 0
-    if (allocated(joint%offset%harmonic)) harmonics_in = size(joint%offset%harmonic)
-  end function harmonics_in
 
 end module chatter

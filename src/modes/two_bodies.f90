@@ -4,14 +4,15 @@
 !> What a structure is called where one body drives the watched one through friction and stops: its mode, and how the driving
 !> body moves.
 module two_bodies
-  use jointed, only: is_stop, joint_contact, joint_friction, jointed_t, wave_value
-  use jointed_state, only: jointed_state_t, turning_at
+  use jointed, only: harmonics_in, is_stop, joint_contact, joint_friction, jointed_t, wave_value
+  use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
+  use mode_flow, only: harmonics_of
   use motion_state, only: mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, sticks_in
   implicit none
   private
 
-  public :: driver_now, mode_of_two, slides_on, contact_at
+  public :: driver_now, mode_of_two, slides_on, contact_at, keeps_within
 
 contains
 
@@ -20,7 +21,7 @@ contains
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
     real(wp) :: motion(2)
-    complex(wp) :: turning(harmonics_in(machine))
+    complex(wp) :: turning(harmonics_in(machine%driver%motion))
     associate (driver => machine%driver)
       if (driver%at > 0) then
         motion = [state%q(driver%at), state%v(driver%at)]
@@ -32,17 +33,29 @@ contains
     end associate
   end function driver_now
 
-  pure integer function harmonics_in(machine) result(harmonics)
-    type(jointed_t), intent(in) :: machine
-    harmonics = 0
-    if (allocated(machine%driver%motion%harmonic)) harmonics = size(machine%driver%motion%harmonic)
-  end function harmonics_in
-
   !> Number of the joint that is the stops, 0 without any.
   pure integer function contact_at(machine) result(at)
     type(jointed_t), intent(in) :: machine
     at = findloc(is_stop(machine%joints%kind), .true., 1)
   end function contact_at
+
+  !> Whether the watched body is between its stops, soft ones too, but for rounding.
+  pure logical function keeps_within(machine, state)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    complex(wp) :: turning(harmonics_of(machine))
+    real(wp) :: s, u, near
+    integer :: j
+    keeps_within = .true.
+    j = contact_at(machine)
+    if (j == 0) return
+    associate (joint => machine%joints(j))
+      turning = turning_at(machine%frequency, state%time, size(turning))
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      near = 16*epsilon(1.0_wp)*(abs(s) + sum(abs(joint%row*state%q(:machine%n))))
+      keeps_within = s <= joint%upper + near .and. s >= joint%lower - near
+    end associate
+  end function keeps_within
 
   !> The mode of both bodies: they slip by the sign of v1 - v2, stick, the watched one leans on its stop on the ground while the
   !> other slides on, or both are held there.

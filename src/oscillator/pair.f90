@@ -15,7 +15,7 @@ module pair
   implicit none
   private
 
-  public :: build_pair, is_pair, impact_mass
+  public :: build_pair, is_pair
 
   !> How m1 is driven: by a force, by its motion being given, by a controller that follows a reference.
   integer, parameter, public :: driven_by_force = 0, driven_by_motion = 1, driven_by_controller = 2

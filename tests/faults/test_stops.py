@@ -133,10 +133,14 @@ def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, fig
     while outcome is None or "tiles were done before" not in outcome.out:
         again = [*life.RUN, *SLOW, "--resume", "--time-limit", limit]
         outcome = life.run(mpi_separatrix, *again, folder=folder, ranks=3)
-        assert outcome.code == 75
+        # Where the search took long, the next limit may be enough for the rest.
+        assert outcome.code in (0, 75)
         limit *= 2
     assert f"{done} of {life.TILES} tiles were done before" in outcome.out
-    assert life.tiles_of(folder)[0] >= done
+    if outcome.code == 0:
+        assert life.stage(folder) == "done"
+    else:
+        assert life.tiles_of(folder)[0] >= done
     figures.update(code=code, end=round(seconds, 2))
 
 

@@ -185,6 +185,19 @@ def test_starts_that_are_not_allowed() -> None:
         trajectory(model, (0.4, 0, 0), {"contact.restitution": 2.0})
 
 
+@pytest.mark.parametrize("soft", [False, True])
+def test_a_pair_starts_between_its_stops(source_dir: Path, soft: bool) -> None:
+    """Rigid or soft; at a stop is between them."""
+    text = (source_dir / "examples" / "pair_backlash.toml").read_text()
+    if soft:
+        text = text.replace('"newton"', '"hunt_crossley_exact"\nstiffness = 1e5')
+    model = Model.from_text(text)
+    for stop in (0.1, -0.1):
+        assert trajectory(model, (stop, 0.0, 0), duration=0.1, samples_per_period=-1).summary["reason"] != 65
+        with pytest.raises(CaseError, match=f"found x0 = {1.01 * stop:.3f}.* allowed"):
+            trajectory(model, (1.01 * stop, 0.0, 0), duration=0.1)
+
+
 def test_starts_that_are_not_allowed_of_several_threads() -> None:
     """None is taken for an allowed one, and nothing breaks, however many threads are refused at once."""
     catalogue = Catalogue(Model.from_text(CASE))
