@@ -13,7 +13,7 @@ module build_motion
   use motion_state, only: flight_adaptive, options_t
   use oscillator, only: build_oscillator, oscillator_t
   use pair, only: build_pair, is_pair, pair_t
-  use pair_as_structure, only: flown_structure
+  use pair_as_structure, only: structure_of_pair
   use status, only: exit_bad_case
   implicit none
   private
@@ -53,7 +53,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(pair_t) :: pair
     call build_pair(laws, pair, error)
-    if (.not. allocated(error)) call flown_structure(pair, machine, error)
+    if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
   end subroutine structure_of_two
 
   !> A machine of several bodies, in `moving%jointed`; `moving%machine` has its section, and the mass that is watched.
