@@ -24,6 +24,8 @@ module marched_flight
 
   !> Rounding of a guard, as a share of the sizes of its terms.
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+  !> Displacements of so many depths of a contact leave that digits enough.
+  real(wp), parameter :: far = 1e2_wp
 
   !> Displacements and speeds, 1, the time since the start, cosines and sines of the drive are what rows refer to.
   type, extends(watched_system_t) :: marched_t
@@ -31,8 +33,8 @@ module marched_flight
     real(wp) :: frequency = 0, start = 0
     !> Accelerations, one column each; guards.
     real(wp), allocatable :: acceleration(:, :), guard(:, :)
-    !> Joints whose force is not linear: their coordinates and speeds, what their forces are multiplied by, what these do to
-    !> accelerations and guards.
+    !> Joints whose force is not linear: their coordinates (of a contact those beyond its stop) and speeds, what their forces are
+    !> multiplied by, what these do to accelerations and guards.
     type(joint_t), allocatable :: joints(:)
     integer :: phase(most_joints) = 0
     real(wp) :: touch_speed(most_joints) = 0
@@ -52,6 +54,8 @@ module marched_flight
     !> Sizes of the guards, for their rounding; coordinates at the start [m].
     real(wp) :: size_of_guard(most_guards) = 0
     real(wp), allocatable :: origin(:)
+    !> Depth of the thinnest contact that is pressed [m], huge without one.
+    real(wp) :: depth = huge(1.0_wp)
   end type marched_flight_t
 
 contains
@@ -77,7 +81,7 @@ contains
     call set_guards(machine, flow, state, path, flight)
     y(:n) = 0
     y(n + 1:) = state%v(:n)
-    call set_sizes(machine, flight%system, state, y, scale, contact_time)
+    call set_sizes(machine, flight%system, state, y, scale, flight%depth, contact_time)
     duration = machine%period
     ! Held bodies move as they are told: only the force of the contact knows how fast that is.
     if (size(flow%held) > 0) duration = min(duration, 3*contact_time)
@@ -92,6 +96,7 @@ contains
     type(path_t), intent(in) :: path
     type(marched_t), intent(inout) :: system
     real(wp) :: s, u
+    real(wp) :: stop
     integer :: n, one, j, k
     n = machine%n
     one = 2*n + 1
@@ -110,6 +115,10 @@ contains
       if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
       k = k + 1
       system%joints(k) = machine%joints(j)
+      stop = 0
+      if (machine%joints(j)%kind == joint_soft) stop = stop_of(machine%joints(j), state%phase(j))
+      system%joints(k)%upper = machine%joints(j)%upper - stop
+      system%joints(k)%lower = machine%joints(j)%lower - stop
       system%phase(k) = state%phase(j)
       system%touch_speed(k) = state%touch_speed(j)
       system%push(:, k) = held_push(machine, flow, machine%joints(j)%row)
@@ -120,10 +129,9 @@ contains
       system%speed(one, k) = machine%joints(j)%offset%rate
       call joint_motion(machine, j, state%q, state%v, state%time, path%turning, s, u)
       ! A contact that begins is at its stop to the last digit.
-      if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop_of(machine%joints(j), state%phase(j))) &
-          <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop_of(machine%joints(j), &
-                                                                                               state%phase(j))
-      system%place(one, k) = s - sum(flow%place_row(one + 2:, j)*path%unknowns(one + 2:))
+      if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop) &
+          <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop
+      system%place(one, k) = s - stop
     end do
   end subroutine set_system
 
@@ -242,15 +250,15 @@ contains
   end subroutine take_as_linear
 
   !> Sizes of displacements and speeds below which errors are absolute: shares of those of the motion, digits that the
-  !> coordinates do not have excepted, or those of the contacts that are pressed. `contact_time` is that in which their forces
-  !> change [s], huge without one.
-  pure subroutine set_sizes(machine, system, state, y, scale, contact_time)
+  !> coordinates do not have excepted, or those of the contacts that are pressed. `length` is the depth of the thinnest one [m],
+  !> `contact_time` that in which its force changes [s], huge without one.
+  pure subroutine set_sizes(machine, system, state, y, scale, length, contact_time)
     type(jointed_t), intent(in) :: machine
     type(marched_t), intent(in) :: system
     type(jointed_state_t), intent(in) :: state
     real(wp), intent(in) :: y(:)
-    real(wp), intent(out) :: scale(:), contact_time
-    real(wp) :: slope(size(y)), z(2*machine%n + 2 + 2*system%harmonics), length, mass, force, p, u
+    real(wp), intent(out) :: scale(:), length, contact_time
+    real(wp) :: slope(size(y)), mass, force, p, u
     integer :: k, n
     n = machine%n
     slope = system%slope(0.0_wp, y)
@@ -262,7 +270,6 @@ contains
     scale(n + 1:) = length*machine%frequency
     length = huge(length)
     contact_time = huge(contact_time)
-    z = unknowns(system, 0.0_wp, y)
     do k = 1, system%count_joints
       if (system%joints(k)%kind /= joint_soft) cycle
       ! How deep a body of the contact's mass goes at its speed, rests under its force, or is held.
@@ -271,7 +278,7 @@ contains
         u = abs(sum(row*y(n + 1:)))
         force = mass*abs(sum(row*slope(n + 1:)))
         p = max(depth(law, mass*u**2, 1.0_wp), depth(law, force, 0.0_wp), &
-                abs(sum(system%place(:, k)*z) - stop_of(system%joints(k), system%phase(k))))
+                abs(system%place(2*n + 1, k)))
         if (.not. p < length .or. .not. p > tiny(p)) cycle
         length = p
         scale(:n) = p
@@ -312,10 +319,30 @@ contains
     real(wp) :: force(self%count_joints)
     integer :: k
     do k = 1, self%count_joints
-      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), sum(self%place(:, k)*z), &
+      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), place_now(self, k, z), &
                        sum(self%speed(:, k)*z), sum(self%strength(:, k)*z), force(k))
     end do
   end function forces_at
+
+  !> Coordinate of joint number `k` of the system [m]. The part that is given changes by sum of amplitude (exp(i m Omega t) - 1),
+  !> with exp(i x) - 1 = 2 i sin(x/2) exp(i x/2): a stiff contact is so thin that differences of positions have no digits of it.
+  pure real(wp) function place_now(self, k, z) result(s)
+    class(marched_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(wp), intent(in) :: z(:)
+    real(wp) :: sine, cosine, half, unused
+    integer :: c, m
+    c = 2*self%n + 2
+    s = sum(self%place(:c, k)*z(:c))
+    do m = 1, self%harmonics
+      associate (a => self%place(c + 2*m - 1, k), b => self%place(c + 2*m, k))
+        if (.not. (abs(a) > 0 .or. abs(b) > 0)) cycle
+        call sine_cosine(m*self%frequency*z(c)/2, half, unused)
+        call sine_cosine(m*self%frequency*(self%start + z(c)/2), sine, cosine)
+        s = s + 2*half*(b*cosine - a*sine)
+      end associate
+    end do
+  end function place_now
 
   !> Speeds and accelerations.
   pure function marched_slope(self, time, y) result(slope)
@@ -358,6 +385,7 @@ contains
     real(wp) :: before(most_guards), y(2*machine%n)
     integer :: fell, g, n
     n = machine%n
+    if (maxval(abs(flight%march%y(:n))) > far*flight%depth) call count_anew(flight)
     y = flight%march%y(:2*n)
     do g = 1, flight%count_guards
       before(g) = value_of(flight, g, flight%march%time, y)
@@ -389,6 +417,41 @@ contains
     state%time = flight%system%start + flight%march%time
     if (fell == march_time_over) state%time = until
   end subroutine step_flight
+
+  !> Counts displacements and time from where the flight has come to: where a body leans on a contact that moves, both go far, and
+  !> their difference is as thin as the contact.
+  pure subroutine count_anew(flight)
+    type(marched_flight_t), intent(inout) :: flight
+    real(wp) :: z(2*flight%system%n + 2 + 2*flight%system%harmonics)
+    integer :: k, g, c
+    associate (system => flight%system, y => flight%march%y, n => flight%system%n)
+      c = 2*n + 2
+      z = unknowns(system, flight%march%time, y(:2*n))
+      do k = 1, system%count_joints
+        system%place(c - 1, k) = place_now(system, k, z)
+      end do
+      do k = 1, n
+        system%acceleration(c - 1, k) = system%acceleration(c - 1, k) + behind(system%acceleration(:, k))
+      end do
+      do g = 1, flight%count_guards
+        system%guard(c - 1, g) = system%guard(c - 1, g) + behind(system%guard(:, g))
+        if (flight%guards(g)%margin == 0) flight%guards(g)%constant = flight%guards(g)%constant + behind(system%guard(:, g))
+      end do
+      flight%origin = flight%origin + y(:n)
+      y(:n) = 0
+      system%start = system%start + flight%march%time
+      flight%march%time = 0
+    end associate
+
+  contains
+
+    !> What displacements and time so far add to the constant of a row.
+    pure real(wp) function behind(row)
+      real(wp), intent(in) :: row(:)
+      behind = sum(row(:flight%system%n)*z(:flight%system%n)) + row(c)*z(c)
+    end function behind
+
+  end subroutine count_anew
 
   !> Value of a guard.
   pure real(wp) function value_of(flight, g, time, y)
