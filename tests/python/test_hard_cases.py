@@ -80,7 +80,7 @@ def test_a_body_at_rest_on_a_stop_is_pulled_off_it(separatrix, tmp_path):
 
 
 def test_a_body_leans_on_a_very_stiff_stop(separatrix, tmp_path):
-    """Steps follow the frequency of the contact, not the digits that positions have of its depth (F/K)^(2/3)."""
+    """Steps follow the contact's frequency, not the digits that positions have of its depth (F/K)^(2/3)."""
     (tmp_path / "case.toml").write_text(LEANING)
     succeed(separatrix, "trajectory", "case.toml", folder=tmp_path)
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
