@@ -427,6 +427,10 @@ contains
     associate (system => flight%system, y => flight%march%y, n => flight%system%n)
       c = 2*n + 2
       z = unknowns(system, flight%march%time, y(:2*n))
+      ! What the origin has no digits of stays.
+      z(:n) = (flight%origin + y(:n)) - flight%origin
+      flight%origin = flight%origin + z(:n)
+      y(:n) = y(:n) - z(:n)
       do k = 1, system%count_joints
         system%place(c - 1, k) = place_now(system, k, z)
       end do
@@ -437,8 +441,6 @@ contains
         system%guard(c - 1, g) = system%guard(c - 1, g) + behind(system%guard(:, g))
         if (flight%guards(g)%margin == 0) flight%guards(g)%constant = flight%guards(g)%constant + behind(system%guard(:, g))
       end do
-      flight%origin = flight%origin + y(:n)
-      y(:n) = 0
       system%start = system%start + flight%march%time
       flight%march%time = 0
     end associate
