@@ -4,7 +4,7 @@
 !> One flight of a mode in which the force of a joint is not linear, by high-order steps of `marched_system`.
 module marched_flight
   use contact_law, only: contact_t
-  use flight_path, only: begin_series, constant_forces, guard_row, path_t
+  use flight_path, only: begin_series, constant_forces, path_t
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step
   use guards, only: guards_of, joint_guard_t, most_guards
   use jointed, only: joint_soft, jointed_t
@@ -14,6 +14,7 @@ module marched_flight
   use linear_flight, only: watch_t
   use marched_system, only: digits_of_forces, forces_at, marched_t, place_now, set_system, unknowns
   use mode_flow, only: harmonics_of, mode_flow_t
+  use path_rows, only: guard_row
   use polynomial, only: degree, maximum_until
   implicit none
   private
