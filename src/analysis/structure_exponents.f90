@@ -298,7 +298,8 @@ contains
       slope = structure%slope(mode, event%time, y(:structure%n))
       call joint_motion(machine, event%joint, state%q, state%v, event%time, &
                         turning_at(machine%frequency, event%time, structure%frame%moving%harmonics), s, u, given)
-      slide_rate = sum(machine%joints(event%joint)%row*slope(p + 1:p + machine%n)) + given
+      slide_rate = sum(machine%joints(event%joint)%row* &
+                       matmul(structure%frame%velocities, slope(p + 1:p + structure%frame%speeds))) + given
     end associate
   end function slide_rate
 

@@ -210,7 +210,7 @@ contains
     real(wp), intent(in) :: y(:)
     type(margins_t), intent(inout) :: margins
     real(wp) :: x
-    x = sum(machine%frame%directions(machine%frame%moving%machine%watched, :)*y(:machine%places))
+    x = sum(machine%watched(1, :)*y)
     margins%x_max = max(margins%x_max, x)
     margins%x_min = min(margins%x_min, x)
   end subroutine note_place

@@ -62,7 +62,10 @@ contains
     path = output_path(command%output, command%path, command%name)
     call set_range(command, session%the_case, search, bounds, error)
     if (.not. allocated(error)) call set_free(command, session%the_case, search, curves, error)
-    if (.not. allocated(error)) call prepare_search(search, command%searches, error)
+    if (.not. allocated(error)) then
+      call prepare_search(search, command%searches, error)
+      if (allocated(error)) error%message = command%path//': '//error%message
+    end if
     call session%stop_if(error)
     call set_starts(session%the_case, search, error)
     call session%stop_if(error)

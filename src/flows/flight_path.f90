@@ -5,8 +5,7 @@
 !> exponential series.
 module flight_path
   use elementary, only: exponential, sine_cosine
-  use guards, only: joint_guard_t
-  use jointed, only: joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees, most_joints
+  use jointed, only: joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees
   use jointed_state, only: acts_as_spring, is_curved, is_held, joint_force, jointed_state_t, running_control, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
@@ -14,8 +13,7 @@ module flight_path
   implicit none
   private
 
-  public :: begin_path, begin_change, begin_series, path_at, place_powers, force_powers, unknowns_of, series_step, &
-    constant_forces, guard_row
+  public :: begin_path, begin_change, begin_series, path_at, unknowns_of, series_step, constant_forces
 
   !> Terms of the exponential series over a stretch no longer than 1/rate.
   integer, parameter, public :: terms = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)
@@ -348,56 +346,5 @@ contains
     q(:n) = y(:n)
     v(:n) = y(n + 1:2*n)
   end subroutine series_at
-
-  !> Powers of time in a joint coordinate.
-  pure function place_powers(machine, path, j) result(p)
-    type(jointed_t), intent(in) :: machine
-    type(path_t), intent(in) :: path
-    integer, intent(in) :: j
-    real(wp) :: p(0:3)
-    associate (joint => machine%joints(j))
-      p = matmul(joint%row, path%powers(:machine%n, :))
-      p(0) = p(0) + joint%offset%mean + joint%offset%rate*path%start
-      p(1) = p(1) + joint%offset%rate
-    end associate
-  end function place_powers
-
-  !> Powers of time in the force of constraint number `i` of the mode.
-  pure function force_powers(machine, flow, path, i) result(p)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(path_t), intent(in) :: path
-    integer, intent(in) :: i
-    real(wp) :: p(0:3), by_place(machine%n), by_speed(machine%n)
-    integer :: n
-    n = machine%n
-    by_place = matmul(flow%reaction(i, :), flow%stiffness)
-    by_speed = matmul(flow%reaction(i, :), flow%damping)
-    p = matmul(by_place, path%powers(:n, :))
-    p(0:2) = p(0:2) + [1, 2, 3]*matmul(by_speed, path%powers(:n, 1:3))
-    p(0) = p(0) - sum(flow%reaction(i, :)*path%force(:n))
-    p(1) = p(1) - sum(flow%reaction(i, :)*path%force_rate(:n))
-  end function force_powers
-
-  !> The row of a guard over the unknowns of the series.
-  pure function guard_row(machine, flow, path, guard) result(row)
-    type(jointed_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(path_t), intent(in) :: path
-    type(joint_guard_t), intent(in) :: guard
-    real(wp) :: row(size(path%unknowns))
-    integer :: one
-    one = 2*machine%n + 1
-    associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
-      row = guard%place*flow%place_row(:, guard%joint) + guard%speed*flow%speed_row(:, guard%joint)
-      row(one) = row(one) + guard%constant + guard%place*(offset%mean + offset%rate*path%start) + guard%speed*offset%rate
-      row(one + 1) = row(one + 1) + guard%place*offset%rate
-      if (guard%held > 0) then
-        row = row + guard%force*flow%force_row(:, guard%held)
-        row(one) = row(one) - guard%force*sum(flow%reaction(guard%held, :)*path%force(:n))
-        row(one + 1) = row(one + 1) - guard%force*sum(flow%reaction(guard%held, :)*path%force_rate(:n))
-      end if
-    end associate
-  end function guard_row
 
 end module flight_path

@@ -5,11 +5,12 @@
 module guard_functions
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine
-  use flight_path, only: force_powers, path_t, place_powers
+  use flight_path, only: path_t
   use guards, only: joint_guard_t, most_guards
   use jointed, only: jointed_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
+  use path_rows, only: force_powers, place_powers
   implicit none
   private
 

@@ -3,7 +3,7 @@
 
 !> One flight of a linear mode: to the first guard that falls, or to a time.
 module linear_flight
-  use flight_path, only: begin_path, guard_row, path_at, path_t, series_step, terms
+  use flight_path, only: begin_path, path_at, path_t, series_step, terms
   use guard_functions, only: prepare_search, search_t
   use guard_search, only: find_first
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards
@@ -11,6 +11,7 @@ module linear_flight
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
+  use path_rows, only: guard_row
   use series_zero, only: first_zero, order
   implicit none
   private

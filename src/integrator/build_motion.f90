@@ -4,17 +4,16 @@
 !> From laws to a machine ready to move, of one body, two, or several.
 module build_motion
   use build_jointed, only: is_jointed, jointed_of
-  use errors, only: error_t, fail
+  use errors, only: error_t
   use jointed, only: jointed_t
   use jointed_motion, only: prepare_jointed
   use kinds, only: wp
   use law_table, only: law_choice_t
   use motion, only: motion_t, prepare_motion
-  use motion_state, only: flight_adaptive, options_t
+  use motion_state, only: options_t
   use oscillator, only: build_oscillator, oscillator_t
   use pair, only: build_pair, is_pair, pair_t
-  use pair_as_structure, only: flown_structure
-  use status, only: exit_bad_case
+  use pair_as_structure, only: structure_of_pair
   implicit none
   private
 
@@ -33,10 +32,6 @@ contains
     if (is_jointed(laws)) then
       call jointed_of(laws, structure, error)
     else if (is_pair(laws)) then
-      if (options%flight == flight_adaptive) then
-        call fail(error, exit_bad_case, 'integrator.flight = "adaptive": two bodies are flown in closed form; use "auto"')
-        return
-      end if
       call structure_of_two(laws, structure, error)
     else
       call build_oscillator(laws, machine, error)
@@ -53,7 +48,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(pair_t) :: pair
     call build_pair(laws, pair, error)
-    if (.not. allocated(error)) call flown_structure(pair, machine, error)
+    if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
   end subroutine structure_of_two
 
   !> A machine of several bodies, in `moving%jointed`; `moving%machine` has its section, and the mass that is watched.

@@ -16,7 +16,7 @@ module jointed_section
   implicit none
   private
 
-  public :: coordinates_of_jointed, fits_section, start_of_jointed, jointed_at, jointed_point, scales_of_jointed, &
+  public :: coordinates_of_jointed, fits_section, start_of_jointed, lay_out, jointed_at, jointed_point, scales_of_jointed, &
     watched_speed, free_jointed, keeps_clear
 
   !> Sums of the elements of orthonormal directions that are rounding.
@@ -130,29 +130,37 @@ contains
     end do
   end function is_allowed
 
-  !> The state on the section with the coordinates `point`; what they leave open is zero: of two bodies that nothing ties to the
-  !> ground place and velocity of the driving one.
+  !> Places and velocities of all coordinates for those of the section, `point`; what these leave open is zero: of two bodies that
+  !> nothing ties to the ground place and velocity of the driving one.
+  pure subroutine lay_out(moving, point, q, v)
+    type(jointed_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    real(wp), intent(out) :: q(:), v(:)
+    integer :: places, speeds
+    places = size(moving%directions, 2)
+    speeds = size(moving%speeds, 2)
+    q = matmul(moving%directions, point(:places))
+    v = matmul(moving%speeds, point(places + 1:places + speeds))
+    if (.not. allocated(moving%machine%driver)) return
+    associate (at => moving%machine%driver%at)
+      if (at > 0 .and. all(abs(sum(moving%directions, 1)) < nothing)) q = q - q(at)
+      if (at > 0 .and. all(abs(sum(moving%speeds, 1)) < nothing)) v = v - v(at)
+    end associate
+  end subroutine lay_out
+
+  !> The state on the section with the coordinates `point`, see `lay_out`.
   pure function jointed_at(moving, point) result(state)
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(jointed_state_t) :: state
     real(wp) :: q(moving%machine%n), v(moving%machine%n), s, u, limit
     complex(wp) :: turning(moving%harmonics)
-    integer :: places, speeds, j, k
+    integer :: j, k
     logical :: ok
-    places = size(moving%directions, 2)
-    speeds = size(moving%speeds, 2)
-    q = matmul(moving%directions, point(:places))
-    v = matmul(moving%speeds, point(places + 1:places + speeds))
-    if (allocated(moving%machine%driver)) then
-      associate (at => moving%machine%driver%at)
-        if (at > 0 .and. all(abs(sum(moving%directions, 1)) < nothing)) q = q - q(at)
-        if (at > 0 .and. all(abs(sum(moving%speeds, 1)) < nothing)) v = v - v(at)
-      end associate
-    end if
+    call lay_out(moving, point, q, v)
     call start_jointed(moving, q, v, 0.0_wp, state, ok)
     turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
-    k = places + speeds
+    k = size(moving%directions, 2) + size(moving%speeds, 2)
     do j = 1, size(moving%machine%joints)
       associate (joint => moving%machine%joints(j))
         if (joint%kind /= joint_elastic) cycle

@@ -9,7 +9,7 @@ module motion
   use contact_flight, only: contact_side
   use contact_law, only: contact_table, velocity_after_impact
   use effect_law, only: dahl_level
-  use energy, only: book_exact, book_rest, record_with_book
+  use energy, only: book_exact, book_rest
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
@@ -17,15 +17,16 @@ module motion
   use jointed_motion, only: jointed_motion_t
   use kinds, only: wp
   use layer_transit, only: cross_layer, prepare_transit, transit_t
-  use motion_state, only: append_word, event_barrier_release, event_chatter_lower, &
-    event_chatter_upper, event_impact_lower, event_impact_upper, event_release, event_separation, event_stick, &
+  use motion_state, only: append_word, event_chatter_lower, &
+    event_chatter_upper, event_impact_lower, event_impact_upper, event_separation, event_stick, &
     event_touch_lower, event_touch_upper, event_turning_point, flight_adaptive, flight_exact, log_t, &
-    mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, record_event, &
-    sample_due, sample_time, state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
+    mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_upper_barrier, note_position, options_t, record_event, &
+    state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
     word_stick, word_upper
   use oscillator, only: oscillator_t
   use pressed_flight, only: fly_pressed_body, prepare_pressed, pressed_flow_t
-  use rest, only: chatter_time, hold, mode_from_rest
+  use rest, only: chatter_time, mode_from_rest
+  use rest_flight, only: rest_on
   use status, only: exit_bad_case, reason_event_budget, reason_left_domain, reason_not_finite, &
     reason_step_budget, reason_step_failed
   implicit none
@@ -124,7 +125,7 @@ contains
       case (mode_slip_plus, mode_slip_minus)
         call slip_on(moving, state, time_end, tally, reason, log, seam)
       case default
-        call rest_on(moving, state, time_end, tally, log)
+        call rest_on(moving%machine, state, time_end, tally, log)
       end select
       if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (.not. (abs(state%x) <= moving%options%domain)) reason = reason_left_domain
@@ -363,37 +364,6 @@ contains
     end if
     if (present(log)) call record_event(log, merge(passing, event_stick, slips), state, 0.0_wp)
   end subroutine come_to_rest
-
-  !> Rest until release or the end of the time.
-  pure subroutine rest_on(moving, state, time_end, tally, log)
-    type(motion_t), intent(in) :: moving
-    type(state_t), intent(inout) :: state
-    real(wp), intent(in) :: time_end
-    type(tally_t), intent(inout) :: tally
-    type(log_t), intent(inout), optional :: log
-    type(state_t) :: start, sample, before
-    integer :: kind
-    start = state
-    call note_position(tally, state)
-    tally%v_max = max(tally%v_max, 0.0_wp)
-    call hold(moving%machine, state, time_end)
-    if (.not. present(log)) return
-    if (log%sample_interval > 0) then
-      sample = start
-      do
-        before = sample
-        sample%time = sample_time(log)
-        if (.not. sample_due(log, state%time)) exit
-        call book_rest(moving%machine, before, sample, log%book)
-        call record_with_book(moving%machine, sample, log)
-      end do
-      start = before
-    end if
-    call book_rest(moving%machine, start, state, log%book)
-    if (state%mode == start%mode) return
-    kind = merge(event_release, event_barrier_release, start%mode == mode_stick)
-    call record_event(log, kind, state, 0.0_wp)
-  end subroutine rest_on
 
   !> A tie of forces to the last bit: the body is held where it is for an instant.
   pure subroutine break_tie(moving, state, time_end)

@@ -4,10 +4,11 @@
 !> What the lanes of a structure look at in one mode: of every joint a function of time whose limits end a flight.
 module structure_functions
   use eigen, only: modulus
-  use flight_path, only: begin_change, force_powers, path_t, place_powers
+  use flight_path, only: begin_change, path_t
   use jointed, only: joint_friction, joint_soft, joint_t, jointed_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
+  use path_rows, only: force_powers, place_powers
   use structure_types, only: lane_functions, lane_powers, structure_mode_t
   implicit none
   private

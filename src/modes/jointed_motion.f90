@@ -3,28 +3,23 @@
 
 !> The event loop of a jointed structure: fly to the first guard, make the transition, until a time.
 module jointed_motion
-  use chatter, only: rest_of_chatter
   use constants, only: two_pi
   use control, only: error_of
-  use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, slide_ends, slides_down, slides_up, &
-    turns_round
-  use jointed, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, most_joints
+  use guards, only: joint_guard_t, most_guards, turns_round
+  use jointed, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
   use jointed_flight, only: fly
   use jointed_flows, only: jointed_motion_t, prepare_jointed, ready, with_matrix
-  use jointed_log, only: book_change, log_event
   use jointed_state, only: joint_motion, jointed_state_t, key_of, turning_at
   use jointed_transition, only: rounding_of_speed, settle, transition
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use linear_flight, only: watch_t
   use mode_flow, only: build_flow, mode_flow_t
-  use motion_state, only: append_word, event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
-    event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
-    event_turning_point, log_t, tally_t, word_period
+  use motion_state, only: append_word, log_t, tally_t, word_period
   use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
     reason_time_over
-  use still_joints, only: stand_still
   use timed_actions, only: act, acts_on_time, next_action
   use transition_list, only: note_transition, transition_t, transitions_t
+  use transition_log, only: log_action, log_transition
   use two_bodies, only: slides_on
   implicit none
   private
@@ -106,8 +101,8 @@ contains
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
     real(wp) :: before, until, from
-    integer :: count_guards, stalls, holds, key
-    logical :: fallen(most_guards), ok, turned, counts_on, timed, slips
+    integer :: stalls, holds, key
+    logical :: fallen(most_guards), turned, counts_on, timed, slips
     reason = 0
     stalls = 0
     holds = 0
@@ -133,23 +128,14 @@ contains
         if (timed) then
           until = min(until, next_action(machine, state))
           if (until <= state%time) then
-            start = state
-            call act(moving, state, ok, log)
-            if (present(log) .and. ok) call log_action(moving, start, state, log)
-            if (.not. ok) reason = reason_step_failed
-            if (.not. ok) exit
+            call act_and_log(moving, state, reason, log)
+            if (reason /= 0) exit
             cycle
           end if
         end if
         key = key_of(machine, state%phase)
         slips = moves(moving, state, key)
-        if (ready(moving, key) > 0) then
-          call fly(machine, moving%flows(ready(moving, key)), moving%options, state, until, list, count_guards, fallen, watch, &
-                   tally%steps, reason, log)
-        else
-          if (spare%key /= key) call build_flow(machine, key, with_matrix(moving), spare)
-          call fly(machine, spare, moving%options, state, until, list, count_guards, fallen, watch, tally%steps, reason, log)
-        end if
+        call fly_in_mode(moving, key, spare, state, until, list, fallen, watch, tally%steps, reason, log)
         if (reason /= 0) exit
         if (slips .and. state%time > before) tally%slips = tally%slips + 1
         if (state%time > before) state%left = 0
@@ -158,11 +144,7 @@ contains
         turned = any(fallen .and. list%meaning == turns_round)
         fallen = fallen .and. list%meaning /= turns_round
         if (any(fallen)) then
-          start = state
-          call transition(moving, state, list, fallen, stalls >= most_stalls, tally, ok)
-          if (present(log) .and. ok) call log_transition(moving, start, state, list, fallen, log)
-          if (present(transitions)) call keep(start, state, list, fallen, stalls >= most_stalls, transitions)
-          if (.not. ok) reason = reason_step_failed
+          call change_mode(moving, state, list, fallen, stalls >= most_stalls, tally, reason, log, transitions)
           if (stalls >= most_stalls) then
             stalls = 0
             holds = holds + 1
@@ -172,9 +154,7 @@ contains
         if (moving%section > 0) call follow_section(moving, turned, state)
         if (state%at_section .and. present(transitions)) call note_transition(transitions, transition_t(start, state, &
                                                                        moving%section, turns_round, .not. any(fallen)))
-        if (tally%steps > moving%options%step_budget) reason = reason_step_budget
-        if (.not. all(abs(state%q(:machine%n)) <= moving%options%domain)) reason = reason_left_domain
-        if (any(state%q /= state%q) .or. any(state%v /= state%v)) reason = reason_not_finite
+        call check_limits(moving, state, tally, reason)
         if (.not. present(one_event) .or. reason /= 0) cycle
         if (one_event .and. state%time - before > shortest_pause*burst_gap*machine%period) exit
       end do
@@ -184,6 +164,75 @@ contains
       tally%grazing_margin = min(tally%grazing_margin, watch%margin)
     end associate
   end subroutine advance_jointed
+
+  !> One flight in the mode `key`, by the flow that is ready for it or else by `spare`, which is made for it.
+  pure subroutine fly_in_mode(moving, key, spare, state, until, list, fallen, watch, steps, reason, log)
+    type(jointed_motion_t), intent(in) :: moving
+    integer, intent(in) :: key
+    type(mode_flow_t), intent(inout) :: spare
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), intent(in) :: until
+    type(joint_guard_t), intent(inout) :: list(most_guards)
+    logical, intent(out) :: fallen(most_guards)
+    type(watch_t), intent(inout) :: watch
+    integer(int64), intent(inout) :: steps
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    integer :: at, count_guards
+    at = ready(moving, key)
+    associate (machine => moving%machine, options => moving%options)
+      if (at > 0) then
+        call fly(machine, moving%flows(at), options, state, until, list, count_guards, fallen, watch, steps, reason, log)
+      else
+        if (spare%key /= key) call build_flow(machine, key, with_matrix(moving), spare)
+        call fly(machine, spare, options, state, until, list, count_guards, fallen, watch, steps, reason, log)
+      end if
+    end associate
+  end subroutine fly_in_mode
+
+  !> What comes at its time: the sample of a controller, or an impulse.
+  pure subroutine act_and_log(moving, state, reason, log)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(inout) :: state
+    integer, intent(inout) :: reason
+    type(log_t), intent(inout), optional :: log
+    type(jointed_state_t) :: start
+    logical :: ok
+    start = state
+    call act(moving, state, ok, log)
+    if (.not. ok) reason = reason_step_failed
+    if (present(log) .and. ok) call log_action(moving, start, state, log)
+  end subroutine act_and_log
+
+  !> The transition at guards that have `fallen`; phases are `held` for an instant where the motion has stalled.
+  pure subroutine change_mode(moving, state, list, fallen, held, tally, reason, log, transitions)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(inout) :: state
+    type(joint_guard_t), intent(in) :: list(:)
+    logical, intent(in) :: fallen(:), held
+    type(tally_t), intent(inout) :: tally
+    integer, intent(inout) :: reason
+    type(log_t), intent(inout), optional :: log
+    type(transitions_t), intent(inout), optional :: transitions
+    type(jointed_state_t) :: start
+    logical :: ok
+    start = state
+    call transition(moving, state, list, fallen, held, tally, ok)
+    if (.not. ok) reason = reason_step_failed
+    if (present(log) .and. ok) call log_transition(moving, start, state, list, fallen, log)
+    if (present(transitions)) call keep(start, state, list, fallen, held, transitions)
+  end subroutine change_mode
+
+  !> Budgets and the domain.
+  pure subroutine check_limits(moving, state, tally, reason)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: state
+    type(tally_t), intent(in) :: tally
+    integer, intent(inout) :: reason
+    if (tally%steps > moving%options%step_budget) reason = reason_step_budget
+    if (.not. all(abs(state%q(:moving%machine%n)) <= moving%options%domain)) reason = reason_left_domain
+    if (any(state%q /= state%q) .or. any(state%v /= state%v)) reason = reason_not_finite
+  end subroutine check_limits
 
   !> Notes a transition; what was `held` for an instant, or several at once, is not certain.
   pure subroutine keep(before, after, list, fallen, held, transitions)
@@ -218,102 +267,6 @@ contains
       end if
     end associate
   end subroutine follow_section
-
-  !> Events and losses of a transition. Friction sticks or is released as it stops to move or begins to, whatever its force.
-  pure subroutine log_transition(moving, before, after, list, fallen, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: before, after
-    type(joint_guard_t), intent(in) :: list(:)
-    logical, intent(in) :: fallen(:)
-    type(log_t), intent(inout) :: log
-    type(jointed_state_t) :: struck, late
-    complex(wp) :: turning(moving%harmonics)
-    logical, dimension(size(moving%machine%joints)) :: told, stood, stands
-    integer :: g, j, kind
-    associate (machine => moving%machine)
-      struck = after
-      struck%time = before%time
-      call book_change(machine, before, struck, log)
-      turning = turning_at(machine%frequency, before%time, moving%harmonics)
-      stood = stand_still(machine, before, turning)
-      stands = stand_still(machine, struck, turning)
-      told = .false.
-      do g = 1, size(list)
-        if (.not. fallen(g)) cycle
-        j = list(g)%joint
-        select case (list(g)%meaning)
-        case (slide_ends)
-          kind = merge(event_stick, event_turning_point, stands(j))
-        case (slides_up, slides_down)
-          if (stands(j)) cycle
-          kind = event_release
-        case (meets_upper, meets_lower)
-          kind = merge(event_impact_upper, event_impact_lower, list(g)%meaning == meets_upper)
-          if (machine%joints(j)%kind == joint_soft) then
-            kind = merge(event_touch_upper, event_touch_lower, list(g)%meaning == meets_upper)
-          end if
-        case (lets_go)
-          kind = event_barrier_release
-        case (leaves)
-          kind = event_separation
-        case default
-          cycle
-        end select
-        told(j) = .true.
-        call log_event(machine, kind, j, before, struck, log)
-        if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0 .and. &
-            machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
-          kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
-          if (allocated(machine%driver)) then
-            ! Of two bodies at the instant where the impacts accumulate, even where the clock stops before it; what is given or
-            ! sampled first comes first.
-            late = struck
-            late%time = min(late%time + rest_of_chatter(moving, before, turning, j, after%phase(j)), &
-                            next_action(machine, before))
-            call log_event(machine, kind, j, late, late, log)
-          else
-            call log_event(machine, kind, j, before, struck, log)
-          end if
-        end if
-      end do
-      ! What an impact or a cascade does to other joints.
-      call log_friction(machine, before, struck, stood, stands, told, log)
-    end associate
-  end subroutine log_transition
-
-  !> Friction that holds from here on, or no longer, where that is not `told` yet; of two bodies it goes with what did it.
-  pure subroutine log_friction(machine, before, after, stood, stands, told, log)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: before, after
-    logical, intent(in) :: stood(:), stands(:), told(:)
-    type(log_t), intent(inout) :: log
-    integer :: j
-    if (allocated(machine%driver)) return
-    do j = 1, size(machine%joints)
-      if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
-      call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, after, log)
-    end do
-  end subroutine log_friction
-
-  !> What the sample of a controller or an impulse does to joints: friction holds or lets go, contacts open.
-  pure subroutine log_action(moving, before, after, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: before, after
-    type(log_t), intent(inout) :: log
-    complex(wp) :: turning(moving%harmonics)
-    logical :: told(size(moving%machine%joints))
-    integer :: j
-    associate (machine => moving%machine)
-      turning = turning_at(machine%frequency, before%time, moving%harmonics)
-      told = .false.
-      call log_friction(machine, before, after, stand_still(machine, before, turning), stand_still(machine, after, turning), &
-                        told, log)
-      do j = 1, size(machine%joints)
-        if (machine%joints(j)%kind /= joint_contact .or. before%phase(j) == 0 .or. after%phase(j) /= 0) cycle
-        call log_event(machine, event_barrier_release, j, before, after, log)
-      end do
-    end associate
-  end subroutine log_action
 
   !> Moves to the next section and starts the clock anew.
   pure subroutine advance_jointed_period(moving, state, tally, reason, log, transitions)

@@ -18,7 +18,6 @@ module machine_family
   use motion_state, only: log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
   use pair, only: is_pair
-  use pair_as_structure, only: start_of_section
   use structure, only: coordinates_of, structure_t
   use strobe, only: start_strobe, strobe_t
   use structure_family, only: map_of_structure, state_at_start, structure_neighbourhood, structure_of_family
@@ -126,14 +125,7 @@ contains
     select type (machine)
     type is (structure_t)
       call start_of_structure(machine, point, strobe%jointed, ok)
-      if (.not. ok) return
-      if (allocated(machine%pair)) then
-        associate (n => machine%frame%moving%machine%n)
-          strobe = start_strobe(moving, start_of_section(machine%pair, strobe%jointed%q(:n), strobe%jointed%v(:n)))
-        end associate
-      else
-        strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-      end if
+      if (ok) strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
     class default
       strobe = start_strobe(moving, [point, 0.0_wp])
     end select
@@ -246,10 +238,7 @@ contains
     rows = 0
     select type (machine)
     type is (structure_t)
-      associate (watched => machine%frame%moving%machine%watched)
-        rows(1, :machine%places) = machine%frame%directions(watched, :)
-        rows(2, machine%places + watched) = 1
-      end associate
+      rows = machine%watched
     class default
       rows(1, 1) = 1
       rows(2, 2) = 1

@@ -1,17 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure as a hybrid machine. Its state has the positions on which anything depends (see `section_directions`), the
-!> velocities of all coordinates, and the stretches of the springs of elastic friction, which are constant while those slide.
+!> A jointed structure as a hybrid machine. Its state has the positions and the velocities on which anything depends (see
+!> `section_directions`), and the stretches of the springs of elastic friction, which are constant while those slide.
 module structure
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
   use hybrid_machine, only: event_t, hybrid_t
   use jointed, only: joint_contact, joint_elastic, joint_section, jointed_t, most_joints
   use jointed_flows, only: jointed_motion_t
+  use jointed_section, only: lay_out
   use jointed_state, only: free_force, joint_motion, jointed_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use pair, only: pair_t
   use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
   use structure_impact, only: carried_by, strike_with_slopes
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -22,8 +22,8 @@ module structure
 
   type, extends(hybrid_t), public :: structure_t
     type(frame_t) :: frame
-    !> The two bodies that it stands for, if it does (module `pair_as_structure`).
-    type(pair_t), allocatable :: pair
+    !> Rows that give place [m] and speed [m/s] of what is watched.
+    real(wp), allocatable :: watched(:, :)
   contains
     procedure :: rests => structure_rests
     procedure :: fly => fly_structure
@@ -42,22 +42,38 @@ contains
     type(jointed_motion_t), intent(in) :: moving
     real(wp), intent(in) :: sizes(2)
     type(structure_t) :: structure
-    integer :: places, j
+    real(wp) :: q(moving%machine%n), v(moving%machine%n)
+    integer :: places, speeds, j
     associate (machine => moving%machine)
       structure%frame%moving = moving
       structure%frame%directions = moving%directions
+      structure%frame%velocities = moving%speeds
       places = size(moving%directions, 2)
+      speeds = size(moving%speeds, 2)
       structure%frame%elastic = pack([(j, j=1, size(machine%joints))], machine%joints%kind == joint_elastic)
       structure%frame%places = places
+      structure%frame%speeds = speeds
       structure%places = places
-      structure%n = places + machine%n + size(structure%frame%elastic)
+      structure%n = places + speeds + size(structure%frame%elastic)
       structure%has_clock = moving%section == 0
       structure%period = machine%period
       allocate (structure%size_of(structure%n))
       structure%size_of = sizes(1)
-      structure%size_of(places + 1:places + machine%n) = sizes(2)
+      structure%size_of(places + 1:places + speeds) = sizes(2)
+      allocate (structure%watched(2, structure%n), source=0.0_wp)
+      do j = 1, places + speeds
+        call lay_out(moving, unit_vector(places + speeds, j), q, v)
+        structure%watched(:, j) = [q(machine%watched), v(machine%watched)]
+      end do
     end associate
   end function structure_of
+
+  pure function unit_vector(n, k)
+    integer, intent(in) :: n, k
+    real(wp) :: unit_vector(n)
+    unit_vector = 0
+    unit_vector(k) = 1
+  end function unit_vector
 
   !> Number of joints without the section.
   pure integer function count_joints(machine) result(joints)
@@ -106,15 +122,15 @@ contains
     real(wp) :: y(self%n), s, u
     complex(wp) :: turning(self%frame%moving%harmonics)
     integer :: j, k
-    associate (machine => self%frame%moving%machine, n => self%frame%moving%machine%n)
-      y(:self%places) = matmul(state%q(:n), self%frame%directions)
-      y(self%places + 1:self%places + n) = state%v(:n)
+    associate (machine => self%frame%moving%machine, n => self%places + self%frame%speeds)
+      y(:self%places) = matmul(state%q(:machine%n), self%frame%directions)
+      y(self%places + 1:n) = matmul(state%v(:machine%n), self%frame%velocities)
       turning = turning_at(machine%frequency, state%time, self%frame%moving%harmonics)
       do k = 1, size(self%frame%elastic)
         j = self%frame%elastic(k)
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        y(self%places + n + k) = s - state%slider(j)
-        if (state%phase(j) /= 0) y(self%places + n + k) = sliding_stretch(machine, j, state%phase(j))
+        y(n + k) = s - state%slider(j)
+        if (state%phase(j) /= 0) y(n + k) = sliding_stretch(machine, j, state%phase(j))
       end do
     end associate
   end function coordinates_of
@@ -173,13 +189,13 @@ contains
     do k = 1, self%n
       by_state(k, k) = 1
     end do
-    associate (machine => self%frame%moving%machine, d => self%frame%directions, p => self%places, &
-               n => self%frame%moving%machine%n)
+    associate (machine => self%frame%moving%machine, d => self%frame%directions, e => self%frame%velocities, p => self%places, &
+               n => self%places + self%frame%speeds)
       phase = phases_in(machine, mode)
       turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
       call carried_by(machine, phase, .true., held, carried)
       q = matmul(d, y(:p))
-      v = y(p + 1:p + n)
+      v = matmul(e, y(p + 1:n))
       do i = 1, size(held)
         j = held(i)
         associate (joint => machine%joints(j))
@@ -197,18 +213,18 @@ contains
         j = held(i)
         associate (joint => machine%joints(j))
           call joint_motion(machine, j, q, v, t, turning, s, u, given)
-          y(p + 1:p + n) = y(p + 1:p + n) - carried(:, i)*u
-          by_time(p + 1:p + n) = by_time(p + 1:p + n) - carried(:, i)*given
-          do k = 1, n
-            by_state(p + 1:p + n, p + k) = by_state(p + 1:p + n, p + k) - carried(:, i)*joint%row(k)
+          y(p + 1:n) = y(p + 1:n) - matmul(carried(:, i), e)*u
+          by_time(p + 1:n) = by_time(p + 1:n) - matmul(carried(:, i), e)*given
+          do k = 1, n - p
+            by_state(p + 1:n, p + k) = by_state(p + 1:n, p + k) - matmul(carried(:, i), e)*sum(joint%row*e(:, k))
           end do
         end associate
       end do
       do k = 1, size(self%frame%elastic)
         j = self%frame%elastic(k)
         if (phase(j) == 0) cycle
-        y(p + n + k) = sliding_stretch(machine, j, phase(j))
-        by_state(p + n + k, :) = 0
+        y(n + k) = sliding_stretch(machine, j, phase(j))
+        by_state(n + k, :) = 0
       end do
     end associate
   end subroutine settle
@@ -264,7 +280,7 @@ contains
     by_state = 0
     by_time = 0
     value = ieee_value(1.0_wp, ieee_quiet_nan)
-    associate (machine => self%frame%moving%machine, p => self%places, n => self%frame%moving%machine%n)
+    associate (machine => self%frame%moving%machine, p => self%places, n => self%places + self%frame%speeds)
       call guards_of(machine, flow, state, list, count_guards)
       do g = 1, count_guards
         if (list(g)%joint == event%joint .and. list(g)%meaning == event%guard) exit
@@ -274,14 +290,14 @@ contains
       associate (guard => list(g), joint => machine%joints(event%joint))
         call joint_motion(machine, event%joint, state%q, state%v, t, turning, s, u, given)
         value = guard%constant + guard%place*s + guard%speed*u
-        by_state(p + 1:p + n) = guard%speed*joint%row
+        by_state(p + 1:n) = guard%speed*matmul(joint%row, self%frame%velocities)
         by_time = guard%speed*given
         i = findloc(self%frame%elastic, event%joint, 1)
         if (i > 0) then
-          by_state(p + n + i) = guard%place
+          by_state(n + i) = guard%place
         else
           by_state(:p) = guard%place*matmul(joint%row, self%frame%directions)
-          by_time = by_time + guard%place*(u - sum(joint%row*state%v(:n)))
+          by_time = by_time + guard%place*(u - sum(joint%row*state%v(:machine%n)))
         end if
         if (guard%held > 0) call add_force(self, flow, state, turning, guard%held, guard%force, value, by_state, by_time)
       end associate
@@ -324,6 +340,8 @@ contains
     real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
     real(wp) :: struck(size(y), size(y)), at_time(size(y))
+    real(wp), dimension(self%frame%moving%machine%n) :: speeds, at_speeds
+    real(wp) :: by_speeds(self%frame%moving%machine%n, self%frame%moving%machine%n)
     complex(wp) :: turning(self%frame%moving%harmonics)
     integer :: side(most_joints), phase(most_joints), k
     logical :: hits
@@ -333,7 +351,8 @@ contains
     do k = 1, self%n
       struck(k, k) = 1
     end do
-    associate (machine => self%frame%moving%machine, p => self%places, n => self%frame%moving%machine%n)
+    associate (machine => self%frame%moving%machine, e => self%frame%velocities, p => self%places, &
+               n => self%places + self%frame%speeds)
       hits = event%guard == meets_upper .or. event%guard == meets_lower
       if (hits) hits = machine%joints(event%joint)%kind == joint_contact
       if (hits) then
@@ -343,13 +362,16 @@ contains
         phase = phases_in(machine, event%after)
         turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
         call strike_with_slopes(machine, state_in(self, event%before, t, y), turning, side, phase(event%joint) /= 0, &
-                                after(p + 1:p + n), struck(p + 1:p + n, p + 1:p + n), at_time(p + 1:p + n))
+                                speeds, by_speeds, at_speeds)
+        after(p + 1:n) = matmul(speeds, e)
+        struck(p + 1:n, p + 1:n) = matmul(transpose(e), matmul(by_speeds, e))
+        at_time(p + 1:n) = matmul(at_speeds, e)
       end if
       ! A slider stops with its spring stretched by what friction was.
       k = findloc(self%frame%elastic, event%joint, 1)
       if (k > 0 .and. event%guard == slide_ends) then
-        after(p + n + k) = sliding_stretch(machine, event%joint, event%side)
-        struck(p + n + k, :) = 0
+        after(n + k) = sliding_stretch(machine, event%joint, event%side)
+        struck(n + k, :) = 0
       end if
       call settle(self, event%after, t, after, by_state, by_time)
       by_time = by_time + matmul(by_state, at_time)

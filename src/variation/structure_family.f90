@@ -12,15 +12,14 @@ module structure_family
   use hybrid_machine, only: event_t, most_states
   use jointed, only: integral_of, is_stop, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, &
     most_joints
-  use jointed_motion, only: jointed_motion_t, prepare_jointed
+  use jointed_motion, only: jointed_motion_t
   use jointed_section, only: start_of_jointed
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
+  use machine_facts, only: has_driver
   use motion, only: motion_t
   use motion_state, only: flight_adaptive, tally_t
-  use pair, only: build_pair, is_pair, pair_t
-  use pair_as_structure, only: start_as_structure, structure_of_pair
   use status, only: exit_bad_case
   use structure, only: count_joints, phases_in, structure_of, structure_t
   use structure_walk, only: fly_structure
@@ -70,20 +69,14 @@ contains
     type(law_choice_t), allocatable :: laws(:)
     character(len=:), allocatable :: why
     type(motion_t) :: moving
-    type(jointed_t) :: machine
-    type(pair_t) :: pair
     real(wp) :: sizes(2)
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
-    if (is_pair(laws)) then
-      call build_pair(laws, pair, error)
-      if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
-      if (allocated(error)) return
-      call prepare_jointed(machine, family%options, moving%jointed)
-    end if
+    if (has_driver(moving)) call refuse_two_bodies(moving%jointed%machine, error)
+    if (allocated(error)) return
     why = why_not_varied(moving%jointed)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, 'body: the variations of this structure are not known: '//why)
@@ -95,17 +88,28 @@ contains
     end associate
     if (family%sizes(1) > 0) sizes = family%sizes
     structure = structure_of(moving%jointed, sizes)
-    if (is_pair(laws)) structure%pair = pair
   end subroutine structure_of_family
+
+  !> What two bodies have in their own tables and no variations; code 65.
+  pure subroutine refuse_two_bodies(machine, error)
+    type(jointed_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    if (allocated(machine%controller)) then
+      call fail(error, exit_bad_case, 'drive.law: found a controller, allowed force, sine: variations of two bodies have no '// &
+                'law for its integral and samples')
+    else if (.not. machine%driven) then
+      call fail(error, exit_bad_case, 'drive.law: found two bodies without a periodic drive, allowed force, sine: their '// &
+                'variations are known from one drive period to the next')
+    else if (allocated(machine%impulses)) then
+      call fail(error, exit_bad_case, 'body.blow: found a blow, allowed 0 N s: variations of two bodies have no law for it')
+    end if
+  end subroutine refuse_two_bodies
 
   !> The state at a start as `start_strobe` has it.
   pure type(jointed_state_t) function state_at_start(structure, start) result(state)
     type(structure_t), intent(in) :: structure
     real(wp), intent(in) :: start(:)
-    real(wp), allocatable :: own(:)
-    own = start
-    if (allocated(structure%pair)) own = start_as_structure(structure%pair, start)
-    state = start_of_jointed(structure%frame%moving, own(1), own(2), own(3), own(4:))
+    state = start_of_jointed(structure%frame%moving, start(1), start(2), start(3), start(4:))
   end function state_at_start
 
   !> The structure and its neighbours in the parameter.

@@ -25,10 +25,10 @@ module structure_flight
   !> A mode, what its coordinates are, and what may change in it.
   type, public :: frame_t
     type(jointed_motion_t) :: moving
-    !> Directions of the positions (columns), joints with a stretch, number of positions.
-    real(wp), allocatable :: directions(:, :)
+    !> Directions of the positions and of the velocities (columns), joints with a stretch, numbers of positions and velocities.
+    real(wp), allocatable :: directions(:, :), velocities(:, :)
     integer, allocatable :: elastic(:)
-    integer :: places = 0
+    integer :: places = 0, speeds = 0
   end type frame_t
 
   !> The displacement from a start and, after it, changes of it, column by column.
@@ -103,12 +103,12 @@ contains
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: i, j, k
     span = t1 - state%time
-    associate (machine => frame%moving%machine, d => frame%directions, p => frame%places, n => frame%moving%machine%n)
+    associate (machine => frame%moving%machine, d => frame%directions, p => frame%places, n => frame%places + frame%speeds)
       call begin_path(machine, flow, state, path)
       call path_at(machine, flow, path, span, q, v)
       y1(:p) = matmul(q, d)
-      y1(p + 1:p + n) = v
-      y1(p + n + 1:) = y0(p + n + 1:)
+      y1(p + 1:n) = matmul(v, frame%velocities)
+      y1(n + 1:) = y0(n + 1:)
       do i = 1, size(frame%elastic)
         j = frame%elastic(i)
         if (state%phase(j) /= 0) cycle
@@ -116,7 +116,7 @@ contains
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s0, u)
         turning = turning_at(machine%frequency, t1, frame%moving%harmonics)
         call joint_motion(machine, j, q, v, t1, turning, s1, u)
-        y1(p + n + i) = y0(p + n + i) + (s1 - s0)
+        y1(n + i) = y0(n + i) + (s1 - s0)
       end do
       if (.not. present(flight)) return
       do k = 1, size(y0)
@@ -127,16 +127,16 @@ contains
         do i = 1, size(frame%elastic)
           associate (joint => machine%joints(frame%elastic(i)))
             if (state%phase(frame%elastic(i)) == 0) force = force &
-              + joint%stiffness*(sum(joint%row*from) - unit(p + n + i))*joint%row
+              + joint%stiffness*(sum(joint%row*from) - unit(n + i))*joint%row
           end associate
         end do
-        call begin_change(machine, flow, from, unit(p + 1:p + n), force, path)
+        call begin_change(machine, flow, from, matmul(frame%velocities, unit(p + 1:n)), force, path)
         call path_at(machine, flow, path, span, q, v)
         after(:p) = matmul(q, d)
-        after(p + 1:p + n) = v
-        after(p + n + 1:) = 0
+        after(p + 1:n) = matmul(v, frame%velocities)
+        after(n + 1:) = 0
         do i = 1, size(frame%elastic)
-          if (state%phase(frame%elastic(i)) == 0) after(p + n + i) = unit(p + n + i) &
+          if (state%phase(frame%elastic(i)) == 0) after(n + i) = unit(n + i) &
             + sum(machine%joints(frame%elastic(i))%row*(q - from))
         end do
         flight(:, k) = after
@@ -219,16 +219,16 @@ contains
     complex(wp) :: turning(frame%moving%harmonics)
     real(wp) :: s, u
     integer :: k
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%moving%machine%n)
+    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds)
       state%phase = mode%phase
       state%time = time
-      state%q(:n) = matmul(frame%directions, y(:p))
-      state%v(:n) = y(p + 1:p + n)
+      state%q(:machine%n) = matmul(frame%directions, y(:p))
+      state%v(:machine%n) = matmul(frame%velocities, y(p + 1:n))
       if (size(frame%elastic) == 0) return
       turning = turning_at(machine%frequency, time, frame%moving%harmonics)
       do k = 1, size(frame%elastic)
         call joint_motion(machine, frame%elastic(k), state%q, state%v, time, turning, s, u)
-        state%slider(frame%elastic(k)) = s - y(p + n + k)
+        state%slider(frame%elastic(k)) = s - y(n + k)
       end do
     end associate
   end subroutine put_state
@@ -238,18 +238,18 @@ contains
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
     type(jointed_state_t), intent(in) :: state
-    real(wp) :: slope(frame%places + frame%moving%machine%n + size(frame%elastic)), s, u
+    real(wp) :: slope(frame%places + frame%speeds + size(frame%elastic)), s, u
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: k
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%moving%machine%n)
+    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds)
       turning = turning_at(machine%frequency, state%time, frame%moving%harmonics)
-      slope(:p) = matmul(state%v(:n), frame%directions)
-      slope(p + 1:p + n) = accelerations(machine, flow, state, turning)
+      slope(:p) = matmul(state%v(:machine%n), frame%directions)
+      slope(p + 1:n) = matmul(accelerations(machine, flow, state, turning), frame%velocities)
       do k = 1, size(frame%elastic)
-        slope(p + n + k) = 0
+        slope(n + k) = 0
         if (state%phase(frame%elastic(k)) /= 0) cycle
         call joint_motion(machine, frame%elastic(k), state%q, state%v, state%time, turning, s, u)
-        slope(p + n + k) = u
+        slope(n + k) = u
       end do
     end associate
   end function rates
@@ -260,24 +260,27 @@ contains
     type(mode_flow_t), intent(in) :: flow
     type(jointed_state_t), intent(in) :: state
     real(wp), intent(out) :: by_state(:, :)
-    real(wp) :: force(frame%moving%machine%n, size(by_state, 2)), by_time(frame%moving%machine%n)
+    real(wp), dimension(frame%moving%machine%n, size(by_state, 2)) :: force, a
+    real(wp) :: by_time(frame%moving%machine%n)
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: i, k, j
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%moving%machine%n)
+    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds)
       turning = turning_at(machine%frequency, state%time, frame%moving%harmonics)
       call force_slopes(frame, state, turning, force, by_time)
-      by_state = 0
-      by_state(:p, p + 1:p + n) = transpose(frame%directions)
       force = matmul(machine%mobility, force)
-      by_state(p + 1:p + n, :) = force
+      a = force
       do i = 1, size(flow%independent)
         j = flow%held(flow%independent(i))
         do k = 1, size(by_state, 2)
-          by_state(p + 1:p + n, k) = by_state(p + 1:p + n, k) - flow%carried(:, i)*sum(machine%joints(j)%row*force(:, k))
+          a(:, k) = a(:, k) - flow%carried(:, i)*sum(machine%joints(j)%row*force(:, k))
         end do
       end do
+      by_state = 0
+      by_state(:p, p + 1:n) = matmul(transpose(frame%directions), frame%velocities)
+      by_state(p + 1:n, :) = matmul(transpose(frame%velocities), a)
       do k = 1, size(frame%elastic)
-        if (state%phase(frame%elastic(k)) == 0) by_state(p + n + k, p + 1:p + n) = machine%joints(frame%elastic(k))%row
+        if (state%phase(frame%elastic(k)) /= 0) cycle
+        by_state(n + k, p + 1:n) = matmul(machine%joints(frame%elastic(k))%row, frame%velocities)
       end do
     end associate
   end subroutine rate_slopes
@@ -308,10 +311,11 @@ contains
     real(wp), intent(out) :: by_state(:, :), by_time(:)
     real(wp) :: s, u, given, r, by_place, by_speed, surface, rate, strength, growth
     integer :: i, j, m
-    associate (machine => frame%moving%machine, d => frame%directions, p => frame%places, n => frame%moving%machine%n)
+    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds, &
+               d => frame%directions, e => frame%velocities)
       by_state = 0
       by_state(:, :p) = -matmul(machine%stiffness, d)
-      by_state(:, p + 1:p + n) = -machine%damping
+      by_state(:, p + 1:n) = -matmul(machine%damping, e)
       by_time = 0
       do m = 1, size(machine%force, 2)
         by_time = by_time - m*machine%frequency*aimag(machine%force(:, m)*turning(m))
@@ -321,13 +325,13 @@ contains
           if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
           if (joint%kind == joint_elastic .and. state%phase(j) == 0) then
             i = findloc(frame%elastic, j, 1)
-            by_state(:, p + n + i) = -joint%stiffness*joint%row
+            by_state(:, n + i) = -joint%stiffness*joint%row
             cycle
           end if
           call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
           call strength_now(joint, machine%frequency, turning, strength, growth)
           call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
-          surface = u - sum(joint%row*state%v(:n))
+          surface = u - sum(joint%row*state%v(:machine%n))
           rate = by_place*surface + by_speed*given
           if (allocated(joint%strength)) then
             call spring_force(joint, s, growth, r)
@@ -337,8 +341,8 @@ contains
           do i = 1, p
             by_state(:, i) = by_state(:, i) + by_place*sum(joint%row*d(:, i))*joint%row
           end do
-          do i = 1, n
-            by_state(:, p + i) = by_state(:, p + i) + by_speed*joint%row(i)*joint%row
+          do i = 1, n - p
+            by_state(:, p + i) = by_state(:, p + i) + by_speed*sum(joint%row*e(:, i))*joint%row
           end do
         end associate
       end do

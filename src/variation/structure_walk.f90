@@ -55,7 +55,7 @@ contains
             if (abs(s - joint%upper) <= held_within*length .and. abs(u) <= held_within*speed) raw%phase(j) = 1
             if (abs(s - joint%lower) <= held_within*length .and. abs(u) <= held_within*speed) raw%phase(j) = -1
           case (joint_elastic)
-            k = structure%places + machine%n + findloc(structure%frame%elastic, j, 1)
+            k = structure%places + structure%frame%speeds + findloc(structure%frame%elastic, j, 1)
             associate (limit => joint%friction%kinetic/joint%stiffness)
               raw%phase(j) = 0
               if (abs(point(k)) >= limit*(1 - held_within) .and. point(k)*u > 0) raw%phase(j) = merge(1, -1, u > 0)

@@ -25,6 +25,23 @@ velocity = 0.2
 duration = 2
 """
 
+LEANING = """\
+drive = { law = "velocity", velocity = 0.5 }
+contact = { law = "hunt_crossley_exact", stiffness = 1e14, restitution = 0.6, upper = 0.1 }
+body = { law = "friction_pair", mass = 1, driven_mass = 0.7, friction = 3 }
+start = { v0 = 0.5 }
+run = { duration = 2, average = "window" }
+integrator = { step_budget = 200000 }
+"""
+
+SHAKEN = """\
+drive = { law = "sine", amplitude = 4, frequency = 1 }
+contact = { law = "hunt_crossley_exact", stiffness = 1e12, restitution = 0.6, upper = 0.1, lower = -0.1 }
+body = { law = "backlash_pair", mass = 1, driven_mass = 0.7, friction = 0.3 }
+run = { duration = 5, average = "window" }
+integrator = { step_budget = 20000 }
+"""
+
 SOFT = """\
 [body]
 mass = 1
@@ -60,6 +77,24 @@ def test_a_body_at_rest_on_a_stop_is_pulled_off_it(separatrix, tmp_path):
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file.attrs["reason"] == "time_over"
         assert abs(file.attrs["energy_closing_error"]) < 1e-15
+
+
+def test_a_body_leans_on_a_very_stiff_stop(separatrix, tmp_path):
+    """Steps follow the contact's frequency, not the digits that positions have of its depth (F/K)^(2/3)."""
+    (tmp_path / "case.toml").write_text(LEANING)
+    succeed(separatrix, "trajectory", "case.toml", folder=tmp_path)
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
+        assert file.attrs["reason"] == "time_over"
+        assert file["x"][-1] - 0.1 == pytest.approx((3 / 1e14) ** (2 / 3), abs=1e-15)
+
+
+def test_a_very_stiff_stop_that_moves(separatrix, tmp_path):
+    """Its motion, many million times as wide as the contact is deep, leaves that its digits."""
+    (tmp_path / "case.toml").write_text(SHAKEN)
+    succeed(separatrix, "trajectory", "case.toml", folder=tmp_path)
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
+        assert file.attrs["reason"] == "time_over"
+        assert file.attrs["energy_lost_to_contacts"] > 0
 
 
 def test_a_motion_given_up_at_once(separatrix, tmp_path):

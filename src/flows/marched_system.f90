@@ -1,0 +1,217 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The equations of a mode in which the force of a joint is not linear. What is linear of the mode are the rows of its exponential
+!> series; the unknowns are the displacements since the start and the speeds, so that a brief contact loses no digits to the size of
+!> the coordinates.
+module marched_system
+  use elementary, only: sine_cosine
+  use flight_path, only: path_t
+  use guarded_march, only: watched_system_t
+  use jointed, only: joint_soft, joint_t, jointed_t, most_joints
+  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, strength_now
+  use kinds, only: wp
+  use mode_flow, only: mode_flow_t
+  implicit none
+  private
+
+  public :: marched_t, set_system, unknowns, forces_at, place_now, digits_of_forces
+
+  !> Displacements and speeds, 1, the time since the start, cosines and sines of the drive are what rows refer to.
+  type, extends(watched_system_t) :: marched_t
+    integer :: n = 0, harmonics = 0, count_joints = 0, count_guards = 0
+    real(wp) :: frequency = 0, start = 0
+    !> Accelerations, one column each; guards.
+    real(wp), allocatable :: acceleration(:, :), guard(:, :)
+    !> Joints whose force is not linear: their coordinates (of a contact those beyond its stop) and speeds, what their forces are
+    !> multiplied by, what these do to accelerations and guards.
+    type(joint_t), allocatable :: joints(:)
+    integer :: phase(most_joints) = 0
+    real(wp) :: touch_speed(most_joints) = 0
+    real(wp), allocatable :: place(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
+  contains
+    procedure :: slope => marched_slope
+    procedure :: margin => marched_margin
+  end type marched_t
+
+contains
+
+  !> What is integrated.
+  pure subroutine set_system(machine, flow, state, path, system)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(jointed_state_t), intent(in) :: state
+    type(path_t), intent(in) :: path
+    type(marched_t), intent(inout) :: system
+    real(wp) :: s, u
+    real(wp) :: stop
+    integer :: n, one, j, k
+    n = machine%n
+    one = 2*n + 1
+    system%n = n
+    system%harmonics = size(path%turning)
+    system%frequency = machine%frequency
+    system%start = state%time
+    system%acceleration = transpose(path%matrix(n + 1:2*n, :))
+    system%acceleration(one, :) = system%acceleration(one, :) + matmul(path%matrix(n + 1:2*n, :n), state%q(:n))
+    system%count_joints = count([(is_curved(machine%joints(j), state%phase(j)), j=1, size(machine%joints))])
+    allocate (system%joints(system%count_joints), system%push(n, system%count_joints))
+    allocate (system%place(size(path%unknowns), system%count_joints), system%speed(size(path%unknowns), system%count_joints))
+    allocate (system%strength(size(path%unknowns), system%count_joints), source=0.0_wp)
+    k = 0
+    do j = 1, size(machine%joints)
+      if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
+      k = k + 1
+      system%joints(k) = machine%joints(j)
+      stop = 0
+      if (machine%joints(j)%kind == joint_soft) stop = stop_of(machine%joints(j), state%phase(j))
+      system%joints(k)%upper = machine%joints(j)%upper - stop
+      system%joints(k)%lower = machine%joints(j)%lower - stop
+      system%phase(k) = state%phase(j)
+      system%touch_speed(k) = state%touch_speed(j)
+      system%push(:, k) = held_push(machine, flow, machine%joints(j)%row)
+      call set_strength(machine%joints(j), one, system%strength(:, k))
+      system%place(:, k) = flow%place_row(:, j)
+      system%speed(:, k) = flow%speed_row(:, j)
+      system%place(one + 1, k) = machine%joints(j)%offset%rate
+      system%speed(one, k) = machine%joints(j)%offset%rate
+      call joint_motion(machine, j, state%q, state%v, state%time, path%turning, s, u)
+      ! A contact that begins is at its stop to the last digit.
+      if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop) &
+          <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop
+      system%place(one, k) = s - stop
+    end do
+  end subroutine set_system
+
+  !> What the force of a spring is multiplied by, as a row; the unknown number `one` is 1.
+  pure subroutine set_strength(joint, one, row)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: one
+    real(wp), intent(inout) :: row(:)
+    integer :: m
+    row(one) = 1
+    if (.not. allocated(joint%strength)) return
+    row(one) = joint%strength%mean
+    do m = 1, size(joint%strength%harmonic)
+      row(one + 2*m) = real(joint%strength%harmonic(m))
+      row(one + 2*m + 1) = -aimag(joint%strength%harmonic(m))
+    end do
+  end subroutine set_strength
+
+  !> Stop of a contact [m].
+  pure real(wp) function stop_of(joint, phase)
+    type(joint_t), intent(in) :: joint
+    integer, intent(in) :: phase
+    stop_of = merge(joint%upper, joint%lower, phase > 0)
+  end function stop_of
+
+  !> Accelerations under a force of 1 N along `row`, with the constraints held.
+  pure function held_push(machine, flow, row) result(push)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: row(:)
+    real(wp) :: push(machine%n), free(machine%n)
+    integer :: i
+    free = matmul(machine%mobility, row)
+    push = free
+    do i = 1, size(flow%independent)
+      push = push - flow%carried(:, i)*sum(machine%joints(flow%held(flow%independent(i)))%row*free)
+    end do
+  end function held_push
+
+  !> What rows refer to.
+  pure function unknowns(self, time, y) result(z)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: z(2*self%n + 2 + 2*self%harmonics)
+    integer :: m, c
+    c = 2*self%n + 2
+    z(:c - 2) = y
+    z(c - 1) = 1
+    z(c) = time
+    do m = 1, self%harmonics
+      call sine_cosine(m*self%frequency*(self%start + time), z(c + 2*m), z(c + 2*m - 1))
+    end do
+  end function unknowns
+
+  !> Forces of the joints that are not linear [N].
+  pure function forces_at(self, z) result(force)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: z(:)
+    real(wp) :: force(self%count_joints)
+    integer :: k
+    do k = 1, self%count_joints
+      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), place_now(self, k, z), &
+                       sum(self%speed(:, k)*z), sum(self%strength(:, k)*z), force(k))
+    end do
+  end function forces_at
+
+  !> Coordinate of joint number `k` of the system [m]. The part that is given changes by sum of amplitude (exp(i m Omega t) - 1),
+  !> with exp(i x) - 1 = 2 i sin(x/2) exp(i x/2): a stiff contact is so thin that differences of positions have no digits of it.
+  pure real(wp) function place_now(self, k, z) result(s)
+    class(marched_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(wp), intent(in) :: z(:)
+    real(wp) :: sine, cosine, half, unused
+    integer :: c, m
+    c = 2*self%n + 2
+    s = sum(self%place(:c, k)*z(:c))
+    do m = 1, self%harmonics
+      associate (a => self%place(c + 2*m - 1, k), b => self%place(c + 2*m, k))
+        if (.not. (abs(a) > 0 .or. abs(b) > 0)) cycle
+        call sine_cosine(m*self%frequency*z(c)/2, half, unused)
+        call sine_cosine(m*self%frequency*(self%start + z(c)/2), sine, cosine)
+        s = s + 2*half*(b*cosine - a*sine)
+      end associate
+    end do
+  end function place_now
+
+  !> Speeds and accelerations.
+  pure function marched_slope(self, time, y) result(slope)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: slope(size(y)), z(2*self%n + 2 + 2*self%harmonics), force(self%count_joints)
+    integer :: i
+    z = unknowns(self, time, y)
+    force = forces_at(self, z)
+    slope(:self%n) = y(self%n + 1:)
+    do i = 1, self%n
+      slope(self%n + i) = sum(self%acceleration(:, i)*z)
+    end do
+    do i = 1, self%count_joints
+      slope(self%n + 1:) = slope(self%n + 1:) + self%push(:, i)*force(i)
+    end do
+  end function marched_slope
+
+  !> Guard `number`.
+  pure real(wp) function marched_margin(self, number, time, y) result(margin)
+    class(marched_t), intent(in) :: self
+    integer, intent(in) :: number
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: z(2*self%n + 2 + 2*self%harmonics)
+    z = unknowns(self, time, y)
+    margin = sum(self%guard(:, number)*z)
+    if (any(abs(self%lean(:, number)) > 0)) margin = margin + sum(self%lean(:, number)*forces_at(self, z))
+  end function marched_margin
+
+  !> Sizes of what the forces of the joints that are not linear are small differences of [N]: stiff ones, far from the origin.
+  pure function digits_of_forces(machine, system, state, turning) result(sizes)
+    type(jointed_t), intent(in) :: machine
+    type(marched_t), intent(in) :: system
+    type(jointed_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp) :: sizes(system%count_joints), s, u, strength, r, by_place, by_speed
+    integer :: j, k
+    k = 0
+    do j = 1, size(machine%joints)
+      if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
+      k = k + 1
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      call strength_now(machine%joints(j), machine%frequency, turning, strength)
+      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, &
+                       by_speed)
+      sizes(k) = abs(by_place)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:machine%n))))
+    end do
+  end function digits_of_forces
+
+end module marched_system

@@ -1,0 +1,121 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What a transition of a jointed structure is told as: its events, and what it does to the energy.
+module transition_log
+  use chatter, only: rest_of_chatter
+  use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
+  use jointed, only: joint_contact, joint_friction, joint_soft, jointed_t
+  use jointed_flows, only: jointed_motion_t
+  use jointed_log, only: book_change, log_event
+  use jointed_state, only: jointed_state_t, turning_at
+  use kinds, only: wp
+  use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
+    event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
+    event_turning_point, log_t
+  use still_joints, only: stand_still
+  use timed_actions, only: next_action
+  implicit none
+  private
+
+  public :: log_transition, log_action
+
+contains
+
+  !> Events and losses of a transition. Friction sticks or is released as it stops to move or begins to, whatever its force.
+  pure subroutine log_transition(moving, before, after, list, fallen, log)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: before, after
+    type(joint_guard_t), intent(in) :: list(:)
+    logical, intent(in) :: fallen(:)
+    type(log_t), intent(inout) :: log
+    type(jointed_state_t) :: struck, late
+    complex(wp) :: turning(moving%harmonics)
+    logical, dimension(size(moving%machine%joints)) :: told, stood, stands
+    integer :: g, j, kind
+    associate (machine => moving%machine)
+      struck = after
+      struck%time = before%time
+      call book_change(machine, before, struck, log)
+      turning = turning_at(machine%frequency, before%time, moving%harmonics)
+      stood = stand_still(machine, before, turning)
+      stands = stand_still(machine, struck, turning)
+      told = .false.
+      do g = 1, size(list)
+        if (.not. fallen(g)) cycle
+        j = list(g)%joint
+        select case (list(g)%meaning)
+        case (slide_ends)
+          kind = merge(event_stick, event_turning_point, stands(j))
+        case (slides_up, slides_down)
+          if (stands(j)) cycle
+          kind = event_release
+        case (meets_upper, meets_lower)
+          kind = merge(event_impact_upper, event_impact_lower, list(g)%meaning == meets_upper)
+          if (machine%joints(j)%kind == joint_soft) then
+            kind = merge(event_touch_upper, event_touch_lower, list(g)%meaning == meets_upper)
+          end if
+        case (lets_go)
+          kind = event_barrier_release
+        case (leaves)
+          kind = event_separation
+        case default
+          cycle
+        end select
+        told(j) = .true.
+        call log_event(machine, kind, j, before, struck, log)
+        if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0 .and. &
+            machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
+          kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
+          if (allocated(machine%driver)) then
+            ! Of two bodies at the instant where the impacts accumulate, even where the clock stops before it; what is given or
+            ! sampled first comes first.
+            late = struck
+            late%time = min(late%time + rest_of_chatter(moving, before, turning, j, after%phase(j)), &
+                            next_action(machine, before))
+            call log_event(machine, kind, j, late, late, log)
+          else
+            call log_event(machine, kind, j, before, struck, log)
+          end if
+        end if
+      end do
+      ! What an impact or a cascade does to other joints.
+      call log_friction(machine, before, struck, stood, stands, told, log)
+    end associate
+  end subroutine log_transition
+
+  !> Friction that holds from here on, or no longer, where that is not `told` yet; of two bodies it goes with what did it.
+  pure subroutine log_friction(machine, before, after, stood, stands, told, log)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: before, after
+    logical, intent(in) :: stood(:), stands(:), told(:)
+    type(log_t), intent(inout) :: log
+    integer :: j
+    if (allocated(machine%driver)) return
+    do j = 1, size(machine%joints)
+      if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
+      call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, after, log)
+    end do
+  end subroutine log_friction
+
+  !> What the sample of a controller or an impulse does to joints: friction holds or lets go, contacts open.
+  pure subroutine log_action(moving, before, after, log)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(in) :: before, after
+    type(log_t), intent(inout) :: log
+    complex(wp) :: turning(moving%harmonics)
+    logical :: told(size(moving%machine%joints))
+    integer :: j
+    associate (machine => moving%machine)
+      turning = turning_at(machine%frequency, before%time, moving%harmonics)
+      told = .false.
+      call log_friction(machine, before, after, stand_still(machine, before, turning), stand_still(machine, after, turning), &
+                        told, log)
+      do j = 1, size(machine%joints)
+        if (machine%joints(j)%kind /= joint_contact .or. before%phase(j) == 0 .or. after%phase(j) /= 0) cycle
+        call log_event(machine, event_barrier_release, j, before, after, log)
+      end do
+    end associate
+  end subroutine log_action
+
+end module transition_log
