@@ -4,7 +4,7 @@
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
-  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria
+  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria, report_rest
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
@@ -83,6 +83,7 @@ contains
       if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, contacts, trim(bounds%unit))
       call report_equilibria(session, search, trim(bounds%unit))
+      call report_rest(session, search, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
     if (size(search%branches) + count_equilibria(search) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
