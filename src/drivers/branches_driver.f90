@@ -36,7 +36,7 @@ module branches_driver
   public :: run_branches
 
   !> Starts at each value at which orbits are searched.
-  integer, parameter :: starts = 48
+  integer, parameter :: starts = 48, near_starts = 16
   !> At an impact without speed the derivative is not finite: a located graze leaves a speed of rounding, and what is larger than
   !> this comes from that.
   real(wp), parameter :: endless = 1e7_wp
@@ -165,15 +165,17 @@ contains
 
   end subroutine set_range
 
-  !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about.
+  !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about;
+  !> where it has none for either some within a quarter of that, too, and its own start: basins may be small.
   subroutine set_starts(the_case, search, error)
     type(case_t), intent(in) :: the_case
     type(search_t), intent(inout) :: search
     type(error_t), allocatable, intent(out) :: error
     class(hybrid_t), allocatable :: machine
-    real(wp) :: low(2), high(2)
-    integer :: i, k
+    real(wp) :: low(2), high(2), watched(2, starts + near_starts + 1)
+    integer :: i, k, last
     character(len=2), parameter :: names(2) = ['x0', 'v0']
+    last = size(watched, 2)
     high = 2*search%family%sizes
     low = -high
     do k = 1, 2
@@ -181,12 +183,17 @@ contains
         if (the_case%axes(i)%name /= names(k)) cycle
         low(k) = minval(the_case%axes(i)%values)
         high(k) = maxval(the_case%axes(i)%values)
+        last = starts
       end do
     end do
     call machine_of_family(search%family, (search%plan%lowest + search%plan%highest)/2, machine, error)
     if (allocated(error)) return
-    search%starts = starts_of_section(machine, reshape([(low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp), i=1, starts)], &
-                                                       [2, starts]))
+    do i = 1, starts + near_starts
+      watched(:, i) = low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp)
+      if (i > starts) watched(:, i) = watched(:, i)/4
+    end do
+    watched(:, starts + near_starts + 1) = [the_case%start%x0, the_case%start%v0]
+    search%starts = starts_of_section(machine, watched(:, :last))
   end subroutine set_starts
 
   !> Every labelled point, and what was found from how many seeds.
