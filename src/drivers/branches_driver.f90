@@ -285,6 +285,7 @@ contains
     end do
     if (.not. has_clock) text = text//' and the trivial 1'
     text = replace_all(text, 'multipliers  ', 'multipliers ')
+    if (index(text, 'not known') > 0) text = text//' (hidden by rounding beside what grows without bound where events graze)'
   end function multipliers_text
 
   pure function multipliers_json(orbit, has_clock) result(text)
