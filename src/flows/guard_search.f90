@@ -227,14 +227,16 @@ contains
     end do
   end subroutine note_misses
 
-  !> Gap `g`, if it stops closing between `a` and `b`, with its derivatives there.
+  !> Gap `g`, if it stops closing between `a` and `b`, with its derivatives there. A rate of nothing but rounding is none: what
+  !> friction holds the contact between moves as one.
   pure subroutine note_miss(search, g, a, b, here, last, margin)
     type(search_t), intent(in) :: search
     integer, intent(in) :: g
     real(wp), intent(in) :: a, b, here(0:), last(0:)
     real(wp), intent(inout) :: margin
-    real(wp) :: least(0:3), at
-    if (.not. here(1) < 0 .or. last(1) < -rounding*(bound(search, g, 1, a, b - a) + search%blur(1, g))) return
+    real(wp) :: least(0:3), at, none
+    none = rounding*(bound(search, g, 1, a, b - a) + search%blur(1, g))
+    if (.not. here(1) < -none .or. last(1) < -none) return
     least = last
     if (last(1) > 0) call turning_point(search, g, 1, a, b, here, last, 0.0_wp, at, least)
     margin = min(margin, max(least(0), 0.0_wp))

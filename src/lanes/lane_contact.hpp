@@ -140,6 +140,16 @@ LANE_DEVICE inline vec contact_length(const lane_machine &m, const lane_group &g
   return exponential(pick(least < longest, least, longest));
 }
 
+// Length over which the first terms of the speed are at most `room` each.
+LANE_DEVICE inline vec length_within(const contact_expansion &p, vec room) {
+  vec least = 1e300;
+  for (int k = 1; k <= 6; k++) {
+    vec length = (1.0 / k) * (logarithm(room) - logarithm(magnitude(p.v[k]) + 1e-290));
+    put(least, length < least, length);
+  }
+  return exponential(least);
+}
+
 // A step of the contacts: its polynomials in the fraction of the step, how far it goes, what it ends with.
 struct contact_stride {
   vec u[order + 1], fall[order], time[order + 1], length, end, duration;
@@ -194,10 +204,11 @@ LANE_DEVICE inline contact_stride look_along_contact(const lane_machine &m, cons
   return t;
 }
 
-// Does the formula push all the way?
+// Does the formula push all the way? `pulls` where it does not at the end of the step.
 LANE_DEVICE inline mask pushes(const lane_machine &m, mask asked, const contact_stride &t,
-                               const lane_group &g) {
+                               const lane_group &g, mask &pulls) {
   const lane_contact &c = m.contact;
+  pulls = mask{};
   if (c.linear > 0 || !(c.damping > 0))
     return ~mask{};
   const vec share = damping_of(m, g) * side_of(g) * g.direction;
@@ -205,7 +216,10 @@ LANE_DEVICE inline mask pushes(const lane_machine &m, mask asked, const contact_
   for (int k = 0; k < order; k++)
     margin[k] = share * t.fall[k];
   margin[0] += 1.0;
-  return positive_until(margin, asked, t.end);
+  vec last, f1, f2;
+  value_at<order - 1>(margin, t.end, last, f1, f2);
+  pulls = asked & (last <= 0.0);
+  return positive_until(margin, asked, t.end) & ~pulls;
 }
 
 // What follows the steps `due` that end with an event, or go on. Returns the lanes that the scalar code must
@@ -245,12 +259,22 @@ LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const contact
 LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left, lane_group &g) {
   contact_expansion p;
   expand_contact(m, g, p);
-  vec natural = contact_length(m, g, p), length = pick(limit < natural, limit, natural);
+  vec natural = contact_length(m, g, p), room = speed_room(m.law, g, pressed);
+  const bool fades = any(pressed & (room < 1e299));
+  if (fades) {
+    vec within = length_within(p, room);
+    put(natural, within < natural, within);
+  }
+  vec length = pick(limit < natural, limit, natural);
   contact_stride t = look_along_contact(m, p, pressed, length, g);
-  mask proven = pressed & ~t.lost & positive_until(t.fall, pressed, t.end) & pushes(m, pressed, t, g);
+  mask pulls, proven = pressed & ~t.lost & positive_until(t.fall, pressed, t.end) &
+                       pushes(m, pressed & ~t.lost, t, g, pulls);
+  if (fades)
+    proven = proven & keeps_within(t.fall, t.end, room);
   // A body that neither moves nor presses stays for ever in the variable of the series.
   mask idle = (p.u[0] <= 0.0) & (magnitude(g.v) < 1e-12);
-  mask lost = pressed & (idle | (~proven & ~(length > shortest_share * natural)));
+  // Where its law comes to pull, the contact has no force: a kink.
+  mask lost = pressed & (idle | pulls | (~proven & ~(length > shortest_share * natural)));
   proven = proven & ~lost;
   lost = lost | (proven & take_contact_events(m, t, proven, g)) | (pressed & (g.flights >= g.budget));
   put(limit, pressed, pick(proven, vec(1e300), 0.5 * length));

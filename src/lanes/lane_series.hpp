@@ -253,17 +253,19 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
   return exponential(least - shrinking);
 }
 
-// How much the speed may change over a step where there is friction E exp(-(v/v_s)^2): the terms of its
-// series grow up to order 2 (v/v_s)^2 before they shrink, so that the last one says little. For |x| <= 0.5
-// what is left out of exp(-(u + x)^2) is below exp(r^2) (0.5/r)^18 = 1e-10 (Cauchy, r = 2.5); above u = 6.2
-// it is nil.
+// How much the speed may change over a step where there is friction E exp(-(v/v_s)^delta): the terms of its
+// series grow before they shrink, so that the last one says little. For |x| <= 0.5 what is left out of
+// exp(-(u + x)^2) is below exp(r^2) (0.5/r)^18 = 1e-10 (Cauchy, r = 2.5); above u = 6.2 it is nil. For
+// |x| <= 2 what is left out of exp(-(u + x)) is below 2^18/18! = 4e-11 of it; above u = 30 it is nil.
 LANE_DEVICE inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
   vec room = 1e300;
   for (int i = 0; i < 2; i++) {
-    if (!(l.excess[i] > 0) || l.exponent[i] < 1.5)
+    if (!(l.excess[i] > 0))
       continue;
-    vec here = magnitude(g.v) - 6.2 * l.velocity[i];
-    put(here, here < 0.5 * l.velocity[i], 0.5 * l.velocity[i]);
+    const bool squared = l.exponent[i] > 1.5;
+    const double nil = (squared ? 6.2 : 30) * l.velocity[i], least = (squared ? 0.5 : 2) * l.velocity[i];
+    vec here = magnitude(g.v) - nil;
+    put(here, here < least, least);
     put(room, within & (here < room), here);
   }
   return room;

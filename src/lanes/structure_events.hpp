@@ -119,8 +119,8 @@ inline mask set_off(const structure_machine &m, const size &z, mask fresh, struc
   return wrong;
 }
 
-// Sticking or sliding of joint j where `at` it was found. Where it turns, and both it and another that sticks
-// take more force to hold than to slide, the scalar code tells which of them go together.
+// Sticking or sliding of joint j where `at` it was found. Where it turns, and it or another that sticks takes
+// more force to hold than to slide, the other might give way instead: the scalar code tells which does.
 inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rare, mask &stuck,
                            structure_group &g) {
   const structure_joint &joint = m.joint[j];
@@ -131,8 +131,8 @@ inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rar
   mask holds = magnitude(force)<joint.upper - joint.tie, turns = force> joint.upper + joint.tie;
   rare = rare | (slid & ~holds & ~turns);
   stuck = slid & holds;
-  for (int i = 0; i < int(m.joints) && joint.even < 0.5; i++)
-    if (i != j && m.joint[i].slides > 0.5 && m.joint[i].even < 0.5)
+  for (int i = 0; i < int(m.joints); i++)
+    if (i != j && m.joint[i].slides > 0.5 && (joint.even < 0.5 || m.joint[i].even < 0.5))
       rare = rare | (slid & turns & (g.s.phase[i] == 0.0));
   put(g.s.phase[j], slid, pick(holds, 0, -d));
   put(g.s.left, slid & turns, -double(j + 1));

@@ -71,22 +71,36 @@ contains
     flies = flies .and. flow%structure%mode(key + 1)%known > 0
   end function structure_flies
 
-  !> The lanes can be captured by attractor number `attractor` near its `point` (coordinates, speeds): where the square of the
-  !> distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`.
-  pure subroutine add_structure_region(batch, attractor, point, scale, metric, reach)
+  !> The lanes can be captured by attractor number `attractor` near its `point` of the section (places, speeds): where the square
+  !> of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`. The section's
+  !> coordinates lie along directions of its own, at right angles; places share a scale, and so do speeds.
+  pure subroutine add_structure_region(moving, batch, attractor, point, scale, metric, reach)
+    type(jointed_motion_t), intent(in) :: moving
     type(structure_batch_t), intent(inout) :: batch
     integer, intent(in) :: attractor
     real(wp), intent(in) :: point(:), scale(:), metric(:), reach
-    if (batch%regions == structure_regions) then
+    real(wp), dimension(size(point), size(point)) :: onto, form
+    integer :: i, j, n
+    n = moving%machine%n
+    if (batch%regions == structure_regions .or. any(abs(scale(2:n) - scale(1)) > 0) .or. &
+        any(abs(scale(n + 2:) - scale(n + 1)) > 0)) then
       batch%complete = 0
       return
     end if
+    onto = 0
+    onto(:n, :n) = transpose(moving%directions)
+    onto(n + 1:, n + 1:) = transpose(moving%speeds)
+    do j = 1, 2*n
+      form(:j, j) = metric((j*(j - 1))/2 + 1:(j*(j + 1))/2)
+      form(j, :j) = form(:j, j)
+    end do
+    form = matmul(transpose(onto), matmul(form, onto))
     batch%regions = batch%regions + 1
-    associate (region => batch%region(batch%regions), n => size(point))
+    associate (region => batch%region(batch%regions))
       region = structure_region_t(attractor=real(attractor, wp), reach=reach)
-      region%point(:n) = point
-      region%stretch(:n) = 1/scale
-      region%metric(:size(metric)) = metric
+      region%point(:2*n) = matmul(transpose(onto), point)
+      region%stretch(:2*n) = 1/scale
+      region%metric(:size(metric)) = [((form(i, j), i=1, j), j=1, 2*n)]
     end associate
   end subroutine add_structure_region
 

@@ -15,6 +15,7 @@ module trajectories
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_event, go_to_stop, outcome_t, pass_stop, &
     phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
+  use, intrinsic :: iso_fortran_env, only: int64
   implicit none
   private
 
@@ -38,11 +39,13 @@ module trajectories
   !> Batches of a GPU that are attended to between two looks at the watch.
   integer, parameter :: batches_per_look = 256
 
-  !> The trajectory in a lane: number of its start (0 = none), and whether the extremes of its window went unseen.
+  !> The trajectory in a lane: number of its start (0 = none), whether the extremes of its window went unseen, and the slips that
+  !> were counted up to its last stop.
   type :: passenger_t
     integer :: start = 0
     type(course_t) :: course
     logical :: unseen = .false.
+    integer(int64) :: slips = 0
   end type passenger_t
 
 contains
@@ -276,7 +279,9 @@ contains
         if (journey%flow%resumes) call go_past_events(journey, course, taken)
         if (course%reason == 0 .and. .not. taken) call go_to_stop(journey%moving, course, slipped)
       end if
-      if (.not. taken) call pass_stop(journey%moving, catalogue, journey%span, .true., course, outcome)
+      if (.not. taken) call pass_stop(journey%moving, catalogue, journey%span, course%tally%slips > passenger%slips, &
+                                      course, outcome)
+      if (.not. taken) passenger%slips = course%tally%slips
       if (.not. taken .and. (left .or. .not. flies(journey, course))) then
         call go_on(journey, catalogue, start, passenger, outcome)
         taken = course%phase /= phase_over
@@ -318,6 +323,7 @@ contains
         call pass_stop(journey%moving, catalogue, journey%span, slipped, course, outcome)
       end do
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
+      passenger%slips = course%tally%slips
       if (course%phase /= phase_over) return
       if (passenger%unseen .and. course%reason == 0 .and. course%captured == 0 .and. journey%describe == describe_all) then
         ! It was captured when its window began, and lost: once more, in the event loop.

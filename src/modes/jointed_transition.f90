@@ -217,7 +217,7 @@ contains
   end subroutine change_phases
 
   !> Which friction joints are at rest, and the directions of the others. One that stuck in the state `before` is at rest unless
-  !> an impact has set it in motion: what its speed was then is rounding.
+  !> an impact has set it in motion: what its speed was then is rounding. What an impact leaves of a speed may be rounding, too.
   pure subroutine judge_friction(machine, before, turning, struck, state, at_rest)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: before
@@ -225,21 +225,22 @@ contains
     logical, intent(in) :: struck
     type(jointed_state_t), intent(inout) :: state
     logical, intent(inout) :: at_rest(:)
-    real(wp) :: s, u, last
+    real(wp) :: s, u, last, rounding
     integer :: j
     do j = 1, size(machine%joints)
       if (machine%joints(j)%kind /= joint_friction) cycle
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      rounding = rounding_of_speed(machine, j, state)
+      if (struck) rounding = rounding + rounding_of_speed(machine, j, before)
       if (before%phase(j) == 0) then
         call joint_motion(machine, j, before%q, before%v, before%time, turning, s, last)
-        at_rest(j) = .not. struck .or. &
-          abs(u - last) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, before)
+        at_rest(j) = .not. struck .or. abs(u - last) <= rounding
       else if (at_rest(j) .and. struck) then
         ! Its slide has just ended, unless the impact at the same instant sets it in motion.
         call joint_motion(machine, j, before%q, before%v, before%time, turning, s, last)
-        at_rest(j) = abs(u - last) <= rounding_of_speed(machine, j, state) + rounding_of_speed(machine, j, before)
+        at_rest(j) = abs(u - last) <= rounding
       end if
-      if (abs(u) <= rounding_of_speed(machine, j, state)) at_rest(j) = .true.
+      if (abs(u) <= rounding) at_rest(j) = .true.
       if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
     end do
   end subroutine judge_friction
