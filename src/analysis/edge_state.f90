@@ -12,7 +12,7 @@ module edge_state
   use motion, only: motion_t
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
     event_touch_lower, event_touch_upper, tally_t
-  use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance
+  use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance, sides_of_saddle
   use start_label, only: label_from, label_not_known, label_of
   use strobe, only: strobe_t
   use trajectory, only: outcome_t, run_trajectory, span_t
@@ -32,21 +32,23 @@ module edge_state
     'recurrent edge state, not periodic', 'edge of a graze', 'rim of a stick set', 'edge of a completed chatter', &
     'edge at another event']
 
-  !> Drive periods that a pair is followed, and the longest saddle that is looked for.
-  integer, parameter :: most_periods = 300, longest = 12
+  !> Drive periods that a pair is followed, and more where it is on its way to a saddle; and the longest saddle that is looked for.
+  integer, parameter :: most_periods = 300, most_arriving = 900, longest = 32
   !> Distances in natural sizes: at which a pair is brought together again and to which, at which it has parted.
   real(wp), parameter :: apart = 1e-6_wp, together = 1e-10_wp, closest = 1e-13_wp, parted = 1e-2_wp
   !> Growth of the distance within one period that is looked at more closely where one has an event that the other has not.
   real(wp), parameter :: sudden = 1e3_wp
-  !> A return so near is tried with Newton's method; a motion that never returns nearer than `far` is not periodic.
-  real(wp), parameter :: near_return = 1e-3_wp, far = 2e-2_wp
+  !> A return so near is tried with Newton's method. A motion settles on no cycle where its returns, after the number of periods
+  !> after which they are the nearest, are `far` still in its last quarter, and not less than this share of what they were.
+  real(wp), parameter :: near_return = 1e-3_wp, far = 0.1_wp, settling = 0.8_wp
   !> It has come to a saddle at this distance; it has not where the distance grows so many times, or after so many periods.
   real(wp), parameter :: arrived = 1e-5_wp, moved_off = 20
-  integer, parameter :: most_waiting = 60
+  integer, parameter :: waiting_least = 60
   !> Halvings of the way between two starts.
   integer, parameter :: start_halvings = 10
-  !> A pair leaves a saddle that it has come as near to as `near_saddle`, up to the distance `left_saddle`, on two sides.
-  real(wp), parameter :: near_saddle = 3e-3_wp, left_saddle = 2e-2_wp
+  !> A pair leaves a saddle that it has come as near to as `near_saddle` on two sides: before it is as far as `left_saddle` both are
+  !> so many times as far from the stable set as at first, or as what the saddle is known to.
+  real(wp), parameter :: near_saddle = 3e-3_wp, left_saddle = 2e-2_wp, leaves = 10, known_to = 1e-9_wp
 
   !> What labels a motion: the machine, its trajectories, and the attractors that they may come to.
   type, public :: labeller_t
@@ -61,12 +63,15 @@ module edge_state
     real(wp), allocatable :: points(:, :)
     logical :: on_section = .false.
     integer :: labels(2) = 0
+    !> A third label was met between the two, and the second is that one now.
+    logical :: mixed = .false.
   end type pair_t
 
 contains
 
   !> Follows the pair that starts at the columns of `starts` with `labels`, halving its distance by the labels whenever it grows.
-  !> `edge` is one of the codes above; `saddle` is the orbit where it is `edge_saddle`.
+  !> `edge` is one of the codes above; `saddle` is the orbit where it is `edge_saddle`. Where a third label was met on the way it is
+  !> that of another pair of labels: `edge` is not known then, but the periods of `saddle` are not 0.
   pure subroutine track_edge(machines, labeller, starts, labels, edge, saddle)
     type(neighbourhood_t), intent(in) :: machines
     type(labeller_t), intent(in) :: labeller
@@ -75,14 +80,15 @@ contains
     integer, intent(out) :: edge
     type(saddle_t), intent(out) :: saddle
     type(pair_t) :: pair, before
-    real(wp) :: past(machines%centre%n, most_periods), least, distance, first_distance, gap
-    integer :: n, event, waiting
+    type(saddle_t) :: candidate
+    real(wp) :: past(machines%centre%n, most_arriving), distance, first_distance, gap
+    integer :: n, event, waiting, most
     logical :: ok
     edge = edge_not_known
     waiting = 0
     pair = pair_t(starts, .false., labels)
-    least = huge(least)
-    do n = 1, most_periods
+    do n = 1, most_arriving
+      if (n > most_periods .and. waiting == 0) exit
       if (n > 1) then
         if (gap_of(machines%centre, pair) > apart) call bring_together(machines%centre, labeller, together, pair, ok)
         if (.not. ok) return
@@ -93,26 +99,60 @@ contains
       gap = gap_of(machines%centre, pair)
       if (gap > parted .or. (event /= 0 .and. gap > sudden*gap_before(machines%centre, before))) then
         call look_closer(machines%centre, labeller, before, pair, event, ok)
-        if (ok) edge = edge_of_event(event)
+        if (ok .and. .not. pair%mixed) edge = edge_of_event(event)
         if (ok .or. gap_of(machines%centre, pair) > parted) return
         ok = .true.
       end if
       past(:, n) = pair%points(:, 1) + (nearest_copy(machines%centre, pair%points(:, 2), pair%points(:, 1)) - pair%points(:, 1))/2
       if (waiting == 0) then
-        call try_returns(machines, past(:, :n), least, saddle, ok)
-        if (ok) first_distance = distance_to_saddle(machines%centre, saddle, past(:, n))
-        if (ok) waiting = n
+        call try_returns(machines, past(:, :n), candidate, ok)
+        if (ok) then
+          first_distance = distance_to_saddle(machines%centre, candidate, past(:, n))
+          waiting = n
+          most = waiting_of(candidate, first_distance)
+        end if
         ok = .true.
       end if
       if (waiting == 0) cycle
       ! Near to a saddle once is not enough: the pair has to come to it.
-      distance = distance_to_saddle(machines%centre, saddle, past(:, n))
-      if (distance < arrived) edge = edge_saddle
-      if (edge == edge_saddle) return
-      if (distance > moved_off*first_distance .or. n > waiting + most_waiting) waiting = 0
+      distance = distance_to_saddle(machines%centre, candidate, past(:, n))
+      if (distance < arrived) then
+        saddle = candidate
+        if (.not. pair%mixed) edge = edge_saddle
+        return
+      end if
+      if (distance > moved_off*first_distance .or. n > waiting + most) waiting = 0
     end do
-    if (least > far) edge = edge_recurrent
+    if (wanders(machines%centre, past(:, :most_periods))) edge = edge_recurrent
   end subroutine track_edge
+
+  !> Periods that a pair may take from a distance to where it has arrived, as the saddle attracts.
+  pure integer function waiting_of(saddle, distance) result(most)
+    type(saddle_t), intent(in) :: saddle
+    real(wp), intent(in) :: distance
+    real(wp) :: rate
+    rate = -log(max(tiny(rate), maxval(abs(saddle%multipliers(2:)))))/saddle%periods
+    most = max(waiting_least, ceiling(min(real(most_arriving, wp), 2*log(max(1.0_wp, distance/arrived))/rate)))
+  end function waiting_of
+
+  !> Whether a motion settles on no cycle of up to `longest` periods: to its end it comes back far from where it was.
+  pure logical function wanders(machine, past)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: past(:, :)
+    real(wp) :: largest(2), best(2)
+    integer :: p, n, quarter
+    quarter = size(past, 2)/4
+    best = huge(best)
+    do p = 1, longest
+      largest = 0
+      do n = quarter + 1, 2*quarter
+        largest(1) = max(largest(1), section_distance(machine, past(:, n - p), past(:, n)))
+        largest(2) = max(largest(2), section_distance(machine, past(:, n + 2*quarter - p), past(:, n + 2*quarter)))
+      end do
+      if (largest(2) < best(2)) best = largest
+    end do
+    wanders = best(2) > far .and. best(2) >= settling*best(1)
+  end function wanders
 
   !> Distance from which a pair has grown; of starts the least that is looked at.
   pure real(wp) function gap_before(machine, pair) result(gap)
@@ -144,10 +184,9 @@ contains
   end subroutine look_closer
 
   !> Looks for the nearest return among the last points; from a near one Newton's method, whose orbit is to be near.
-  pure subroutine try_returns(machines, past, least, saddle, found)
+  pure subroutine try_returns(machines, past, saddle, found)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: past(:, :)
-    real(wp), intent(inout) :: least
     type(saddle_t), intent(out) :: saddle
     logical, intent(out) :: found
     real(wp) :: distance
@@ -156,10 +195,11 @@ contains
     n = size(past, 2)
     do p = 1, min(longest, n - 1)
       distance = section_distance(machines%centre, past(:, n - p), past(:, n))
-      if (n > most_periods/2) least = min(least, distance)
       if (distance > near_return) cycle
       call find_saddle(machines, past(:, n), p, saddle, found)
-      if (found) found = distance_to_saddle(machines%centre, saddle, past(:, n)) <= 10*distance + together
+      ! What comes to it slowly is far from it still.
+      if (found) found = distance_to_saddle(machines%centre, saddle, past(:, n)) <= &
+        10*distance/(1 - maxval(abs(saddle%multipliers(2:)))) + together
       if (found) return
     end do
   end subroutine try_returns
@@ -191,8 +231,9 @@ contains
     end if
   end function label_at
 
-  !> Halves the way between the two, by the labels: on the section down to the distance `goal`, of starts to a thousandth. `ok` is
-  !> false where the labels are not those of the pair, or a third is met.
+  !> Halves the way between the two, by the labels: on the section down to the distance `goal`, of starts to a thousandth. Where a
+  !> third label is met the pair is `mixed`, and stays on the boundary of the first. `ok` is false where the labels are not those of
+  !> the pair, or one is not known.
   pure subroutine bring_together(machine, labeller, goal, pair, ok)
     class(hybrid_t), intent(in) :: machine
     type(labeller_t), intent(in) :: labeller
@@ -212,8 +253,12 @@ contains
       middle = points(:, 1) + (points(:, 2) - points(:, 1))/2
       if (all(abs(middle - points(:, 1)) <= 0) .or. all(abs(middle - points(:, 2)) <= 0)) exit
       label = label_at(machine, labeller, pair%on_section, middle)
-      ok = any(pair%labels == label)
+      ok = label /= label_not_known
       if (.not. ok) return
+      if (.not. any(pair%labels == label)) then
+        pair%labels(2) = label
+        pair%mixed = .true.
+      end if
       points(:, findloc(pair%labels, label, 1)) = middle
     end do
     pair%points = points
@@ -232,7 +277,7 @@ contains
     call advance_one(machine, pair, 1, images(:, 1), events, ok)
     if (ok) call advance_one(machine, pair, 2, images(:, 2), others, ok)
     if (.not. ok) return
-    pair = pair_t(images, .true., pair%labels)
+    pair = pair_t(images, .true., pair%labels, pair%mixed)
     do k = 1, max(size(events), size(others))
       if (k > size(events)) then
         event = others(k)%kind
@@ -288,8 +333,8 @@ contains
     edge = edges(rank_of(event))
   end function edge_of_event
 
-  !> Whether a pair, followed without halving, comes near to a saddle and leaves it on two sides: then it started on its stable set.
-  !> `number` is that of the saddle, 0 for none.
+  !> Whether a pair, followed without halving, comes near to a saddle and leaves it on the two sides of its stable set: then it
+  !> started on either side of that. `number` is that of the saddle, 0 for none.
   pure subroutine reaches_saddle(machine, saddles, starts, number)
     class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddles(:)
@@ -297,12 +342,12 @@ contains
     integer, intent(out) :: number
     type(pair_t) :: pair
     type(event_t), allocatable :: events(:)
-    real(wp) :: nearest(size(saddles)), distance, images(machine%n, 2)
+    real(wp) :: entered(2, size(saddles)), distance, sides(2), images(machine%n, 2)
     integer :: n, k, side
     logical :: ok
     number = 0
     pair = pair_t(starts, .false.)
-    nearest = huge(nearest)
+    entered = 0
     do n = 1, most_periods
       do side = 1, 2
         call advance_one(machine, pair, side, images(:, side), events, ok)
@@ -310,14 +355,14 @@ contains
       end do
       pair = pair_t(images, .true.)
       do k = 1, size(saddles)
-        distance = maxval([(distance_to_saddle(machine, saddles(k), images(:, side)), side=1, 2)])
-        if (distance < nearest(k)) then
-          nearest(k) = distance
-        else if (nearest(k) < near_saddle .and. distance > left_saddle) then
-          ! It leaves: the two together, or each to its side.
-          if (gap_of(machine, pair) > distance/2) number = k
+        call sides_of_saddle(machine, saddles(k), images, distance, sides)
+        if (distance > left_saddle) then
+          entered(:, k) = 0
+        else if (entered(1, k) > 0) then
+          if (product(sides) < 0 .and. all(abs(sides) > leaves*entered(:, k))) number = k
           if (number > 0) return
-          nearest(k) = huge(nearest)
+        else if (distance < near_saddle) then
+          entered(:, k) = max(known_to, abs(sides))
         end if
       end do
       if (gap_of(machine, pair) > 1) return

@@ -41,6 +41,11 @@ module exponents
     logical :: has_sum = .false.
     !> The motion comes back to its section points, over and over.
     logical :: returns = .false.
+    !> The last section point that was kept, the number of sections of the cycle that it is on (0: none is known), and the largest
+    !> modulus of the multipliers of that.
+    real(wp), allocatable :: point(:)
+    integer :: cycle = 0
+    real(wp) :: multiplier = 0
     !> Largest exponent of the first and of the second half.
     real(wp) :: halves(2) = 0
     !> What the turning of the directions may bring into exponents, where those are of many motions that turn alike [1/s].
@@ -105,6 +110,7 @@ contains
         if (determinant > 0) lost(part) = lost(part) + logarithm(determinant)
         call note_events(body, events, spectrum)
         if (i <= size(section)) section(i) = state%x
+        if (i == size(section)) spectrum%point = [state%x, state%v]
       end do
       duration = periods*body%period
       spectrum%sum_exact = spectrum%sum_exact/duration - body%moving%machine%friction%damping/body%moving%machine%mass
@@ -265,17 +271,20 @@ contains
     period = 0
   end function period_of_section
 
-  !> What a motion is, by its largest exponent and the 0-1 test `k`, at three standard errors; not known where they do not agree.
-  !> A neutral one must be so within the errors alone.
+  !> What a motion is, by the cycle that it is on, or else by its largest exponent and the 0-1 test `k`, at three standard errors;
+  !> not known where they do not agree. A neutral one must be so within the errors alone, and they must tell it from a cycle all of
+  !> whose directions contract alike.
   pure integer function type_of_motion(spectrum, k) result(motion)
     type(spectrum_t), intent(in) :: spectrum
     real(wp), intent(in) :: k
-    !> Of a logarithm over a section.
-    real(wp), parameter :: rounding = 10*epsilon(1.0_wp)
+    !> Of a logarithm over a section; of a multiplier.
+    real(wp), parameter :: rounding = 10*epsilon(1.0_wp), neutral = 1e-10_wp
     motion = motion_not_known
     if (.not. spectrum%known) return
     associate (largest => spectrum%exponents(1), error => spectrum%errors(1), room => 3*spectrum%errors(1) + spectrum%memory)
-      if (abs(spectrum%halves(1) - spectrum%halves(2)) > 2*sqrt(2.0_wp)*room + 1e-9_wp*abs(largest) .and. error > 0) then
+      if (spectrum%cycle > 0 .and. spectrum%multiplier < 1 - neutral) then
+        if (k < 0.2_wp) motion = motion_contracting
+      else if (abs(spectrum%halves(1) - spectrum%halves(2)) > 2*sqrt(2.0_wp)*room + 1e-9_wp*abs(largest) .and. error > 0) then
         motion = motion_transient
       else if (largest > room .and. k > 0.8_wp) then
         motion = motion_chaotic
@@ -284,8 +293,16 @@ contains
       else if (abs(largest)*spectrum%mean_period <= 3*error*spectrum%mean_period + rounding .and. k < 0.2_wp) then
         ! One of a family of cycles is a cycle.
         motion = merge(motion_contracting, motion_neutral, spectrum%returns)
+        if (.not. spectrum%returns .and. all_alike(spectrum) .and. spectrum%sum_exact < 0) motion = motion_not_known
       end if
     end associate
   end function type_of_motion
+
+  !> Whether exponents that are all the same are within the errors.
+  pure logical function all_alike(spectrum)
+    type(spectrum_t), intent(in) :: spectrum
+    all_alike = spectrum%has_sum .and. abs(spectrum%exponents(1) - spectrum%sum_exact/size(spectrum%exponents)) <= &
+      3*spectrum%errors(1) + spectrum%memory
+  end function all_alike
 
 end module exponents

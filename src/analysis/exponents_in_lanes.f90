@@ -90,6 +90,7 @@ contains
     log%book%kept = .false.
     call lead_the_way(body, state, log, transient, starts, section, spectrum%known)
     if (.not. spectrum%known) return
+    spectrum%point = [state%x, state%v]
     spectrum%has_sum = .true.
     batch%budget = real(body%moving%options%event_budget, wp)
     do lane = 1, lane_count

@@ -184,7 +184,9 @@ contains
       point = within_stops(machines%centre, point)
       if (norm2(step/sizes) < 1e-8_wp) exit
     end do
-    if (norm2(step/sizes) < 1e-6_wp) call add_orbit(family, machines, value, point, periods, found)
+    if (.not. norm2(step/sizes) < 1e-6_wp) return
+    ! Most starts lead to what others led to.
+    if (.not. is_found(machines, point, periods, found)) call add_orbit(family, machines, value, point, periods, found)
   end subroutine try_newton
 
   !> Corrects the orbit near a section point and adds it, unless it is known, not real, or of a shorter period.

@@ -16,7 +16,7 @@ module saddle_search
   implicit none
   private
 
-  public :: find_saddle, saddle_at, add_saddle, section_distance, distance_to_saddle
+  public :: find_saddle, saddle_at, add_saddle, section_distance, distance_to_saddle, sides_of_saddle
 
   integer, parameter :: most_newton = 30
   !> Of natural sizes: Newton's method is not to go further at once, has converged.
@@ -37,6 +37,9 @@ module saddle_search
     !> Over the period of the orbit, the largest modulus first, and the derivative of the map they belong to, at the first point.
     complex(wp), allocatable :: multipliers(:)
     real(wp), allocatable :: matrix(:, :)
+    !> Left eigenvectors of the multiplier outside of the unit circle (columns), one at each point: their product with what a
+    !> state beside the orbit is away from it tells on which side of the stable set it is, and how far in natural sizes.
+    real(wp), allocatable :: unstable(:, :)
     integer(int64) :: word = 0
   end type saddle_t
 
@@ -60,6 +63,31 @@ contains
       distance = min(distance, section_distance(machine, point, saddle%points(:, k)))
     end do
   end function distance_to_saddle
+
+  !> Of two section points (columns): the larger of their distances to the orbit, at its point next to their middle, and how far
+  !> each is from the stable set there, negative on one side, all in natural sizes.
+  pure subroutine sides_of_saddle(machine, saddle, points, distance, sides)
+    class(hybrid_t), intent(in) :: machine
+    type(saddle_t), intent(in) :: saddle
+    real(wp), intent(in) :: points(:, :)
+    real(wp), intent(out) :: distance, sides(2)
+    real(wp) :: away(size(points, 1), 2), nearest
+    integer :: k, i
+    distance = huge(distance)
+    nearest = huge(nearest)
+    sides = 0
+    do k = 1, saddle%periods
+      do i = 1, 2
+        away(:, i) = nearest_copy(machine, points(:, i), saddle%points(:, k)) - saddle%points(:, k)
+      end do
+      associate (middle => norm2((away(:, 1) + away(:, 2))/machine%size_of))
+        if (middle >= nearest) cycle
+        nearest = middle
+      end associate
+      distance = max(norm2(away(:, 1)/machine%size_of), norm2(away(:, 2)/machine%size_of))
+      sides = matmul(saddle%unstable(:, k), away)
+    end do
+  end subroutine sides_of_saddle
 
   !> The saddle that Newton's method comes to from `start` over `periods` sections; `ok` is false if it comes to none of this
   !> period.
@@ -107,10 +135,10 @@ contains
     logical, intent(out) :: ok
     type(tally_t) :: tally
     integer(int64) :: words(periods)
-    real(wp) :: image(size(point)), slopes(size(point), size(point))
+    real(wp) :: image(size(point)), slopes(size(point), size(point), periods)
     integer :: k, n
     n = size(point)
-    allocate (saddle%points(n, periods), saddle%matrix(n, n))
+    allocate (saddle%points(n, periods), saddle%matrix(n, n), saddle%unstable(n, periods))
     saddle%periods = periods
     call map_with_variation(machines, point, periods, image, saddle%matrix, tally, ok)
     if (.not. ok) return
@@ -122,7 +150,7 @@ contains
     if (.not. ok) return
     saddle%points(:, 1) = point
     do k = 1, periods
-      call map_with_variation(machines, saddle%points(:, k), 1, image, slopes, tally, ok)
+      call map_with_variation(machines, saddle%points(:, k), 1, image, slopes(:, :, k), tally, ok)
       if (.not. ok) return
       words(k) = tally%word
       if (k == periods) exit
@@ -130,9 +158,30 @@ contains
       ok = section_distance(machines%centre, image, point) > same_orbit
       if (.not. ok) return
     end do
+    saddle%unstable(:, 1) = left_eigenvector(saddle%matrix, machines%centre%size_of)
+    do k = periods, 2, -1
+      saddle%unstable(:, k) = matmul(saddle%unstable(:, 1 + modulo(k, periods)), slopes(:, :, k))
+    end do
     saddle%word = canonical_word(words)
     saddle%watched = matmul(watched_rows(machines%centre), saddle%points)
   end subroutine saddle_at
+
+  !> Left eigenvector of the one multiplier outside of the unit circle, of length one in units of 1/`sizes`: all rows of a high
+  !> power of the matrix are along it.
+  pure function left_eigenvector(matrix, sizes) result(vector)
+    real(wp), intent(in) :: matrix(:, :), sizes(:)
+    real(wp) :: vector(size(sizes)), power(size(sizes), size(sizes))
+    integer :: i
+    !> Squarings, after which the others are gone however near to the unit circle.
+    integer, parameter :: squarings = 40
+    power = matrix
+    do i = 1, squarings
+      power = power/maxval(abs(power))
+      power = matmul(power, power)
+    end do
+    vector = power(maxloc([(norm2(power(i, :)*sizes), i=1, size(sizes))], 1), :)
+    vector = vector/norm2(vector*sizes)
+  end function left_eigenvector
 
   !> Whether a machine without a clock moves from a section point: an equilibrium is met as a cycle of no extent.
   pure logical function moves(machine, point)

@@ -3,8 +3,9 @@
 
 !> Lyapunov spectrum of a motion of a structure, by orthogonal directions carried from section to section (Benettin et al. 1980).
 module structure_exponents
+  use cycle_reached, only: note_cycle
   use elementary, only: logarithm
-  use exponents, only: batches, error_of, lyapunov_exponents, period_of_section, spectrum_t
+  use exponents, only: batches, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
@@ -23,8 +24,8 @@ module structure_exponents
 
   public :: exponents_of_structure, exponents_of_machine, exponents_from_section
 
-  !> Section points within this share of the natural size are one; they come back within this share of their range.
-  real(wp), parameter :: fixed = 1e-9_wp, same = 1e-7_wp
+  !> Section points within this share of the natural size are one.
+  real(wp), parameter :: fixed = 1e-9_wp
 
 contains
 
@@ -46,11 +47,23 @@ contains
       else
         call lyapunov_exponents(machines, state, transient, sections, spectrum, series)
       end if
+      call look_at_section(machines, series, spectrum)
     type is (structure_t)
       jointed = state_at_start(machine, start)
       call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
     end select
   end subroutine exponents_of_machine
+
+  !> Notes whether the section points come back, and the cycle that they are of.
+  subroutine look_at_section(machines, series, spectrum)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(inout) :: series(:)
+    type(spectrum_t), intent(inout) :: spectrum
+    if (.not. spectrum%known) return
+    ! Of a fixed point only the rounding moves.
+    if (maxval(series) - minval(series) <= fixed*machines%centre%size_of(1)) series = series(1)
+    call note_cycle(machines, series, spectrum)
+  end subroutine look_at_section
 
   !> Exponents of the motion from a point of the section; not known for one beyond a stop.
   subroutine exponents_from_section(machines, point, transient, sections, spectrum, series)
@@ -106,13 +119,12 @@ contains
       where (growth > 0) batch(part, :) = batch(part, :) + log_of(growth)
       call note_events(structure, events, spectrum)
       if (i <= size(series)) series(i) = place_of(structure, state)
+      if (i == size(series)) spectrum%point = coordinates_of(structure, state)
     end do
-    ! Of a fixed point only the rounding moves.
-    if (maxval(series) - minval(series) <= fixed*structure%size_of(1)) series = series(1)
-    spectrum%returns = period_of_section(series, same) > 0
     spectrum%periods = sections
     spectrum%mean_period = duration/sections
     call conclude(structure, batch*batches/duration, duration, left, spectrum)
+    call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
 
   !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `ok` is false if it had to be given up;

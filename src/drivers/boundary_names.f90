@@ -25,8 +25,8 @@ module boundary_names
 
   !> Points of a plane that are tracked round by round, at most, and of a line in the first.
   integer, parameter :: most_tracked(3) = [32, 256, 256], most_of_line = 8
-  !> Starts from which saddles are sought besides, and their longest period.
-  integer, parameter :: sought_starts = 64, sought_periods = 2
+  !> Starts from which saddles are sought besides, of these periods and of those of the attractors, which are up to the last.
+  integer, parameter :: sought_starts = 64, sought_periods(2) = [1, 2], longest_sought = 32
   !> Points to track, starts to seek from, and points to try, that are kept together.
   integer, parameter :: tracked_of_part = 32, sought_of_part = 16, tried_of_part = 1024
 
@@ -74,7 +74,7 @@ contains
       if (round > 1 .and. size(points) == 0) exit
       tried = size(names%saddles)
       call track_points(session, kept, grid, plane, machines, labeller, points, names)
-      if (round == 1) call seek_saddles(session, kept, grid, machines, names%saddles)
+      if (round == 1) call seek_saddles(session, kept, grid, machines, periods_of(plane), names%saddles)
       if (size(names%saddles) > tried) call try_saddles(session, kept, grid, plane, machines, names)
     end do
   end subroutine name_points
@@ -155,14 +155,12 @@ contains
       do i = first, last
         associate (row => row_of(i), point => points(i))
           names%edge(point) = nint(row(2))
-          if (names%edge(point) /= edge_saddle) cycle
+          if (nint(row(3)) == 0) cycle
           call find_saddle(machines, row(4:), nint(row(3)), saddle, ok)
-          if (.not. ok) then
-            names%edge(point) = edge_not_known
-            cycle
-          end if
-          call add_saddle(machines%centre, saddle, names%saddles, number)
-          names%saddle(point) = number
+          if (ok) call add_saddle(machines%centre, saddle, names%saddles, number)
+          if (names%edge(point) /= edge_saddle) cycle
+          if (ok) names%saddle(point) = number
+          if (.not. ok) names%edge(point) = edge_not_known
         end associate
       end do
     end do
@@ -181,7 +179,8 @@ contains
 
   end subroutine track_points
 
-  !> Tracks the points from number `first` on, each on one rank: number, edge state, periods and a section point of its saddle.
+  !> Tracks the points from number `first` on, each on one rank: number, edge state, periods (0: none) and a section point of the
+  !> saddle met.
   subroutine track_part(session, grid, plane, machines, labeller, points, first, rows)
     type(session_t), intent(inout) :: session
     type(grid_t), intent(in) :: grid
@@ -202,7 +201,7 @@ contains
           call track_edge(machines, labeller, starts, [point%below, point%above], edge, saddle)
         end associate
         place = 0
-        if (edge == edge_saddle) place = saddle%points(:, 1)
+        if (saddle%periods > 0) place = saddle%points(:, 1)
         own = [own, real(k, wp), real(edge, wp), real(saddle%periods, wp), place]
         call session%journal%progress(int(k, int64))
       end do
@@ -210,12 +209,26 @@ contains
     end associate
   end subroutine track_part
 
+  !> Periods of the saddles that are sought, each once.
+  pure function periods_of(plane) result(periods)
+    type(plane_t), intent(in) :: plane
+    integer, allocatable :: periods(:)
+    integer :: k
+    periods = sought_periods
+    do k = 1, size(plane%attractors)
+      associate (period => plane%attractors(k)%period)
+        if (period > 0 .and. period <= longest_sought .and. .not. any(periods == period)) periods = [periods, period]
+      end associate
+    end do
+  end function periods_of
+
   !> Adds the saddles that Newton's method comes to from starts spread over the map, each on one rank, in the order of the starts.
-  subroutine seek_saddles(session, kept, grid, machines, saddles)
+  subroutine seek_saddles(session, kept, grid, machines, periods, saddles)
     type(session_t), intent(inout) :: session
     type(checkpoint_t), intent(inout) :: kept
     type(grid_t), intent(in) :: grid
     type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: periods(:)
     type(saddle_t), allocatable, intent(inout) :: saddles(:)
     real(wp) :: starts(machines%centre%n, sought_starts)
     real(wp), allocatable :: rows(:)
@@ -230,7 +243,7 @@ contains
     do first = 1, sought_starts, sought_of_part
       call kept%recall(session, rows, found)
       if (.not. found) then
-        call seek_part(session, machines, starts(:, :first + sought_of_part - 1), first, rows)
+        call seek_part(session, machines, starts(:, :first + sought_of_part - 1), first, periods, rows)
         call kept%keep(session, rows)
       end if
       do i = first, first + sought_of_part - 1
@@ -244,11 +257,11 @@ contains
   end subroutine seek_saddles
 
   !> The saddles that are found from the starts from number `first` on: number, periods, first section point.
-  subroutine seek_part(session, machines, starts, first, rows)
+  subroutine seek_part(session, machines, starts, first, periods, rows)
     type(session_t), intent(inout) :: session
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: starts(:, :)
-    integer, intent(in) :: first
+    integer, intent(in) :: first, periods(:)
     real(wp), allocatable, intent(out) :: rows(:)
     real(wp), allocatable :: own(:)
     type(saddle_t) :: saddle
@@ -257,9 +270,9 @@ contains
     allocate (own(0))
     associate (team => session%team)
       do i = first + team%rank(), size(starts, 2), team%size()
-        do n = 1, sought_periods
-          call find_saddle(machines, starts(:, i), n, saddle, ok)
-          if (ok) own = [own, real(i, wp), real(n, wp), saddle%points(:, 1)]
+        do n = 1, size(periods)
+          call find_saddle(machines, starts(:, i), periods(n), saddle, ok)
+          if (ok) own = [own, real(i, wp), real(periods(n), wp), saddle%points(:, 1)]
         end do
         call session%journal%progress(int(i, int64))
       end do

@@ -4,7 +4,7 @@
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
-  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria
+  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria, report_rest
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
@@ -36,7 +36,7 @@ module branches_driver
   public :: run_branches
 
   !> Starts at each value at which orbits are searched.
-  integer, parameter :: starts = 48
+  integer, parameter :: starts = 48, near_starts = 16
   !> At an impact without speed the derivative is not finite: a located graze leaves a speed of rounding, and what is larger than
   !> this comes from that.
   real(wp), parameter :: endless = 1e7_wp
@@ -86,6 +86,7 @@ contains
       if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, contacts, trim(bounds%unit))
       call report_equilibria(session, search, trim(bounds%unit))
+      call report_rest(session, search, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
     if (size(search%branches) + count_equilibria(search) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
@@ -167,15 +168,17 @@ contains
 
   end subroutine set_range
 
-  !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about.
+  !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about;
+  !> where it has none for either some within a quarter of that, too, and its own start: basins may be small.
   subroutine set_starts(the_case, search, error)
     type(case_t), intent(in) :: the_case
     type(search_t), intent(inout) :: search
     type(error_t), allocatable, intent(out) :: error
     class(hybrid_t), allocatable :: machine
-    real(wp) :: low(2), high(2)
-    integer :: i, k
+    real(wp) :: low(2), high(2), watched(2, starts + near_starts + 1)
+    integer :: i, k, last
     character(len=2), parameter :: names(2) = ['x0', 'v0']
+    last = size(watched, 2)
     high = 2*search%family%sizes
     low = -high
     do k = 1, 2
@@ -183,12 +186,17 @@ contains
         if (the_case%axes(i)%name /= names(k)) cycle
         low(k) = minval(the_case%axes(i)%values)
         high(k) = maxval(the_case%axes(i)%values)
+        last = starts
       end do
     end do
     call machine_of_family(search%family, (search%plan%lowest + search%plan%highest)/2, machine, error)
     if (allocated(error)) return
-    search%starts = starts_of_section(machine, reshape([(low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp), i=1, starts)], &
-                                                       [2, starts]))
+    do i = 1, starts + near_starts
+      watched(:, i) = low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp)
+      if (i > starts) watched(:, i) = watched(:, i)/4
+    end do
+    watched(:, starts + near_starts + 1) = [the_case%start%x0, the_case%start%v0]
+    search%starts = starts_of_section(machine, watched(:, :last))
   end subroutine set_starts
 
   !> Every labelled point, and what was found from how many seeds.
@@ -280,6 +288,7 @@ contains
     end do
     if (.not. has_clock) text = text//' and the trivial 1'
     text = replace_all(text, 'multipliers  ', 'multipliers ')
+    if (index(text, 'not known') > 0) text = text//' (hidden by rounding beside what grows without bound where events graze)'
   end function multipliers_text
 
   pure function multipliers_json(orbit, has_clock) result(text)

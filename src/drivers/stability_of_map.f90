@@ -31,6 +31,8 @@ module stability_of_map
   integer, parameter, public :: most_points = 5000
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
+  !> Logarithm of the contraction over a period from which on points that are the same tell a cycle.
+  real(wp), parameter :: contracts = 1e-2_wp
 
   integer, parameter :: not_known = 0, chaotic = 1, quasi_periodic = 2, long_transient = 3, above_limit = 4
   character(len=*), parameter :: type_names(0:4) = [character(len=22) :: 'not_known', 'chaotic', 'quasi_periodic', &
@@ -291,7 +293,12 @@ contains
     if (found%type == chaotic .or. found%type == quasi_periodic) return
     ! A cycle contracts, and comes back to the same points.
     if (.not. found%spectrum%exponents(1) < 0) return
-    found%period = period_of_section(section, same)
+    found%period = found%spectrum%cycle
+    if (found%period == 0) then
+      ! What comes back so near by slowness alone may be of any period.
+      found%period = period_of_section(section, same)
+      if (found%spectrum%exponents(1)*found%period*found%spectrum%mean_period > -contracts) found%period = 0
+    end if
     if (found%period > 0) found%type = merge(above_limit, long_transient, found%period > limit)
   end subroutine examine
 

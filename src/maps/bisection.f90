@@ -14,7 +14,8 @@ module bisection
 
   public :: label_starts, halve_intervals, join_slivers
 
-  !> Intervals that one edge may fall into: beyond, an interval with a third label in it stays as wide as it is.
+  !> Intervals that one edge may fall into: beyond, of an interval with a third label in it the upper part is not followed, and the
+  !> next interval begins with another label than the one below ends with.
   integer, parameter :: most_intervals = 6
   !> Starts that are not captured in time lie between two basins in a sliver; one narrower than this share of its edge is taken
   !> for the boundary itself.
@@ -93,8 +94,8 @@ contains
     left = size(intervals) - sum(merge(1, 0, intervals%done))
   end subroutine halve_intervals
 
-  !> The half of an interval in which its label changes. With a third label in the middle it keeps the lower half, the upper is
-  !> `other`, and `others` is 1; or, if it `may_split` no more, it stays as it is.
+  !> The half of an interval in which its label changes. With a third label in the middle it keeps the lower half, and if it
+  !> `may_split` the upper is `other`, and `others` is 1.
   pure subroutine take_half(one, middle, label, may_split, other, others)
     type(interval_t), intent(inout) :: one
     real(wp), intent(in) :: middle
@@ -107,11 +108,11 @@ contains
       one%high = middle
     else if (label == one%below) then
       one%low = middle
-    else if (.not. may_split) then
-      one%done = .true.
     else
-      others = 1
-      other = interval_t(edge=one%edge, low=middle, high=one%high, below=label, above=one%above)
+      if (may_split) then
+        others = 1
+        other = interval_t(edge=one%edge, low=middle, high=one%high, below=label, above=one%above)
+      end if
       one%high = middle
       one%above = label
     end if

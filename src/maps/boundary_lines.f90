@@ -80,16 +80,19 @@ contains
   end function crossings_of
 
   !> The intervals round the cell whose lowest corner is (i, j), in the sense from the first axis to the second; `after` has the
-  !> label behind each.
-  pure subroutine walk_round(crossings, intervals, i, j, round, after)
+  !> label behind each. It is not `whole` where one does not begin with the label that the one before ends with: between the two the
+  !> label changes where it was not followed.
+  pure subroutine walk_round(crossings, intervals, i, j, round, after, whole)
     type(crossings_t), intent(in) :: crossings
     type(interval_t), intent(in) :: intervals(:)
     integer, intent(in) :: i, j
     integer, allocatable, intent(out) :: round(:), after(:)
+    logical, intent(out) :: whole
+    integer, allocatable :: before(:)
     integer :: sides(4), side, k, e, m, n
     sides = [crossings%edge(i, j, 1), crossings%edge(i + 1, j, 2), crossings%edge(i, j + 1, 1), crossings%edge(i, j, 2)]
     n = sum(crossings%count(sides))
-    allocate (round(n), after(n))
+    allocate (round(n), after(n), before(n))
     n = 0
     do side = 1, 4
       e = sides(side)
@@ -97,14 +100,17 @@ contains
         n = n + 1
         if (side <= 2) then
           m = crossings%first(e) + k
+          before(n) = intervals(m)%below
           after(n) = intervals(m)%above
         else
           m = crossings%first(e) + crossings%count(e) - 1 - k
+          before(n) = intervals(m)%above
           after(n) = intervals(m)%below
         end if
         round(n) = m
       end do
     end do
+    whole = all(before == cshift(after, -1))
   end subroutine walk_round
 
   !> Cells next to crossed edges, each once, lowest corners in columns. With `crowded` only those round which the label changes
@@ -158,6 +164,7 @@ contains
     type(links_t) :: links
     integer, allocatable :: cells(:, :), round(:), after(:)
     integer :: c, crowd, k
+    logical :: whole
     crossings = crossings_of([size(a), size(b)], edges, intervals)
     allocate (points(size(intervals)), links%ends(2, 2*size(intervals) + 16))
     do k = 1, size(intervals)
@@ -166,12 +173,13 @@ contains
     call crowded_cells([size(a), size(b)], edges, intervals, .false., cells)
     crowd = 0
     do c = 1, size(cells, 2)
-      call walk_round(crossings, intervals, cells(1, c), cells(2, c), round, after)
+      call walk_round(crossings, intervals, cells(1, c), cells(2, c), round, after, whole)
       if (size(round) == 2) then
         call add_link(links, round(1), round(2))
       else if (size(round) > 2) then
         crowd = crowd + 1
-        call link_crowd(a, b, cells(:, c), round, after, centres(crowd), points, links)
+        if (.not. whole) call meet(a, b, cells(:, c), round, points, links)
+        if (whole) call link_crowd(a, b, cells(:, c), round, after, centres(crowd), points, links)
       end if
     end do
     call trace(points, links, lines)
@@ -216,7 +224,6 @@ contains
     integer, intent(in) :: cell(2), round(:), after(:), centre
     type(line_point_t), allocatable, intent(inout) :: points(:)
     type(links_t), intent(inout) :: links
-    type(line_point_t) :: junction
     integer :: n, middle, first, last, i, k
     n = size(round)
     middle = centre
@@ -232,17 +239,27 @@ contains
         if (k == 2) then
           call add_link(links, group(1), group(2))
         else
-          junction = line_point_t()
-          junction%place = [(sum(points(group)%place(i))/k, i=1, 2)]
-          junction%error = maxval([a(cell(1) + 1) - a(cell(1)), b(cell(2) + 1) - b(cell(2))])/2
-          points = [points, junction]
-          do i = 1, k
-            call add_link(links, group(i), size(points))
-          end do
+          call meet(a, b, cell, group, points, links)
         end if
       end associate
     end do
   end subroutine link_crowd
+
+  !> The lines of the points of a `group` in a cell meet in a junction.
+  pure subroutine meet(a, b, cell, group, points, links)
+    real(wp), intent(in) :: a(:), b(:)
+    integer, intent(in) :: cell(2), group(:)
+    type(line_point_t), allocatable, intent(inout) :: points(:)
+    type(links_t), intent(inout) :: links
+    type(line_point_t) :: junction
+    integer :: i
+    junction%place = [(sum(points(group)%place(i))/size(group), i=1, 2)]
+    junction%error = maxval([a(cell(1) + 1) - a(cell(1)), b(cell(2) + 1) - b(cell(2))])/2
+    points = [points, junction]
+    do i = 1, size(group)
+      call add_link(links, group(i), size(points))
+    end do
+  end subroutine meet
 
   !> Walks along the links: first from ends and junctions, then round what is closed.
   subroutine trace(points, links, lines)

@@ -255,8 +255,9 @@ contains
     real(wp) :: share
     integer :: i, k
     logical :: ok
-    points(:2, :) = watched
     select type (machine)
+    type is (one_body_t)
+      points = watched
     type is (structure_t)
       share = 2
       do i = 1, 60

@@ -210,12 +210,12 @@ contains
     end do
   end function slope_of_varied
 
-  !> The state with the coordinates `y` at a time, in the mode of `mode`.
+  !> A new state gets the coordinates `y` at a time, in the mode of `mode`.
   pure subroutine put_state(frame, mode, time, y, state)
     type(frame_t), intent(in) :: frame
     type(jointed_state_t), intent(in) :: mode
     real(wp), intent(in) :: time, y(:)
-    type(jointed_state_t), intent(out) :: state
+    type(jointed_state_t), intent(inout) :: state
     complex(wp) :: turning(frame%moving%harmonics)
     real(wp) :: s, u
     integer :: k

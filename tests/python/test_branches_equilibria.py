@@ -3,6 +3,7 @@
 """Equilibria of a machine without a clock in what `branches` says, in its file and its figure."""
 
 import json
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -55,3 +56,27 @@ def test_a_body_comes_to_lie_against_its_stop(separatrix: Path, tmp_path: Path) 
         assert sum(len(lines.get_segments()) for lines in drawn.collections) == 2
         with pytest.raises(SeparatrixError, match="no periodic orbits"):
             _ = result.separatrix.labelled_points
+
+
+def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp_path):
+    # 2 x = 1 + h: the belt pulls the block with 1 N through the spring, the floor holds it with |h| <= 0.8 N
+    case = tmp_path / "rest.toml"
+    case.write_text("""
+title = "A block on a floor and a running belt"
+body.block.mass = 1
+body.tip.mass = 1
+spring.frame = { between = ["block"], stiffness = 2, damping = 0.05 }
+spring.tip = { between = ["block", "tip"], stiffness = 1, damping = 0.05 }
+friction.floor = { between = ["block"], force = 0.5, static_force = 0.8 }
+friction.belt = { between = ["tip"], force = 1, velocity = 0.5 }
+run.duration = 100
+""")
+    ended = subprocess.run(
+        [separatrix, "branches", case, "--parameter", "friction.belt.velocity", "--from", "0.3", "--to", "1"]
+        + ["--searches", "1", "-o", tmp_path / "rest.h5"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "dry friction holds friction.floor: places of rest are a family" in ended.stdout
+    assert "x from 0.1000000000 to 0.9000000000 where no stop is touched" in ended.stdout

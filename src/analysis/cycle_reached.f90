@@ -1,0 +1,148 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The cycle that a motion is on at its section points: its period and multipliers decide what errors of long means cannot, whether
+!> a motion that contracts very slowly is periodic.
+module cycle_reached
+  use exponents, only: period_of_section, spectrum_t
+  use hybrid_machine, only: event_t, hybrid_t
+  use kinds, only: wp
+  use machine_family, only: fly_sections, map_with_variation, nearest_copy
+  use matrices, only: solve
+  use motion_state, only: tally_t
+  use multipliers, only: multipliers_of
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: note_cycle
+
+  !> Section points come back within this share of their range. In natural sizes: one so near to a cycle is on it, so near it may
+  !> come to it; and Newton's method has converged where its steps are no longer.
+  real(wp), parameter :: same = 1e-7_wp, on_cycle = 1e-6_wp, beside_cycle = 1, converged = 1e-11_wp
+  integer, parameter :: most_newton = 12
+  !> Of a motion that has not come back yet: the longest cycle that it may come to, in how many sections the distance must shrink,
+  !> taken as the largest of so many, and by how much, as a logarithm, the multiplier lets it at least.
+  integer, parameter :: longest = 32, watched_sections = 20000, stretch = 256
+  real(wp), parameter :: least_decay = 0.05_wp
+
+contains
+
+  !> Notes in `spectrum` whether the section points come back, and the cycle that the last of them (`spectrum%point`, of which
+  !> `series` has the watched position) is on, if Newton's method finds one.
+  subroutine note_cycle(machines, series, spectrum)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: series(:)
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp), allocatable :: point(:), matrix(:, :)
+    complex(wp), allocatable :: values(:)
+    integer :: period, k
+    logical :: ok
+    period = period_of_section(series, same)
+    spectrum%returns = period > 0
+    if (.not. allocated(spectrum%point)) return
+    if (.not. spectrum%returns) period = nearest_period(series)
+    call refine(machines, period, spectrum%point, point, matrix, ok)
+    if (.not. ok) return
+    do k = 1, period
+      if (modulo(period, k) /= 0) cycle
+      if (comes_back(machines, point, k)) exit
+    end do
+    if (k < period) call refine(machines, k, spectrum%point, point, matrix, ok)
+    if (.not. ok) return
+    values = multipliers_of(matrix)
+    ! One that rounding hides is not known.
+    if (.not. all(abs(values) < huge(1.0_wp))) return
+    if (distance(machines%centre, point, spectrum%point) > on_cycle) then
+      if (.not. approaches(machines, point, spectrum%point, k, maxval(abs(values)))) return
+    end if
+    spectrum%cycle = k
+    spectrum%multiplier = maxval(abs(values))
+  end subroutine note_cycle
+
+  !> The number of sections, up to `longest`, after which the last positions come back the nearest.
+  pure integer function nearest_period(series) result(period)
+    real(wp), intent(in) :: series(:)
+    real(wp) :: miss(min(longest, size(series)/2))
+    integer :: p
+    associate (n => size(series))
+      miss = [(maxval(abs(series(n - size(miss) + 1:) - series(n - size(miss) + 1 - p:n - p))), p=1, size(miss))]
+    end associate
+    period = minloc(miss, 1)
+  end function nearest_period
+
+  !> Whether the motion from `start` comes nearer to the cycle through `point`, at least half as fast as its multiplier has it in
+  !> the end.
+  logical function approaches(machines, point, start, period, multiplier)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:), start(:), multiplier
+    integer, intent(in) :: period
+    type(event_t), allocatable :: events(:)
+    type(tally_t) :: tally
+    real(wp) :: here(size(start)), image(size(start)), farthest(2), decay
+    integer :: i, mode, rounds
+    rounds = watched_sections/period
+    decay = -(rounds - stretch)*log(min(1.0_wp, max(tiny(1.0_wp), multiplier)))
+    approaches = decay >= least_decay .and. distance(machines%centre, point, start) <= beside_cycle
+    if (.not. approaches) return
+    here = start
+    farthest = 0
+    do i = 1, rounds
+      call fly_sections(machines%centre, here, period, .false., image, events, mode, tally, approaches)
+      if (.not. approaches) return
+      here = image
+      if (i <= stretch) farthest(1) = max(farthest(1), distance(machines%centre, point, here))
+      if (i > rounds - stretch) farthest(2) = max(farthest(2), distance(machines%centre, point, here))
+    end do
+    approaches = farthest(2) <= max(on_cycle, exp(-decay/2)*farthest(1))
+  end function approaches
+
+  !> The fixed point of the map over `sections` next to `start`, and its derivative.
+  subroutine refine(machines, sections, start, point, matrix, ok)
+    type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: sections
+    real(wp), intent(in) :: start(:)
+    real(wp), allocatable, intent(out) :: point(:), matrix(:, :)
+    logical, intent(out) :: ok
+    type(tally_t) :: tally
+    real(wp) :: image(size(start)), step(size(start)), slopes(size(start), size(start))
+    integer :: i, k
+    point = start
+    allocate (matrix(size(start), size(start)))
+    associate (machine => machines%centre)
+      do i = 1, most_newton
+        call map_with_variation(machines, point, sections, image, matrix, tally, ok)
+        if (.not. ok) return
+        slopes = matrix
+        do k = 1, size(start)
+          slopes(k, k) = slopes(k, k) - 1
+        end do
+        call solve(slopes, point - nearest_copy(machine, image, point), step, ok)
+        if (.not. ok) return
+        point = point + step
+        ok = distance(machine, point, start) <= beside_cycle
+        if (.not. ok .or. norm2(step/machine%size_of) <= converged) return
+      end do
+      ok = .false.
+    end associate
+  end subroutine refine
+
+  !> Whether a point of the section comes back after `sections`.
+  logical function comes_back(machines, point, sections) result(back)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:)
+    integer, intent(in) :: sections
+    type(tally_t) :: tally
+    real(wp) :: image(size(point)), matrix(size(point), size(point))
+    call map_with_variation(machines, point, sections, image, matrix, tally, back)
+    if (back) back = distance(machines%centre, image, point) <= same
+  end function comes_back
+
+  !> In natural sizes.
+  pure real(wp) function distance(machine, one, other)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: one(:), other(:)
+    distance = norm2((nearest_copy(machine, one, other) - other)/machine%size_of)
+  end function distance
+
+end module cycle_reached
