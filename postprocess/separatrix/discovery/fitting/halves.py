@@ -37,8 +37,9 @@ def halves(
         return
     if gain_over(whole, base)[0] < _WORTH or not _doubtful(whole):
         return
-    for place, path in zip(candidate.added, paths, strict=True):
-        value = float(whole.fit.values[place])
+    for path in paths:
+        # the value fitted may be none for the case as it is written, whose friction was fitted too
+        value = candidate.model.parameters[path].value
         model = base.model.with_effect(name, {path.rpartition(".")[2]: value})
         kept = [one for one in candidate.free if one.path == path or one.path not in paths]
         at = [i for i, one in enumerate(kept) if one.path == path]
