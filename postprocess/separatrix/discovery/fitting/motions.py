@@ -17,12 +17,17 @@ _INSTANT = 1e-5
 
 
 def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
-    """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1."""
+    """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1.
+
+    Where no segment could be flown nothing is scaled.
+    """
     inside = problem.segments.inside
     x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
     good = inside & fit.good[:, None]
-    middle, size = np.mean(x[good]), np.std(x[good])
-    speed = np.sqrt(np.mean(v[good] ** 2))
+    middle, size, speed = 0.0, 1.0, 1.0
+    if good.any():
+        middle, size = np.mean(x[good]), np.std(x[good])
+        speed = np.sqrt(np.mean(v[good] ** 2))
     time, phase = np.zeros(inside.shape), None
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)

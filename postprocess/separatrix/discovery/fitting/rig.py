@@ -57,6 +57,8 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
     count, length = signal.shape
     table = np.zeros((count, fit.evaluation.residual.shape[1], len(_POWERS)))
     good = problem.segments.inside & fit.good[:, None]
+    if not good.any():
+        return table
     swing = float(np.std(signal[good]))
     u = (signal - np.mean(signal[good])) / swing
     for number, prepared in enumerate(problem.prepared):
