@@ -123,7 +123,7 @@ contains
       end if
       if (distance > moved_off*first_distance .or. n > waiting + most) waiting = 0
     end do
-    if (wanders(machines%centre, past(:, :most_periods))) edge = edge_recurrent
+    if (.not. pair%mixed .and. wanders(machines%centre, past(:, :most_periods))) edge = edge_recurrent
   end subroutine track_edge
 
   !> Periods that a pair may take from a distance to where it has arrived, as the saddle attracts.

@@ -25,7 +25,7 @@ module rest_family
   type, public :: rest_family_t
     !> Names of the joints that dry friction holds, with commas; '' for none.
     character(len=:), allocatable :: joints
-    !> Between which places [m] the watched coordinate may rest while no stop is touched; `known` for linear machines.
+    !> Between which places [m] the watched coordinate may rest if no stop is in the way; `known` for linear machines.
     logical :: known = .false.
     real(wp) :: low = 0, high = 0
   end type rest_family_t

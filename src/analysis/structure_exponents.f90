@@ -9,6 +9,7 @@ module structure_exponents
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
+  use jointed_section, only: jointed_point, lay_out
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: int64, wp
   use motion, only: start_state
@@ -109,6 +110,7 @@ contains
     call advance_alone(structure, state, events, lasted, spectrum%known)
     if (.not. spectrum%known) return
     do i = 1 - transient, sections
+      call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
       call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%known)
       if (.not. spectrum%known) return
@@ -126,6 +128,19 @@ contains
     call conclude(structure, batch*batches/duration, duration, left, spectrum)
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
+
+  !> Takes from a structure that nothing ties to the ground the drift of the whole, which would run out of its digits.
+  pure subroutine bring_back(structure, state)
+    type(structure_t), intent(in) :: structure
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), dimension(structure%frame%moving%machine%n) :: q, v
+    associate (moving => structure%frame%moving)
+      if (structure%places == size(q) .and. structure%frame%speeds == size(q)) return
+      call lay_out(moving, jointed_point(moving, state), q, v)
+      state%q(:size(q)) = q
+      state%v(:size(v)) = v
+    end associate
+  end subroutine bring_back
 
   !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `ok` is false if it had to be given up;
   !> `smooth` where a transition is not known to be smooth.

@@ -80,7 +80,7 @@ contains
       shown = 'at '//shown//' dry friction holds '//rest%joints//': places of rest are a family, not followed'
       data = '"parameter": '//json_number(search%values(i))//', "joints": '//json_text(rest%joints)
       if (rest%known) then
-        shown = shown//'; x from '//to_text(rest%low, 10)//' to '//to_text(rest%high, 10)//' where no stop is touched'
+        shown = shown//'; x from '//to_text(rest%low, 10)//' to '//to_text(rest%high, 10)//' as far as no stop is in the way'
         data = data//', "x_low": '//json_number(rest%low)//', "x_high": '//json_number(rest%high)
       end if
       call session%journal%line('rest_family', shown, data)

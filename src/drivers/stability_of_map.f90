@@ -292,9 +292,8 @@ contains
     end select
     if (found%type == chaotic .or. found%type == quasi_periodic) return
     ! A cycle contracts, and comes back to the same points.
-    if (.not. found%spectrum%exponents(1) < 0) return
     found%period = found%spectrum%cycle
-    if (found%period == 0) then
+    if (found%period == 0 .and. found%spectrum%exponents(1) < 0) then
       ! What comes back so near by slowness alone may be of any period.
       found%period = period_of_section(section, same)
       if (found%spectrum%exponents(1)*found%period*found%spectrum%mean_period > -contracts) found%period = 0

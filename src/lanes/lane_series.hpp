@@ -256,7 +256,8 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
 // How much the speed may change over a step where there is friction E exp(-(v/v_s)^delta): the terms of its
 // series grow before they shrink, so that the last one says little. For |x| <= 0.5 what is left out of
 // exp(-(u + x)^2) is below exp(r^2) (0.5/r)^18 = 1e-10 (Cauchy, r = 2.5); above u = 6.2 it is nil. For
-// |x| <= 2 what is left out of exp(-(u + x)) is below 2^18/18! = 4e-11 of it; above u = 30 it is nil.
+// |x| <= 2 what is left out of exp(-(u + x)) is below 2^18/18! = 4e-11 of it; above u = 30 it is nil. Where
+// forces change on the way steps may be half as long again (`keeps_within`): below 1e-7 of the excess.
 LANE_DEVICE inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
   vec room = 1e300;
   for (int i = 0; i < 2; i++) {

@@ -79,4 +79,4 @@ run.duration = 100
         check=False,
     )
     assert "dry friction holds friction.floor: places of rest are a family" in ended.stdout
-    assert "x from 0.1000000000 to 0.9000000000 where no stop is touched" in ended.stdout
+    assert "x from 0.1000000000 to 0.9000000000 as far as no stop is in the way" in ended.stdout
