@@ -3,7 +3,7 @@
 """Keeps what a campaign found in one file, from which the campaign goes on and the page can be written again.
 
 A line of JSON for each case, compressed by LZMA: its number, its seal, the text of its truth, its result.
-Records are not kept: the seed draws them again.
+Records are not kept: the seed draws them again. Messages name files by their places among the cases.
 """
 
 import json
@@ -37,7 +37,7 @@ def pack(archive: Path, folders: object, numbers: Sequence[int]) -> int:
             continue
         sealed = folders.sealed / f"{number:04}.json"
         truth = sealed.read_text() if sealed.is_file() else None
-        result = json.loads(folders.result(number).read_text())
+        result = json.loads(folders.result(number).read_text().replace(f"{folders.cases}/", ""))
         lines.append(json.dumps({"number": number, "truth": truth, "result": result}) + "\n")
     draft = archive.with_name(archive.name + ".new")
     draft.parent.mkdir(parents=True, exist_ok=True)

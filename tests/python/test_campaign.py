@@ -4,6 +4,7 @@
 
 import hashlib
 import json
+import lzma
 import math
 import os
 import re
@@ -442,6 +443,21 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
     assert all(len(measured.findall(page)) == 1 for page in results.values())
     untimed = {name: measured.sub("", page) for name, page in results.items()}
     assert untimed["whole"] == untimed["killed"]
+
+
+def test_the_archive_names_no_folder_of_the_machine(campaign, tmp_path):
+    import archive
+    from campaign import Folders
+
+    folders = Folders(tmp_path / "seed")
+    folders.make()
+    said = f"{folders.cases}/0000/base.toml:3: key 'body.mass': missing"
+    folders.result(0).write_text(json.dumps({"number": 0, "verdict": {"reasons": [said]}}))
+    kept = tmp_path / "archive.jsonl.xz"
+    assert archive.pack(kept, folders, [0, 1]) == 1
+    text = lzma.open(kept, "rt").read()
+    assert "0000/base.toml:3: key" in text
+    assert str(tmp_path) not in text
 
 
 def test_the_page_can_be_written_again_from_the_archive_alone(source_dir, tmp_path):
