@@ -150,3 +150,29 @@ def test_events_of_a_ring_of_friction_are_those_of_what_moves(separatrix, tmp_pa
             moved = abs(float(event["joint_x"]) - float(before["joint_x"]))
             assert event is before or (moved > 1e-9) == slides
             slides = event["kind"] != "stick"
+
+
+def test_a_chatter_is_told_when_it_is_over(separatrix, tmp_path):
+    """Each of two balls comes to rest where its bounces add up to; events stand in the order of time."""
+    heights = {"one": 1.0, "two": 0.9992}
+    lines = ["[start]", "x0 = 1.0", "[run]", "duration = 10"]
+    for name, height in heights.items():
+        lines += [f"[body.{name}]", "mass = 1", "load = -10", *([f"x0 = {height}"] if name == "two" else [])]
+        lines += [
+            f"[contact.{name}]",
+            f'between = ["{name}"]',
+            'law = "newton"',
+            "restitution = 0.8",
+            "lower = 0",
+        ]
+    (tmp_path / "case.toml").write_text('title = "Two balls"\n' + "\n".join(lines) + "\n")
+    succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "out.h5") as file:
+        names = file["event_kind"].attrs["flag_meanings"].split()
+        time, kind, joint = (file[name][:] for name in ("event_time", "event_kind", "event_joint"))
+    assert np.all(np.diff(time) >= 0)
+    ends = {int(joint[k]): time[k] for k in np.flatnonzero(kind == names.index("chatter_lower") + 1)}
+    for number, height in enumerate(heights.values(), start=1):
+        fall = np.sqrt(2 * height / 10)
+        assert ends[number] == pytest.approx(fall * (1 + 2 * 0.8 / (1 - 0.8)), abs=1e-12)
+    assert "invariants hold" in succeed(separatrix, "verify", "out.h5", folder=tmp_path).out
