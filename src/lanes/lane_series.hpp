@@ -263,8 +263,8 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
 // How much the speed may change over a step where there is friction E exp(-(v/v_s)^delta): the terms of its
 // series grow before they shrink, so that the last one says little. While the speed changes steadily what is
 // left out of exp(-(u + x)^2) begins with x^18 H_18(u) exp(-u^2)/18!, at most 7.0e-6 exp(-u^2/2) |x|^18
-// (Cramer's inequality): 7e-10 at |x| = 0.6 exp(u^2/36), whatever u; above u = 6.2 it is nil. In a contact the
-// speed's own higher terms count: |x| <= 0.5. For |x| <= 2 what is left out of exp(-(u + x)) is below
+// (Cramer's inequality): 7e-10 at |x| = 0.6 exp(u^2/36), whatever u; above u = 6.2 it is nil. In a contact
+// the speed's own higher terms count: |x| <= 0.5. For |x| <= 2 what is left out of exp(-(u + x)) is below
 // 2^18/18! = 4e-11 of it; above u = 30 it is nil.
 template <bool steady>
 LANE_DEVICE inline vec speed_room(const lane_law &l, const lane_group &g, mask within) {
