@@ -176,3 +176,69 @@ def test_a_chatter_is_told_when_it_is_over(separatrix, tmp_path):
         fall = np.sqrt(2 * height / 10)
         assert ends[number] == pytest.approx(fall * (1 + 2 * 0.8 / (1 - 0.8)), abs=1e-12)
     assert "invariants hold" in succeed(separatrix, "verify", "out.h5", folder=tmp_path).out
+
+
+CURVED = """
+title = "A curved spring, a belt and a stop"
+
+[body.block]
+mass = 0.5
+
+[spring.curved]
+between = ["ground", "block"]
+law = "polynomial"
+stiffness = 1.0
+quadratic = 0.3
+cubic = 3.0
+damping = 0.05
+
+[friction.belt]
+between = ["ground", "block"]
+law = "coulomb"
+force = 0.422
+velocity = -1.0
+
+[contact.stop]
+between = ["ground", "block"]
+law = "newton"
+restitution = 0.3
+lower = -0.366
+
+[drive.shaker]
+law = "force"
+body = "block"
+amplitude = 0.84
+angle = 0.3
+frequency = 4.9
+
+[start]
+v0 = -1.438
+
+[run]
+duration = 12
+
+[integrator]
+event_budget = 3000
+"""
+
+
+def test_a_chatter_under_a_curved_spring_ends(separatrix, tmp_path):
+    """No impact beyond the stop; within a chatter none is faster than the rebound before it."""
+    (tmp_path / "case.toml").write_text(CURVED)
+    out = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
+    assert "time_over" in out
+    with h5py.File(tmp_path / "out.h5") as file:
+        names = ["no event", *file["event_kind"].attrs["flag_meanings"].split()]
+        kinds = [names[kind] for kind in file["event_kind"]]
+        before, after, time = (
+            file[f"event_{name}"][:] for name in ("joint_v_before", "joint_v_after", "time")
+        )
+        assert file["x"][:].min() > -0.366 - 1e-15
+    assert kinds.count("chatter_lower") >= 3
+    pairs = [
+        (k, k + 1)
+        for k in range(len(kinds) - 1)
+        if kinds[k] == kinds[k + 1] == "impact_lower" and time[k + 1] - time[k] < 1e-3
+    ]
+    assert len(pairs) > 20
+    assert all(-before[later] <= after[one] * (1 + 1e-6) for one, later in pairs)
