@@ -57,7 +57,7 @@ window = 5.0
 
 
 def test_what_a_file_gives_is_said_as_it_is(tmp_path):
-    """A matrix that ends early ends the file; break-away friction below that of sliding is refused as written."""
+    """A matrix that ends early ends the file; friction at break-away is not below zero."""
     io.mmwrite(tmp_path / "mass.mtx", np.eye(2), precision=17)
     (tmp_path / "stiffness.mtx").write_text("%%MatrixMarket matrix array real general\n2 2\n3\n-1\n")
     structure = '[structure.f]\nmass = "mass.mtx"\nstiffness = "stiffness.mtx"\npoint.roof = 2\n'

@@ -3,6 +3,7 @@
 """Machines of several bodies through the whole program: files, ranks, quadruple precision."""
 
 import csv
+import re
 
 import h5py
 import numpy as np
@@ -242,3 +243,70 @@ def test_a_chatter_under_a_curved_spring_ends(separatrix, tmp_path):
     ]
     assert len(pairs) > 20
     assert all(-before[later] <= after[one] * (1 + 1e-6) for one, later in pairs)
+
+
+def test_slow_transients_are_no_attractors(separatrix, tmp_path):
+    """Motions that still come together are told in a line, and not counted as attractors."""
+    (tmp_path / "case.toml").write_text(
+        """
+title = "Two bodies that come to one motion slowly"
+
+[body.first]
+mass = 1.0
+
+[body.second]
+mass = 2.0
+load = -0.198
+v0 = -1.822
+
+[spring.first]
+between = ["ground", "first"]
+stiffness = 40.0
+damping = 0.1
+
+[friction.ground]
+between = ["ground", "second"]
+law = "elastic_coulomb"
+force = 0.956
+stiffness = 15.0
+
+[friction.between]
+between = ["first", "second"]
+law = "elastic_coulomb"
+force = 1.16
+stiffness = 15.0
+
+[drive.shaker]
+law = "force"
+body = "first"
+amplitude = 3.24
+angle = 0.3
+frequency = 1.73
+
+[run]
+duration = 60
+
+[attractors]
+sample = 8
+second_look = 0
+
+[[axis]]
+name = "x0"
+from = -0.008
+to = 0.009
+count = 3
+
+[[axis]]
+name = "v0"
+from = -1.7
+to = 1.9
+count = 3
+"""
+    )
+    out = succeed(separatrix, "basin", "case.toml", "-o", "map.h5", folder=tmp_path).out
+    found = re.search(r"^0 attractors and (\d+) motions not known to be periodic in 1 slice discovered", out)
+    assert found is not None, out
+    assert re.search(
+        rf"^  1 to {found[1]}: .*, amplitude 0.07\d+ to 0.07\d+ m, .*come together by 0.99", out, re.M
+    )
+    assert "an attractor that was not found" not in out
