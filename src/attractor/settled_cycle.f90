@@ -7,6 +7,7 @@ module settled_cycle
   use discover, only: discover_attractors, sort_attractors
   use kinds, only: wp
   use motion, only: motion_t
+  use motion_state, only: options_t
   use status, only: reason_settled, reason_time_over
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -14,11 +15,15 @@ module settled_cycle
 
   public :: describe_cycle
 
+  !> A search may take so many times what the motion took, and so many events and steps more.
+  integer, parameter :: most_times = 6, more_events = 10000, more_steps = 20000
+
 contains
 
   !> The cycle that the motion of `outcome` has come to by its end, period 0 if none; then the steady values are those of
   !> the cycle. Not where they are asked for over the window as it is. A cycle that the motion comes to later, or that is longer
-  !> than the motion, is none of its own, so that chaos is not searched for long. `patience`: span of the case, with its extension;
+  !> than the motion, is none of its own, so that chaos is not searched for long; nor is one sought that takes `most_times` the
+  !> events or steps of the motion. `patience`: span of the case, with its extension;
   !> `start`: x [m], v [m/s], crank angle [rad].
   pure subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
     type(motion_t), intent(in) :: moving
@@ -28,17 +33,30 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(attractor_t), intent(out) :: cycle
     type(attractor_t), allocatable :: own(:)
+    type(motion_t) :: searching
     type(outcome_t) :: again
     integer :: most_periods
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
     most_periods = min(max_period, max(1, int(min(span%duration/moving%machine%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
-    call discover_attractors(moving, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
+    searching = moving
+    call limit(searching%options)
+    call limit(searching%jointed%options)
+    call discover_attractors(searching, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
     if (size(own) == 0) return
     call sort_attractors(own)
     call run_trajectory(moving, own, span, start(1), start(2), start(3), again)
     if (again%reason /= reason_settled) return
     cycle = own(again%attractor)
     if (cycle%kind == kind_cycle .or. (cycle%kind == kind_rest .and. .not. cycle%rests)) outcome%window = cycle%features
+
+  contains
+
+    pure subroutine limit(options)
+      type(options_t), intent(inout) :: options
+      options%event_budget = min(options%event_budget, most_times*outcome%events + more_events)
+      options%step_budget = min(options%step_budget, most_times*outcome%steps + more_steps)
+    end subroutine limit
+
   end subroutine describe_cycle
 
 end module settled_cycle

@@ -45,6 +45,8 @@ module trajectory
     real(wp) :: x = 0, v = 0
     integer(int64) :: impacts = 0
     real(wp) :: last_impact_speed = 0
+    !> Events, and steps of flights that take them, until then.
+    integer(int64) :: events = 0, steps = 0
   end type outcome_t
 
   !> Parts of a trajectory: up to the window, the window, and on until captured.
@@ -326,6 +328,8 @@ contains
     outcome%x = place_of(course%state)
     outcome%v = course%state%v
     outcome%impacts = course%impacts + course%tally%impacts
+    outcome%events = course%tally%events
+    outcome%steps = course%tally%steps
     outcome%last_impact_speed = latest_impact_speed(course)
   end subroutine note_state
 
