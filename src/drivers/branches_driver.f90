@@ -4,10 +4,11 @@
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
-  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria, report_rest
+  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
+  use branch_rest, only: describe_rest, find_rest, report_rest, rest_at_t
   use branch_watch, only: branch_watch_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
   use branches_setup, only: set_range, set_starts
@@ -46,6 +47,7 @@ contains
     type(branch_watch_t), target :: watch
     type(curves_t) :: curves
     type(contacts_t) :: contacts
+    type(rest_at_t), allocatable :: rest(:)
     type(schema_t) :: schema
     type(bounds_t) :: bounds
     type(error_t), allocatable :: error
@@ -79,16 +81,20 @@ contains
       if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, contacts, trim(bounds%unit))
       call report_equilibria(session, search, trim(bounds%unit))
-      call report_rest(session, search, trim(bounds%unit))
+      call find_rest(search, rest)
+      call report_rest(session, rest, search%family%path, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
-    if (size(search%branches) + count_equilibria(search) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
-      'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
-      to_text(search%plan%highest)//'; nothing is written')
+    if (session%team%is_root()) then
+      if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, exit_bad_case, &
+        'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
+        to_text(search%plan%highest)//'; nothing is written')
+    end if
     call session%stop_if(error)
     call describe_file(session, 'branches', schema)
     if (session%team%is_root()) call describe_branches(search, trim(bounds%unit), schema)
     if (session%team%is_root()) call describe_equilibria(search, trim(bounds%unit), schema)
+    if (session%team%is_root()) call describe_rest(rest, search%family%path, trim(bounds%unit), schema)
     if (session%team%is_root()) call describe_curves(curves, search%family%path, trim(bounds%unit), schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)

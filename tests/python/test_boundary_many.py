@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import separatrix as sx
+from program import succeed
 from separatrix.open import decode_flags, open_result, table
 
 CASE = """
@@ -83,3 +84,30 @@ def test_a_motion_from_a_named_point_comes_to_its_saddle(woven):
                 assert away < 0.02, (number, k, away)
                 tried += 1
         assert tried > 25
+
+
+THREE = """
+body.mass = 1
+restoring = { law = "linear", stiffness = 1 }
+friction = { law = "viscous", damping = 0.005 }
+contact = { law = "newton", restitution = 0.95, upper = 0.5 }
+drive = { law = "harmonic", amplitude = 1, ratio = 4.2 }
+run.duration = 1000
+axis = [
+  { name = "x0", from = -4, to = 0.5, count = 4 },
+  { name = "v0", from = -5, to = 5, count = 4 },
+]
+"""
+
+
+def test_pairs_that_meet_a_third_basin_name_no_recurrent_set(separatrix, tmp_path):
+    """Three basins so interwoven that pairs of two meet the third: they wander on with other labels."""
+    (tmp_path / "three.toml").write_text(THREE)
+    succeed(separatrix, "basin", "three.toml", "-o", "three.h5", folder=tmp_path)
+    succeed(separatrix, "boundary", "three.h5", "-o", "out.h5", "--grow", 0, folder=tmp_path)
+    with open_result(tmp_path / "out.h5") as result:
+        labels = {*result["label_one"].values.tolist(), *result["label_two"].values.tolist()}
+        assert labels >= {1, 2, 3}
+        names = decode_flags(result["name"]).values
+        assert names.size > 15
+        assert "recurrent" not in names
