@@ -125,7 +125,7 @@ axis = [{ name = "x0", from = -2.5, to = 0, count = 8 }, { name = "v0", from = -
 
 
 def test_a_weak_cycle_of_a_map_is_told_though_its_mean_exponent_is_positive(separatrix: Path, tmp_path: Path):
-    """A cycle contracts with 5e-4/s: means over a thousand seconds are off by more, its multipliers are not."""
+    """A cycle contracts with 5e-4/s: means over a thousand seconds are off by more, its multipliers not."""
     case = tmp_path / "weak.toml"
     case.write_text(
         """body.mass = 1
