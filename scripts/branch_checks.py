@@ -98,6 +98,7 @@ CASES = (
     Case("structure_beam", "drive.shaker.frequency", (1.4, 1.6), (1, 2)),
     Case("structure_capsule", "drive.inner.frequency", (0.9, 1.0), (1, 2)),
     Case("structure_impact_damper", "drive.shaker.frequency", (0.8, 1.2), (1, 2)),
+    Case("basin_woven", "drive.ratio", (5.1, 5.3), (1, 2), product=lambda w: (0.01, 0.95, TAU / w)),
     Case("basin_pair_backlash", "drive.frequency", (10.5, 11.5), (4, 5)),
     Case("sweep_pair_kappa", "body.friction", (0.3, 0.9), (1, 2)),
 )

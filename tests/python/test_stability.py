@@ -160,6 +160,10 @@ def test_a_damaged_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: 
     ended = subprocess.run([separatrix, "stability", target], capture_output=True, text=True, check=False)
     assert ended.returncode == 74
     assert "period" in ended.stderr
+    # a file is buffered, a pipe is not
+    with (tmp_path / "said.txt").open("w") as said:
+        subprocess.run([separatrix, "stability", target], stderr=said, check=False)
+    assert (tmp_path / "said.txt").read_text() == ended.stderr
 
 
 def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):
