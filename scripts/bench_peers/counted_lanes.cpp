@@ -27,10 +27,11 @@ struct lane_counts {
 
 #define LANE_COUNT(what, number) counts.what += number
 
-#include "lane_kernel.hpp"
+#include "lane_variation.hpp"
 #include "structure_kernel.hpp"
 
 SEPARATRIX_LANE_KERNEL(separatrix_fly_counted)
+SEPARATRIX_LANE_VARIATION(separatrix_vary_counted)
 SEPARATRIX_STRUCTURE_KERNEL(separatrix_fly_structures_counted)
 
 extern "C" {
@@ -47,6 +48,10 @@ void separatrix_fly_lanes(int, const lane_machine *machine, const lane_regions *
   separatrix_fly_counted(machine, regions, batch);
   for (double status : batch->fields.status)
     counts.left += status == lane_left;
+}
+
+void separatrix_vary_lanes(int, const lane_machine *machine, lane_batch *batch, lane_tangents *tangents) {
+  separatrix_vary_counted(machine, batch, tangents);
 }
 
 void separatrix_structure_sizes(size_t *machine, size_t *batch) {

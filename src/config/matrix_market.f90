@@ -72,6 +72,7 @@ contains
       next_line = len_trim(cursor%line) > 0 .and. (cursor%number == 1 .or. .not. starts_with(cursor%line, '%'))
       if (next_line) return
     end do
+    cursor%line = 'the end of the file'
   end function next_line
 
   subroutine read_header(cursor, layout, symmetry, problem)
@@ -91,7 +92,6 @@ contains
     if (status == 0 .and. words(1) == '%%matrixmarket' .and. words(2) == 'matrix' .and. &
         (layout == 'coordinate' .or. layout == 'array') .and. (words(4) == 'real' .or. words(4) == 'integer') .and. &
         (symmetry == 'general' .or. symmetry == 'symmetric' .or. symmetry == 'skew-symmetric')) return
-    if (.not. allocated(cursor%line)) cursor%line = ''
     problem = 'found '''//shown(cursor%line)//allowed
   end subroutine read_header
 

@@ -165,6 +165,10 @@ contains
     end do
     if (kind == 'friction') then
       ! Break-away friction that is not given equals sliding friction.
+      if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then
+        call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))// &
+                    ' N, allowed at least the force')
+      end if
       if (value_of(choice, 'static_force') < 0) call set_value(choice, 'static_force', [value_of(choice, 'force')])
     end if
     if (choice%name == 'contact:massless') call set_flexibility(source, path, bodies, choice)

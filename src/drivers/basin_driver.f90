@@ -8,7 +8,7 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, points_of_tile, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_report, only: attractor_text, missed_text, not_known_text
+  use catalogue_report, only: found_text, list_attractors, missed_text, not_known_text
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use endings, only: report_reasons
@@ -200,7 +200,7 @@ contains
     type(session_t), intent(inout) :: session
     type(basin_work_t), intent(in) :: work
     character(len=:), allocatable :: source, not_known, missed
-    integer :: i, k, last
+    integer :: i, last
     if (size(work%catalogues) == 0) then
       call session%journal%line('catalogue', 'no start is an axis: every point has its own attractor, unlabelled')
       return
@@ -211,27 +211,14 @@ contains
     end do
     source = ' discovered'
     if (len(session%command%catalogue) > 0) source = ' taken from '//session%command%catalogue
-    call session%journal%line('catalogue', counted(last, 'attractor')//' in '//counted(size(work%catalogues), 'slice')// &
-      source, '"attractors": '//to_text(last))
+    call session%journal%line('catalogue', found_text(work%catalogues)//source, '"attractors": '//to_text(last))
     not_known = not_known_text(work%catalogues, work%span%extension)
     if (len(not_known) > 0) call session%journal%line('warning', not_known)
     missed = missed_text(work%catalogues, session%the_case%attractors%sample)
     if (len(missed) > 0) call session%journal%line('missed', missed)
     if (size(work%catalogues) > 1) return
-    do k = 1, size(work%catalogues(1)%attractors)
-      call session%journal%line('attractor', attractor_text(work%catalogues(1)%attractors(k), &
-                                                          position_is_angle(session%the_case%laws)))
-    end do
+    call list_attractors(session%journal, work%catalogues(1)%attractors, position_is_angle(session%the_case%laws))
   end subroutine report_catalogue
-
-  !> '1 slice', '2 slices'.
-  pure function counted(number, thing) result(words)
-    integer, intent(in) :: number
-    character(len=*), intent(in) :: thing
-    character(len=:), allocatable :: words
-    words = to_text(number)//' '//thing
-    if (number /= 1) words = words//'s'
-  end function counted
 
   subroutine report_shares(session, work)
     type(session_t), intent(inout) :: session

@@ -6,49 +6,126 @@ module catalogue_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_not_known, regime_names
   use basin, only: catalogue_t
+  use journal, only: journal_t
   use kinds, only: wp
   use statistics, only: share_upper_limit
   use text, only: to_text
   implicit none
   private
 
-  public :: attractor_text, not_known_text, missed_text
+  public :: found_text, list_attractors, not_known_text, missed_text
 
   !> Confidence of the bound on what the sample has missed.
   real(wp), parameter :: confidence = 0.95_wp
 
 contains
 
-  !> An attractor in a line.
-  function attractor_text(attractor, is_angle) result(line)
-    type(attractor_t), intent(in) :: attractor
+  !> How many attractors the catalogues have, and how many entries of which nobody knows whether they are some.
+  pure function found_text(catalogues) result(line)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    character(len=:), allocatable :: line
+    logical, allocatable :: found(:), known(:)
+    integer :: slice, last
+    last = maxval([0, (maxval([0, catalogues(slice)%attractors%id]), slice=1, size(catalogues))])
+    allocate (found(last), known(last), source=.false.)
+    do slice = 1, size(catalogues)
+      associate (entries => catalogues(slice)%attractors)
+        found(entries%id) = .true.
+        known(pack(entries%id, entries%kind /= kind_not_known)) = .true.
+      end associate
+    end do
+    line = counted(count(known), 'attractor')
+    if (count(found .and. .not. known) > 0) then
+      line = line//' and '//counted(count(found .and. .not. known), 'motion')//' not known to be periodic'
+    end if
+    line = line//' in '//counted(size(catalogues), 'slice')
+  end function found_text
+
+  !> '1 slice', '2 slices'.
+  pure function counted(number, thing) result(words)
+    integer, intent(in) :: number
+    character(len=*), intent(in) :: thing
+    character(len=:), allocatable :: words
+    words = to_text(number)//' '//thing
+    if (number /= 1) words = words//'s'
+  end function counted
+
+  !> The attractors, each in a line.
+  subroutine list_attractors(journal, attractors, is_angle)
+    type(journal_t), intent(inout) :: journal
+    type(attractor_t), intent(in) :: attractors(:)
+    logical, intent(in) :: is_angle
+    integer :: first, last
+    first = 1
+    do while (first <= size(attractors))
+      last = alike_until(attractors, first)
+      call journal%line('attractor', attractor_text(attractors(first:last), is_angle))
+      first = last + 1
+    end do
+  end subroutine list_attractors
+
+  !> The last of the entries from `first` on that one line tells: motions that nobody knows to be periodic, alike but for their
+  !> amplitude.
+  pure integer function alike_until(attractors, first) result(last)
+    type(attractor_t), intent(in) :: attractors(:)
+    integer, intent(in) :: first
+    last = first
+    do while (last < size(attractors))
+      associate (one => attractors(first), next => attractors(last + 1))
+        if (one%kind /= kind_not_known .or. next%kind /= kind_not_known .or. next%id /= attractors(last)%id + 1) return
+        if (one%features%regime /= next%features%regime .or. (one%multiplier > 1 .neqv. next%multiplier > 1)) return
+        if (abs(one%features%impacts_per_period - next%features%impacts_per_period) > 0) return
+      end associate
+      last = last + 1
+    end do
+  end function alike_until
+
+  !> An attractor in a line, or entries that are alike.
+  function attractor_text(attractors, is_angle) result(line)
+    type(attractor_t), intent(in) :: attractors(:)
     logical, intent(in) :: is_angle
     character(len=:), allocatable :: line
-    line = '  '//to_text(attractor%id)//': '//trim(regime_names(attractor%features%regime))
-    select case (attractor%kind)
-    case (kind_chaotic)
-      line = line//', chaotic'
-    case (kind_not_known)
-      line = line//', not known to be periodic'
-    case default
-      if (attractor%by_event) then
-        line = line//', limit cycle of '//to_text(attractor%duration, 8)//' s'
-        if (attractor%period > 1) line = line//' with '//to_text(attractor%period)//' turns'
-      else
-        line = line//', period '//to_text(attractor%period)
+    integer :: last
+    last = size(attractors)
+    associate (attractor => attractors(1))
+      line = '  '//to_text(attractor%id)
+      if (last > 1) line = line//' to '//to_text(attractors(last)%id)
+      line = line//': '//trim(regime_names(attractor%features%regime))
+      select case (attractor%kind)
+      case (kind_chaotic)
+        line = line//', chaotic'
+      case (kind_not_known)
+        line = line//', not known to be periodic'
+      case default
+        if (attractor%by_event) then
+          line = line//', limit cycle of '//to_text(attractor%duration, 8)//' s'
+          if (attractor%period > 1) line = line//' with '//to_text(attractor%period)//' turns'
+        else
+          line = line//', period '//to_text(attractor%period)
+        end if
+      end select
+      line = line//', amplitude '//range_text(attractors%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
+             to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
+      if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) then
+        line = line//', rotation number '//to_text(attractor%features%rotation, 4)
       end if
-    end select
-    line = line//', amplitude '//to_text(attractor%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
-           to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
-    if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) then
-      line = line//', rotation number '//to_text(attractor%features%rotation, 4)
-    end if
-    if (attractor%kind == kind_chaotic .or. attractor%kind == kind_not_known) then
-      line = line//', neighbours drift apart by '//to_text(attractor%multiplier, 4)//' a period'
-    else
-      line = line//', multiplier '//to_text(attractor%multiplier, 4)
-    end if
+      if (attractor%kind == kind_chaotic .or. attractor%kind == kind_not_known) then
+        line = line//', neighbours '//trim(merge('drift apart  ', 'come together', attractor%multiplier > 1))//' by '// &
+               range_text(attractors%multiplier, 4)//' a period'
+      else
+        line = line//', multiplier '//to_text(attractor%multiplier, 4)
+      end if
+    end associate
   end function attractor_text
+
+  !> '0.5', '0.5 to 0.7'.
+  pure function range_text(values, digits) result(words)
+    real(wp), intent(in) :: values(:)
+    integer, intent(in) :: digits
+    character(len=:), allocatable :: words
+    words = to_text(minval(values), digits)
+    if (to_text(maxval(values), digits) /= words) words = words//' to '//to_text(maxval(values), digits)
+  end function range_text
 
   !> A warning about the entries of which nobody knows whether they are attractors; '' if there are none.
   function not_known_text(catalogues, extension) result(line)
@@ -65,13 +142,13 @@ contains
     end do
     line = ''
     if (entries == 0) return
-    line = 'warning: '//to_text(entries)//' of the attractors, in '//to_text(slices)//' of '//to_text(size(catalogues))// &
+    line = 'warning: '//to_text(entries)//' entries of the catalogue, in '//to_text(slices)//' of '//to_text(size(catalogues))// &
       ' slices, are not known to be periodic, nor do neighbouring motions drift apart: perhaps long transients. A longer '// &
       'run.duration or run.extension (now '//to_text(extension, 3)//') tells'
   end function not_known_text
 
   !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where
-  !> a slice has none, whether or not it was looked for. The bound is that of independent starts.
+  !> a slice has none that is known, whether or not it was looked for. The bound is that of independent starts.
   function missed_text(catalogues, sample) result(line)
     type(catalogue_t), intent(in) :: catalogues(:)
     integer, intent(in) :: sample
@@ -79,7 +156,7 @@ contains
     integer :: i
     line = ''
     if (size(catalogues) == 0) return
-    if (any([(size(catalogues(i)%attractors) == 0, i=1, size(catalogues))])) return
+    if (any([(all(catalogues(i)%attractors%kind == kind_not_known), i=1, size(catalogues))])) return
     line = 'an attractor that was not found attracts less than '//to_text(100*share_upper_limit(0, sample, confidence), 3)// &
       ' % of the starts'
     if (size(catalogues) > 1) line = line//' of its slice'

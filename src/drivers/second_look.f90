@@ -8,7 +8,7 @@
 module second_look
   use basin, only: catalogue_t, open_slice
   use basin_work, only: basin_work_t, needs_label, prepare_counts
-  use catalogue_report, only: attractor_text
+  use catalogue_report, only: list_attractors
   use catalogue_search, only: pack_catalogues, unpack_catalogues
   use discover, only: discover_attractors
   use errors, only: error_t
@@ -108,7 +108,7 @@ contains
     logical, intent(out) :: complete
     type(error_t), allocatable :: error
     integer(int64), allocatable :: rows(:, :), row(:)
-    integer :: looks, budget, before, found, highest, k
+    integer :: looks, budget, before, found, highest
     integer(int64) :: first, left
     character(len=:), allocatable :: tells
     logical :: changed
@@ -145,12 +145,9 @@ contains
       ' points that had ended without an attractor: '//to_text(found)//' more found, '//to_text(left)//' points left without'// &
       tells, '"starts": '//to_text(count(rows >= 0))//', "found": '//to_text(found)//', "left": '//to_text(left))
     if (size(work%catalogues) > 1) return
-    do k = 1, size(work%catalogues(1)%attractors)
-      associate (attractor => work%catalogues(1)%attractors(k))
-        if (attractor%id > highest) call session%journal%line('attractor', attractor_text(attractor, &
-          position_is_angle(session%the_case%laws)))
-      end associate
-    end do
+    associate (attractors => work%catalogues(1)%attractors)
+      call list_attractors(session%journal, pack(attractors, attractors%id > highest), position_is_angle(session%the_case%laws))
+    end associate
   end subroutine look_again
 
   pure integer function entries(catalogues)

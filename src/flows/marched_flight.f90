@@ -23,6 +23,8 @@ module marched_flight
 
   !> Rounding of a guard, as a share of the sizes of its terms.
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
+  !> That of a guard along a step.
+  real(wp), parameter :: noise_share = 4096*epsilon(1.0_wp)
   !> Displacements of so many depths of a contact leave that digits enough.
   real(wp), parameter :: far = 1e2_wp
 
@@ -105,11 +107,16 @@ contains
           flight%guards(g)%margin = g
           flight%guards(g)%from_zero = guard%from_zero .or. abs(start) <= rounding*flight%size_of_guard(g)
           if (flight%guards(g)%from_zero) flight%guards(g)%constant = -start
-          flight%guards(g)%noise = 4096*epsilon(1.0_wp)*flight%size_of_guard(g)
           rate = sum(abs(row(:n)*state%v(:n))) + sum(abs(row(n + 1:2*n))*accelerations)
           if (guard%held > 0) rate = rate + guard%blur(1)
-          flight%guards(g)%noise_rate = 4096*epsilon(1.0_wp)*rate
+          flight%guards(g)%noise = noise_share*[flight%size_of_guard(g), rate, 0.5_wp*sum(abs(row(:n))*accelerations)]
           call take_as_linear(system, g, flight%guards(g))
+          ! Displacements count from here: of a place that is left, rounding begins with them.
+          associate (taken => flight%guards(g))
+            if (taken%from_zero .and. taken%margin == 0 .and. abs(guard%place) > 0 .and. .not. abs(taken%constant) > 0) then
+              taken%noise(0) = 0
+            end if
+          end associate
         end associate
       end do
     end associate

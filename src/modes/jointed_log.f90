@@ -11,8 +11,8 @@ module jointed_log
   use kinds, only: wp
   use matrices, only: solve
   use mode_flow, only: harmonics_of, mode_flow_t
-  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, record_event, record_sample, &
-    sample_due, sample_time, state_t
+  use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, put_in_order, record_event, &
+    record_sample, sample_due, sample_time, state_t
   use two_bodies, only: contact_at, driver_now, mode_of_two
   implicit none
   private
@@ -364,6 +364,7 @@ contains
     call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u)
     call record_change(machine, kind, before, after, log)
     call put_column(log%event_joint, log%events, [real(j, wp), s, u, u_after])
+    call put_in_order(log)
   end subroutine log_event
 
   !> Writes an event down as the watched body sees it, and of two where the driving one is.

@@ -10,7 +10,7 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
-    place_of, take_turns, move_turn, append_word, open_log, record_event, record_sample, put_sample_book, put_column
+    place_of, take_turns, move_turn, append_word, open_log, record_event, put_in_order, record_sample, put_sample_book, put_column
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -273,6 +273,19 @@ contains
     log%event_data(:, log%events) = [log%origin + state%time, place_of(state), state%v, v_after]
     if (present(driver)) call put_column(log%event_driver, log%events, driver)
   end subroutine record_event
+
+  !> Puts the last event before those that end after it: a chatter is told when it is completed, at the time when it is over.
+  pure subroutine put_in_order(log)
+    type(log_t), intent(inout) :: log
+    integer :: k
+    do k = log%events, 2, -1
+      if (.not. log%event_data(1, k) < log%event_data(1, k - 1)) exit
+      log%event_kind(k - 1:k) = log%event_kind(k:k - 1:-1)
+      log%event_data(:, k - 1:k) = log%event_data(:, k:k - 1:-1)
+      if (allocated(log%event_driver)) log%event_driver(:, k - 1:k) = log%event_driver(:, k:k - 1:-1)
+      if (allocated(log%event_joint)) log%event_joint(:, k - 1:k) = log%event_joint(:, k:k - 1:-1)
+    end do
+  end subroutine put_in_order
 
   !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two, `book` the energy.
   pure subroutine record_sample(log, state, driver, book)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The comparison with other programs: its command line, and that everybody solves the same problem."""
 
+import os
 import subprocess
 
 import h5py
@@ -86,3 +87,22 @@ def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separat
         assert found.x == pytest.approx(file["x"][()], abs=1e-11)
         assert found.v == pytest.approx(file["v"][()], abs=1e-10)
         assert found.impacts.tolist() == file["impacts"][()].tolist()
+
+
+def test_the_kernel_that_counts_does_the_same(source_dir, build_dir, separatrix, tmp_path):
+    """The labels of the usual kernel; an event takes an evaluation of the motion or more."""
+    program = build_dir / "bin" / "separatrix_counted"
+    if not program.is_file():
+        pytest.skip(f"{program} has not been built")
+    words = ["--set", "axis[1].count=10", "--set", "axis[2].count=10", "--set", 'run.stop="duration"']
+    case = source_dir / "examples" / "basin_coulomb.toml"
+    maps = []
+    for name in (separatrix, program):
+        out = tmp_path / f"{name.name}.h5"
+        env = {**os.environ, "LANE_COUNTS": str(tmp_path / "counts")}
+        subprocess.run([name, "basin", case, "-o", out, "-q", *words], check=True, env=env)
+        with h5py.File(out) as file:
+            maps.append({key: file[key][:] for key in ("attractor", "impacts_per_period")})
+    assert all(np.array_equal(maps[0][key], maps[1][key]) for key in maps[0])
+    evaluations, events, left = map(int, (tmp_path / "counts").read_text().split())
+    assert evaluations >= events > left >= 0

@@ -54,3 +54,21 @@ window = 5.0
     with pytest.raises(sx.CaseError, match="structure.beam.stiffness") as refused:
         sx.load("bad.toml")
     assert str(refused.value).startswith("bad.toml:")
+
+
+def test_what_a_file_gives_is_said_as_it_is(tmp_path):
+    """A matrix that ends early ends the file; friction at break-away is not below zero."""
+    io.mmwrite(tmp_path / "mass.mtx", np.eye(2), precision=17)
+    (tmp_path / "stiffness.mtx").write_text("%%MatrixMarket matrix array real general\n2 2\n3\n-1\n")
+    structure = '[structure.f]\nmass = "mass.mtx"\nstiffness = "stiffness.mtx"\npoint.roof = 2\n'
+    friction = (
+        '[body.b]\nmass = 1\n[friction.f]\nbetween = ["b"]\nlaw = "coulomb"\nforce = 1\nstatic_force = -0.5\n'
+    )
+    for text, said in (
+        (structure, "stiffness.mtx:4: found 'the end of the file', allowed a number for row 1 of column 2"),
+        (friction, "key 'friction.f.static_force': found -0.5 N, allowed at least the force"),
+    ):
+        (tmp_path / "case.toml").write_text(text + "[run]\nduration = 5\n")
+        with pytest.raises(sx.CaseError) as refused:
+            sx.trajectory(sx.load(tmp_path / "case.toml"))
+        assert said in str(refused.value)

@@ -3,6 +3,7 @@
 """Machines of several bodies through the whole program: files, ranks, quadruple precision."""
 
 import csv
+import re
 
 import h5py
 import numpy as np
@@ -150,3 +151,162 @@ def test_events_of_a_ring_of_friction_are_those_of_what_moves(separatrix, tmp_pa
             moved = abs(float(event["joint_x"]) - float(before["joint_x"]))
             assert event is before or (moved > 1e-9) == slides
             slides = event["kind"] != "stick"
+
+
+def test_a_chatter_is_told_when_it_is_over(separatrix, tmp_path):
+    """Each of two balls comes to rest where its bounces add up to; events stand in the order of time."""
+    heights = {"one": 1.0, "two": 0.9992}
+    lines = ["[start]", "x0 = 1.0", "[run]", "duration = 10"]
+    for name, height in heights.items():
+        lines += [f"[body.{name}]", "mass = 1", "load = -10", *([f"x0 = {height}"] if name == "two" else [])]
+        lines += [
+            f"[contact.{name}]",
+            f'between = ["{name}"]',
+            'law = "newton"',
+            "restitution = 0.8",
+            "lower = 0",
+        ]
+    (tmp_path / "case.toml").write_text('title = "Two balls"\n' + "\n".join(lines) + "\n")
+    succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "out.h5") as file:
+        names = file["event_kind"].attrs["flag_meanings"].split()
+        time, kind, joint = (file[name][:] for name in ("event_time", "event_kind", "event_joint"))
+    assert np.all(np.diff(time) >= 0)
+    ends = {int(joint[k]): time[k] for k in np.flatnonzero(kind == names.index("chatter_lower") + 1)}
+    for number, height in enumerate(heights.values(), start=1):
+        fall = np.sqrt(2 * height / 10)
+        assert ends[number] == pytest.approx(fall * (1 + 2 * 0.8 / (1 - 0.8)), abs=1e-12)
+    assert "invariants hold" in succeed(separatrix, "verify", "out.h5", folder=tmp_path).out
+
+
+CURVED = """
+title = "A curved spring, a belt and a stop"
+
+[body.block]
+mass = 0.5
+
+[spring.curved]
+between = ["ground", "block"]
+law = "polynomial"
+stiffness = 1.0
+quadratic = 0.3
+cubic = 3.0
+damping = 0.05
+
+[friction.belt]
+between = ["ground", "block"]
+law = "coulomb"
+force = 0.422
+velocity = -1.0
+
+[contact.stop]
+between = ["ground", "block"]
+law = "newton"
+restitution = 0.3
+lower = -0.366
+
+[drive.shaker]
+law = "force"
+body = "block"
+amplitude = 0.84
+angle = 0.3
+frequency = 4.9
+
+[start]
+v0 = -1.438
+
+[run]
+duration = 12
+
+[integrator]
+event_budget = 3000
+"""
+
+
+def test_a_chatter_under_a_curved_spring_ends(separatrix, tmp_path):
+    """No impact beyond the stop; within a chatter none is faster than the rebound before it."""
+    (tmp_path / "case.toml").write_text(CURVED)
+    out = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
+    assert "time_over" in out
+    with h5py.File(tmp_path / "out.h5") as file:
+        names = ["no event", *file["event_kind"].attrs["flag_meanings"].split()]
+        kinds = [names[kind] for kind in file["event_kind"]]
+        before, after, time = (
+            file[f"event_{name}"][:] for name in ("joint_v_before", "joint_v_after", "time")
+        )
+        assert file["x"][:].min() > -0.366 - 1e-15
+    assert kinds.count("chatter_lower") >= 3
+    pairs = [
+        (k, k + 1)
+        for k in range(len(kinds) - 1)
+        if kinds[k] == kinds[k + 1] == "impact_lower" and time[k + 1] - time[k] < 1e-3
+    ]
+    assert len(pairs) > 20
+    assert all(-before[later] <= after[one] * (1 + 1e-6) for one, later in pairs)
+
+
+def test_slow_transients_are_no_attractors(separatrix, tmp_path):
+    """Motions that still come together are told in a line, and not counted as attractors."""
+    (tmp_path / "case.toml").write_text(
+        """
+title = "Two bodies that come to one motion slowly"
+
+[body.first]
+mass = 1.0
+
+[body.second]
+mass = 2.0
+load = -0.198
+v0 = -1.822
+
+[spring.first]
+between = ["ground", "first"]
+stiffness = 40.0
+damping = 0.1
+
+[friction.ground]
+between = ["ground", "second"]
+law = "elastic_coulomb"
+force = 0.956
+stiffness = 15.0
+
+[friction.between]
+between = ["first", "second"]
+law = "elastic_coulomb"
+force = 1.16
+stiffness = 15.0
+
+[drive.shaker]
+law = "force"
+body = "first"
+amplitude = 3.24
+angle = 0.3
+frequency = 1.73
+
+[run]
+duration = 60
+
+[attractors]
+sample = 8
+second_look = 0
+
+[[axis]]
+name = "x0"
+from = -0.008
+to = 0.009
+count = 3
+
+[[axis]]
+name = "v0"
+from = -1.7
+to = 1.9
+count = 3
+"""
+    )
+    out = succeed(separatrix, "basin", "case.toml", "-o", "map.h5", folder=tmp_path).out
+    found = re.search(r"^0 attractors and (\d+) motions not known to be periodic in 1 slice discovered", out)
+    assert found is not None, out
+    assert re.search(
+        rf"^  1 to {found[1]}: .*, amplitude 0.07\d+ to 0.07\d+ m, .*come together by 0.99", out, re.M
+    )
+    assert "an attractor that was not found" not in out

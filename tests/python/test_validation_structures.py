@@ -17,7 +17,7 @@ def rows(source_dir):
 
 
 @pytest.mark.parametrize(
-    ("name", "count"), [("nonsmooth_modes", 3), ("others", 3), ("ball", 5), ("rattle", 1)]
+    ("name", "count"), [("nonsmooth_modes", 3), ("others", 3), ("ball", 6), ("rattle", 1)]
 )
 def test_numbers_agree(rows, separatrix, build_dir, tmp_path, name, count):
     found = getattr(rows, name)(rows.Program(build_dir, tmp_path))
