@@ -66,6 +66,8 @@ program separatrix
   if (allocated(error)) then
     if (first) then
       write (error_unit, '(a)') 'separatrix: '//error%message
+      ! A file is buffered, and what ends at once leaves buffers as they are.
+      flush (error_unit)
     else
       ! mpirun ends the others with the first that fails: let it be the one that speaks.
       call sleep_microseconds(500000)

@@ -48,6 +48,8 @@ contains
       if (modulo(period, k) /= 0) cycle
       if (comes_back(machines, point, k)) exit
     end do
+    ! Newton's method came to an orbit too unstable to come back to the digits it is known to.
+    if (k > period) return
     if (k < period) call refine(machines, k, spectrum%point, point, matrix, ok)
     if (.not. ok) return
     values = multipliers_of(matrix)

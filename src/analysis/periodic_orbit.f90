@@ -290,14 +290,14 @@ contains
   end subroutine set_multipliers
 
   !> Finite multipliers that rounding hides behind that of a graze: the event whose guard is met at the least rate apart from the
-  !> others.
+  !> others, or the two such events where it is not that one alone.
   pure subroutine add_hidden(machines, orbit)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit
     type(split_t) :: split
     complex(wp) :: values(size(orbit%y))
     real(wp) :: speeds(size(orbit%events)), by_state(size(orbit%y)), value, by_time
-    integer :: k
+    integer :: grazes(2), k, apart
     logical :: ok
     if (.not. machines%centre%has_clock .or. size(orbit%events) == 0) return
     associate (machine => machines%centre, n => size(orbit%y))
@@ -308,15 +308,21 @@ contains
             max(norm2(by_state), tiny(1.0_wp))
         end associate
       end do
-      call vary_beside_graze(machines, orbit%mode, orbit%y, orbit%events, closing_time(machine, orbit), minloc(speeds, 1), &
-                             split, ok)
-      if (.not. ok) return
-      do k = 1, n
-        split%base(:, k) = split%base(:, k)*machine%size_of(k)/machine%size_of
+      do apart = 1, min(2, size(speeds))
+        grazes(apart) = minloc(speeds, 1)
+        speeds(grazes(apart)) = huge(1.0_wp)
+        if (apart == 2) grazes = [minval(grazes), maxval(grazes)]
+        call vary_beside_graze(machines, orbit%mode, orbit%y, orbit%events, closing_time(machine, orbit), grazes(:apart), split, ok)
+        if (.not. ok) return
+        do k = 1, n
+          split%base(:, k) = split%base(:, k)*machine%size_of(k)/machine%size_of
+        end do
+        values = multipliers_beside_graze(split%base, split%column/machine%size_of, split%row*machine%size_of, split%rate)
+        if (.not. all(values(2:) == values(2:))) cycle
+        orbit%multipliers(2:) = values(2:)
+        return
       end do
-      values = multipliers_beside_graze(split%base, split%column/machine%size_of, split%row*machine%size_of, split%rate)
     end associate
-    if (all(values(2:) == values(2:))) orbit%multipliers(2:) = values(2:)
   end subroutine add_hidden
 
   !> Direction in which the orbits go on, a unit vector in natural sizes, on the side of `along`.

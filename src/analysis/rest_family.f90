@@ -7,7 +7,7 @@ module rest_family
   use body_family, only: family_t
   use equilibrium, only: correct_equilibrium, equilibrium_t
   use errors, only: error_t
-  use jointed, only: is_stop, joint_elastic, joint_friction, most_joints
+  use jointed, only: joint_elastic, joint_friction, most_joints
   use jointed_state, only: joint_motion, turning_at
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, watched_rows
@@ -116,7 +116,7 @@ contains
       turning = turning_at(machine%frequency, 0.0_wp, structure%frame%moving%harmonics)
       do j = 1, count_joints(machine)
         associate (joint => machine%joints(j))
-          if (is_stop(joint%kind) .or. .not. any(joint%kind == [joint_friction, joint_elastic])) cycle
+          if (all(joint%kind /= [joint_friction, joint_elastic])) cycle
           call joint_motion(machine, j, still, still, 0.0_wp, turning, s, u)
           phase(j) = merge(1, -1, u >= 0)
           if (abs(u) > machine%negligible_speed) cycle

@@ -37,8 +37,9 @@ module saddle_search
     !> Over the period of the orbit, the largest modulus first, and the derivative of the map they belong to, at the first point.
     complex(wp), allocatable :: multipliers(:)
     real(wp), allocatable :: matrix(:, :)
-    !> Left eigenvectors of the multiplier outside of the unit circle (columns), one at each point: their product with what a
-    !> state beside the orbit is away from it tells on which side of the stable set it is, and how far in natural sizes.
+    !> Left eigenvectors of the multiplier outside of the unit circle (columns), one at each point. Their product with the
+    !> displacement of a state from the orbit has the sign of the side of the stable set it is on; its size is how far from that
+    !> set, in natural sizes, the state will be when it next passes the first point, or is there.
     real(wp), allocatable :: unstable(:, :)
     integer(int64) :: word = 0
   end type saddle_t
@@ -64,8 +65,8 @@ contains
     end do
   end function distance_to_saddle
 
-  !> Of two section points (columns): the larger of their distances to the orbit, at its point next to their middle, and how far
-  !> each is from the stable set there, negative on one side, all in natural sizes.
+  !> Of two section points (columns), about the point of the orbit that is nearest to their middle: the larger of their distances
+  !> to it, in natural sizes, and of each the product with `saddle%unstable` there, negative on one side of the stable set.
   pure subroutine sides_of_saddle(machine, saddle, points, distance, sides)
     class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddle
@@ -166,13 +167,13 @@ contains
     saddle%watched = matmul(watched_rows(machines%centre), saddle%points)
   end subroutine saddle_at
 
-  !> Left eigenvector of the one multiplier outside of the unit circle, of length one in units of 1/`sizes`: all rows of a high
-  !> power of the matrix are along it.
+  !> Left eigenvector of the one multiplier outside of the unit circle, by a high power of the matrix, all rows of which are along
+  !> it. Its length is such that the product with a displacement is the distance from the stable set in units of `sizes`.
   pure function left_eigenvector(matrix, sizes) result(vector)
     real(wp), intent(in) :: matrix(:, :), sizes(:)
     real(wp) :: vector(size(sizes)), power(size(sizes), size(sizes))
     integer :: i
-    !> Squarings, after which the others are gone however near to the unit circle.
+    !> The others have sizes below 1 - `neutral`: their share is gone after 2**40 factors.
     integer, parameter :: squarings = 40
     power = matrix
     do i = 1, squarings

@@ -13,7 +13,6 @@ module branch_equilibria
   use machine_family, only: machine_of_family
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int8
   use hybrid_machine, only: hybrid_t
-  use rest_family, only: find_rest_family, rest_family_t
   use session, only: session_t
   use structure, only: phases_in, structure_t
   use text, only: join, replace_all, to_text
@@ -21,7 +20,7 @@ module branch_equilibria
   implicit none
   private
 
-  public :: count_equilibria, report_equilibria, report_rest, describe_equilibria
+  public :: count_equilibria, report_equilibria, describe_equilibria
 
 contains
 
@@ -62,30 +61,6 @@ contains
       end associate
     end do
   end subroutine report_equilibria
-
-  !> What dry friction holds at the first and the last value that was searched, and where the machine may rest.
-  subroutine report_rest(session, search, unit)
-    type(session_t), intent(inout) :: session
-    type(search_t), intent(in) :: search
-    character(len=*), intent(in) :: unit
-    type(rest_family_t) :: rest
-    character(len=:), allocatable :: shown, data
-    integer :: i, last
-    last = size(search%values)
-    do i = 1, last, max(1, last - 1)
-      call find_rest_family(search%family, search%values(i), rest)
-      if (len(rest%joints) == 0) cycle
-      shown = search%family%path//' = '//to_text(search%values(i))
-      if (unit /= '1') shown = shown//' '//unit
-      shown = 'at '//shown//' dry friction holds '//rest%joints//': places of rest are a family, not followed'
-      data = '"parameter": '//json_number(search%values(i))//', "joints": '//json_text(rest%joints)
-      if (rest%known) then
-        shown = shown//'; x from '//to_text(rest%low, 10)//' to '//to_text(rest%high, 10)//' as far as no stop is in the way'
-        data = data//', "x_low": '//json_number(rest%low)//', "x_high": '//json_number(rest%high)
-      end if
-      call session%journal%line('rest_family', shown, data)
-    end do
-  end subroutine report_rest
 
   pure function name_of(label) result(text)
     integer, intent(in) :: label

@@ -4,23 +4,21 @@
 !> `separatrix branches`: stable and unstable periodic orbits over a parameter.
 module branches_driver
   use branch_contacts, only: contacts_t, look_for_contacts, report_contacts
-  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria, report_rest
+  use branch_equilibria, only: count_equilibria, describe_equilibria, report_equilibria
   use branch_curves, only: curves_t, describe_curves, follow_labels, report_curves, set_free
   use branch_point, only: branch_t, is_stable, label_closed, label_crisis, label_homoclinic, label_names, label_range, last_label, &
                           no_label, point_t
+  use branch_rest, only: describe_rest, find_rest, report_rest, rest_at_t
   use branch_watch, only: branch_watch_t
   use branch_search, only: follow_seeds, prepare_search, search_t, search_value
-  use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
-  use case_setup, only: options_of, output_path
-  use case_type, only: case_t
-  use case_values, only: allowed_range, bounds_t
+  use branches_setup, only: set_range, set_starts
+  use case_setup, only: output_path
+  use case_values, only: bounds_t
   use command_line, only: command_t
   use errors, only: error_t, fail
   use event_words, only: word_text
-  use hybrid_machine, only: hybrid_t
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
-  use machine_family, only: machine_of_family, starts_of_section
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use orbit_margins, only: is_impact
@@ -35,13 +33,9 @@ module branches_driver
 
   public :: run_branches
 
-  !> Starts at each value at which orbits are searched.
-  integer, parameter :: starts = 48, near_starts = 16
   !> At an impact without speed the derivative is not finite: a located graze leaves a speed of rounding, and what is larger than
   !> this comes from that.
   real(wp), parameter :: endless = 1e7_wp
-  !> Powers of 1/p for the root p of p^3 = p + 1 (Roberts 2018).
-  real(wp), parameter :: irrational(2) = [0.7548776662466927_wp, 0.5698402909980532_wp]
 
 contains
 
@@ -53,6 +47,7 @@ contains
     type(branch_watch_t), target :: watch
     type(curves_t) :: curves
     type(contacts_t) :: contacts
+    type(rest_at_t), allocatable :: rest(:)
     type(schema_t) :: schema
     type(bounds_t) :: bounds
     type(error_t), allocatable :: error
@@ -86,16 +81,20 @@ contains
       if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, contacts, trim(bounds%unit))
       call report_equilibria(session, search, trim(bounds%unit))
-      call report_rest(session, search, trim(bounds%unit))
+      call find_rest(search, rest)
+      call report_rest(session, rest, search%family%path, trim(bounds%unit))
       call report_curves(session, search, curves)
     end if
-    if (size(search%branches) + count_equilibria(search) == 0 .and. session%team%is_root()) call fail(error, exit_bad_case, &
-      'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
-      to_text(search%plan%highest)//'; nothing is written')
+    if (session%team%is_root()) then
+      if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, exit_bad_case, &
+        'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
+        to_text(search%plan%highest)//'; nothing is written')
+    end if
     call session%stop_if(error)
     call describe_file(session, 'branches', schema)
     if (session%team%is_root()) call describe_branches(search, trim(bounds%unit), schema)
     if (session%team%is_root()) call describe_equilibria(search, trim(bounds%unit), schema)
+    if (session%team%is_root()) call describe_rest(rest, search%family%path, trim(bounds%unit), schema)
     if (session%team%is_root()) call describe_curves(curves, search%family%path, trim(bounds%unit), schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)
@@ -104,100 +103,6 @@ contains
     call session%journal%line('written', 'wrote '//path)
     call session%end_with(exit_done)
   end subroutine run_branches
-
-  !> The parameter and its range: as asked, else those of the sweep or the axis of this parameter. Code 65 for what the machine
-  !> does not have.
-  subroutine set_range(command, the_case, search, bounds, error)
-    type(command_t), intent(in) :: command
-    type(case_t), intent(in) :: the_case
-    type(search_t), intent(inout) :: search
-    type(bounds_t), intent(out) :: bounds
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: name, problem
-    real(wp) :: range(2)
-    logical :: found, given(2)
-    integer :: i
-    name = canonical_name(command%parameter)
-    call parameter_bounds(the_case%laws, name, bounds, found)
-    if (.not. found .or. is_start(name)) then
-      call fail(error, exit_bad_case, "--parameter: found '"//name//"', allowed "//parameter_names(the_case%laws))
-      return
-    end if
-    given = .false.
-    range = 0
-    if (the_case%sweep%present) then
-      if (the_case%sweep%swept%name == name) call take(the_case%sweep%swept%values)
-    end if
-    do i = 1, size(the_case%axes)
-      if (the_case%axes(i)%name == name) call take(the_case%axes(i)%values)
-    end do
-    if (command%has_from) range(1) = command%from
-    if (command%has_to) range(2) = command%to
-    given = given .or. [command%has_from, command%has_to]
-    if (.not. all(given)) then
-      call fail(error, exit_bad_case, '--from and --to are needed: the case has no sweep or axis of '//name)
-      return
-    end if
-    do i = 1, 2
-      problem = allowed_range(range(i), bounds)
-      if (len(problem) == 0) cycle
-      call fail(error, exit_bad_case, trim(merge('--from', '--to  ', i == 1))//': '//problem)
-      return
-    end do
-    if (.not. range(1) < range(2)) then
-      call fail(error, exit_bad_case, '--from, --to: found '//to_text(range(1))//' and '//to_text(range(2))// &
-                ', allowed is a range that rises')
-      return
-    end if
-    search%plan%lowest = range(1)
-    search%plan%highest = range(2)
-    search%family%laws = the_case%laws
-    search%family%path = name
-    search%family%options = options_of(the_case)
-    search%family%lowest = merge(bounds%lower + merge(tiny(1.0_wp), 0.0_wp, bounds%lower_open), -huge(1.0_wp), &
-                                 bounds%lower > -huge(1.0_wp))
-    search%family%highest = bounds%upper
-
-  contains
-
-    subroutine take(values)
-      real(wp), intent(in) :: values(:)
-      range = [minval(values), maxval(values)]
-      given = .true.
-    end subroutine take
-
-  end subroutine set_range
-
-  !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about;
-  !> where it has none for either some within a quarter of that, too, and its own start: basins may be small.
-  subroutine set_starts(the_case, search, error)
-    type(case_t), intent(in) :: the_case
-    type(search_t), intent(inout) :: search
-    type(error_t), allocatable, intent(out) :: error
-    class(hybrid_t), allocatable :: machine
-    real(wp) :: low(2), high(2), watched(2, starts + near_starts + 1)
-    integer :: i, k, last
-    character(len=2), parameter :: names(2) = ['x0', 'v0']
-    last = size(watched, 2)
-    high = 2*search%family%sizes
-    low = -high
-    do k = 1, 2
-      do i = 1, size(the_case%axes)
-        if (the_case%axes(i)%name /= names(k)) cycle
-        low(k) = minval(the_case%axes(i)%values)
-        high(k) = maxval(the_case%axes(i)%values)
-        last = starts
-      end do
-    end do
-    call machine_of_family(search%family, (search%plan%lowest + search%plan%highest)/2, machine, error)
-    if (allocated(error)) return
-    do i = 1, starts + near_starts
-      watched(:, i) = low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp)
-      if (i > starts) watched(:, i) = watched(:, i)/4
-    end do
-    watched(:, starts + near_starts + 1) = [the_case%start%x0, the_case%start%v0]
-    search%starts = starts_of_section(machine, watched(:, :last))
-  end subroutine set_starts
 
   !> Every labelled point, and what was found from how many seeds.
   subroutine report(session, search, contacts, unit)

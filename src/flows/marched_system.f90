@@ -194,7 +194,8 @@ contains
     if (any(abs(self%lean(:, number)) > 0)) margin = margin + sum(self%lean(:, number)*forces_at(self, z))
   end function marched_margin
 
-  !> Sizes of what the forces of the joints that are not linear are small differences of [N]: stiff ones, far from the origin.
+  !> Forces [N], one for each joint that is not linear, of which rounding takes a share: a displacement is known to a share of the
+  !> places it is the difference of, and the force to that times its slope.
   pure function digits_of_forces(machine, system, state, turning) result(sizes)
     type(jointed_t), intent(in) :: machine
     type(marched_t), intent(in) :: system

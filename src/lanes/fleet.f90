@@ -8,7 +8,7 @@ module fleet
   use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_batch_t, lane_flow_t, regions_t
   use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
-  use machine_facts, only: has_driver, is_one_body
+  use machine_facts, only: is_one_body
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
   use strobe, only: coordinates_of, strobe_t
@@ -49,7 +49,7 @@ contains
   end subroutine open_fleet
 
   !> The lanes can be captured by attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What
-  !> does not fit makes every lane stop at every section, as does a driving body that runs on.
+  !> does not fit makes every lane stop at every section.
   pure subroutine add_capture(moving, fleet, attractor, point, scale, metric, reach)
     type(motion_t), intent(in) :: moving
     type(fleet_t), intent(inout) :: fleet
@@ -60,7 +60,6 @@ contains
     n = 2
     if (allocated(moving%jointed)) n = 2*moving%jointed%machine%n
     fits = size(point) == n .and. coordinates_of(moving) == n
-    if (fits .and. has_driver(moving)) fits = .not. any(abs(moving%jointed%machine%driver%running) > 0)
     if (.not. fits) then
       fleet%regions%complete = 0
       if (allocated(fleet%structures)) fleet%structures%complete = 0

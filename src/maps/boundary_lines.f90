@@ -174,12 +174,13 @@ contains
     crowd = 0
     do c = 1, size(cells, 2)
       call walk_round(crossings, intervals, cells(1, c), cells(2, c), round, after, whole)
-      if (size(round) == 2) then
+      if (size(round) > 2) crowd = crowd + 1
+      if (size(round) >= 2 .and. .not. whole) then
+        call meet(a, b, cells(:, c), round, points, links)
+      else if (size(round) == 2) then
         call add_link(links, round(1), round(2))
       else if (size(round) > 2) then
-        crowd = crowd + 1
-        if (.not. whole) call meet(a, b, cells(:, c), round, points, links)
-        if (whole) call link_crowd(a, b, cells(:, c), round, after, centres(crowd), points, links)
+        call link_crowd(a, b, cells(:, c), round, after, centres(crowd), points, links)
       end if
     end do
     call trace(points, links, lines)
@@ -276,7 +277,7 @@ contains
     count = 0
     do round = 1, 2
       do p = 1, size(points)
-        if (round == 1 .and. first(p + 1) - first(p) == 2) cycle
+        if (round == 1 .and. .not. ends_line(p)) cycle
         do k = first(p), first(p + 1) - 1
           if (used(incident(k))) cycle
           call walk(p, incident(k), length)
@@ -299,6 +300,12 @@ contains
 
   contains
 
+    !> A junction does, also one of two lines of different labels.
+    pure logical function ends_line(point)
+      integer, intent(in) :: point
+      ends_line = first(point + 1) - first(point) /= 2 .or. points(point)%interval == 0
+    end function ends_line
+
     !> From a point along a link, until an end, a junction, or where it began.
     subroutine walk(start, link, length)
       integer, intent(in) :: start, link
@@ -313,7 +320,7 @@ contains
         at = sum(links%ends(:, next)) - at
         length = length + 1
         walked(length) = at
-        if (first(at + 1) - first(at) /= 2 .or. at == start) return
+        if (ends_line(at) .or. at == start) return
         next = sum(incident(first(at):first(at) + 1)) - next
       end do
     end subroutine walk

@@ -246,10 +246,12 @@ contains
   end function watched_rows
 
   !> Section points (columns) for searches: `watched` (columns) are places and speeds of what is watched. Of a structure the other
-  !> coordinates of every second one are as the machine says, those of the rest spread evenly over twice their sizes.
-  pure function starts_of_section(machine, watched) result(points)
+  !> coordinates of every second one are as the machine says, those of the rest spread evenly over twice their sizes, or over the
+  !> share `spread` of that, start by start.
+  pure function starts_of_section(machine, watched, spread) result(points)
     class(hybrid_t), intent(in) :: machine
     real(wp), intent(in) :: watched(:, :)
+    real(wp), intent(in), optional :: spread(:)
     real(wp) :: points(machine%n, size(watched, 2))
     type(jointed_state_t) :: state
     real(wp) :: share
@@ -266,6 +268,7 @@ contains
       associate (moving => machine%frame%moving, w => machine%frame%moving%machine%watched)
         do i = 1, size(watched, 2)
           points(:, i) = 2*machine%size_of*(2*modulo(0.5_wp + i*[(share**(-k), k=1, machine%n)], 1.0_wp) - 1)
+          if (present(spread)) points(:, i) = spread(i)*points(:, i)
           if (modulo(i, 2) == 1) then
             associate (start => moving%machine%start, shape => moving%machine%start_shape)
               call start_jointed(moving, start(1, :) + shape(:, 1)*(watched(1, i) - start(1, w)), &

@@ -12,7 +12,7 @@ module variations
   implicit none
   private
 
-  public :: vary, vary_beside_graze, by_difference, period_slope, stencil_offset
+  public :: vary, vary_beside_graze, join_parts, by_difference, period_slope, stencil_offset
 
   !> Where the machines next to one are, in steps of the parameter, and what their results weigh in the derivative, times the
   !> step: central, or one-sided where the parameter can go no further. Of fourth order.
@@ -99,40 +99,44 @@ contains
     ok = all(abs(change) <= huge(1.0_wp))
   end subroutine vary
 
-  !> What `vary` does, by the start, with the event number `graze` apart: its large part is known to more digits than the sum.
-  pure subroutine vary_beside_graze(machines, mode, y, events, t_end, graze, split, ok)
+  !> What `vary` does, by the start, with the events of the numbers `grazes`, one or two that rise, apart: their large part is known
+  !> to more digits than the sum.
+  pure subroutine vary_beside_graze(machines, mode, y, events, t_end, grazes, split, ok)
     type(neighbourhood_t), intent(in) :: machines
-    integer, intent(in) :: mode, graze
+    integer, intent(in) :: mode, grazes(:)
     real(wp), intent(in) :: y(:), t_end
     type(event_t), intent(in) :: events(:)
     type(split_t), intent(out) :: split
     logical, intent(out) :: ok
-    ! The last column is carried along as any other.
-    real(wp), dimension(size(y), size(y) + 1) :: change
+    ! The columns of the events taken apart are carried along as any others.
+    real(wp), dimension(size(y), size(y) + size(grazes)) :: change
+    real(wp) :: rows(size(grazes), size(y) + size(grazes)), rates(size(grazes))
     real(wp), dimension(size(y), size(y)) :: r_y
     real(wp), dimension(size(y)) :: state, reached, g_y, r_t, before, after, jumped
     real(wp) :: time, value, g_t
     logical :: forgets
-    integer :: i, n, now
+    integer :: i, n, now, k
     n = size(y)
     state = y
     time = 0
     now = mode
     change = 0
     ok = .true.
+    k = 0
     call machines%centre%fly(now, time, state, time, reached, change(:, :n))
     do i = 1, size(events)
       call cross_flight(machines, now, state, time, events(i)%time, change, reached, .false.)
       associate (event => events(i))
-        if (i == graze) then
+        if (any(i == grazes)) then
+          k = k + 1
           before = machines%centre%slope(event%before, event%time, event%arrival(:n))
           after = machines%centre%slope(event%after, event%time, event%departure(:n))
           call machines%centre%guard(event, event%time, event%arrival(:n), value, g_y, g_t)
           call machines%centre%jump(event, event%time, event%arrival(:n), jumped, r_y, r_t)
-          split%row = matmul(g_y, change(:, :n))
-          split%rate = sum(g_y*before) + g_t
-          change(:, :n) = matmul(r_y, change(:, :n))
-          change(:, n + 1) = matmul(r_y, before) + r_t - after
+          rows(k, :) = matmul(g_y, change)
+          rates(k) = sum(g_y*before) + g_t
+          change = matmul(r_y, change)
+          change(:, n + k) = matmul(r_y, before) + r_t - after
         else
           call salt(machines, event, change, .false., forgets, ok)
         end if
@@ -143,10 +147,33 @@ contains
       end associate
     end do
     call cross_flight(machines, now, state, time, t_end, change, reached, .false.)
-    split%base = change(:, :n)
-    split%column = change(:, n + 1)
-    ok = all(abs(change) <= huge(1.0_wp)) .and. allocated(split%row)
+    ok = all(abs(change) <= huge(1.0_wp)) .and. k == size(grazes)
+    if (ok) call join_parts(n, change, rows, rates, split, ok)
   end subroutine vary_beside_graze
+
+  !> One large part of one or two: with the changes of state y and of the instants a of the two events, what the start x makes of
+  !> the end is B x - c1 a1 - c2 a2, with V1 a1 = r1 x and V2 a2 = r2 x - k a1. As a1 = (r2 x - V2 a2)/k that is
+  !> (B - c1 r2/k) x - (c2 - c1 V2/k) a2, where -V1 V2/k a2 = (r1 - V1 r2/k) x. Not `ok` if the second event does not see the first.
+  pure subroutine join_parts(n, change, rows, rates, split, ok)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: change(:, :), rows(:, :), rates(:)
+    type(split_t), intent(out) :: split
+    logical, intent(out) :: ok
+    real(wp) :: seen
+    ok = .true.
+    split%base = change(:, :n)
+    split%row = rows(1, :n)
+    split%column = change(:, n + 1)
+    split%rate = rates(1)
+    if (size(rates) == 1) return
+    seen = rows(2, n + 1)
+    ok = abs(seen) > 0
+    if (.not. ok) return
+    split%base = split%base - spread(split%column, 2, n)*spread(rows(2, :n), 1, n)/seen
+    split%row = split%row - rates(1)*rows(2, :n)/seen
+    split%column = change(:, n + 2) - split%column*rates(2)/seen
+    split%rate = -rates(1)*rates(2)/seen
+  end subroutine join_parts
 
   !> Takes the variations along a flight.
   pure subroutine cross_flight(machines, mode, y, t0, t1, change, reached, with_parameter, determinant)
@@ -219,7 +246,7 @@ contains
     end if
     later = -matmul(g_y, change)/rate
     later(n + 1) = later(n + 1) - guard_by_parameter(1)/rate
-    do k = 1, n + 1
+    do k = 1, size(change, 2)
       change(:, k) = matmul(r_y, change(:, k) + before*later(k)) + (r_t - after)*later(k)
     end do
     change(:, n + 1) = change(:, n + 1) + by_parameter

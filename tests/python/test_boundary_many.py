@@ -8,6 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import separatrix as sx
+import xarray as xr
+from matplotlib.figure import Figure
+from program import succeed
+from separatrix.figures import boundary
+from separatrix.figures.look import DEFAULT
 from separatrix.open import decode_flags, open_result, table
 
 CASE = """
@@ -83,3 +88,54 @@ def test_a_motion_from_a_named_point_comes_to_its_saddle(woven):
                 assert away < 0.02, (number, k, away)
                 tried += 1
         assert tried > 25
+
+
+def test_no_two_saddles_look_alike():
+    """Eight pieces, each of another saddle, the last between labels of which one is not known."""
+    flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "not_known stable_set"}
+    pieces = {
+        "piece_name": ("piece", np.ones(8, np.int8), flags),
+        "piece_saddle": ("piece", np.arange(8, 0, -1)),
+        "label_one": ("piece", np.r_[0, np.ones(7, int)]),
+        "label_two": ("piece", np.full(8, 2)),
+        "closed": ("piece", np.zeros(8, int)),
+        "first": ("piece", np.arange(0, 16, 2)),
+        "points": ("piece", np.full(8, 2)),
+    }
+    places = {name: ("point", np.arange(16.0), {"units": "1"}) for name in ("a", "b")}
+    ax = Figure().add_subplot()
+    handles = boundary.draw(ax, xr.Dataset(pieces | places), "a", "b", DEFAULT, {})
+    texts = [handle.get_label() for handle in handles]
+    assert texts == [
+        *(f"boundary: stable set of saddle {k}" for k in range(1, 8)),
+        "edge of what is not known",
+    ]
+    looks = {(handle.get_color(), str(handle._dash_pattern)) for handle in handles}
+    assert len(looks) == 8
+
+
+THREE = """
+body.mass = 1
+restoring = { law = "linear", stiffness = 1 }
+friction = { law = "viscous", damping = 0.005 }
+contact = { law = "newton", restitution = 0.95, upper = 0.5 }
+drive = { law = "harmonic", amplitude = 1, ratio = 4.2 }
+run.duration = 1000
+axis = [
+  { name = "x0", from = -4, to = 0.5, count = 4 },
+  { name = "v0", from = -5, to = 5, count = 4 },
+]
+"""
+
+
+def test_pairs_that_meet_a_third_basin_name_no_recurrent_set(separatrix, tmp_path):
+    """Three basins so interwoven that pairs of two meet the third: they wander on with other labels."""
+    (tmp_path / "three.toml").write_text(THREE)
+    succeed(separatrix, "basin", "three.toml", "-o", "three.h5", folder=tmp_path)
+    succeed(separatrix, "boundary", "three.h5", "-o", "out.h5", "--grow", 0, folder=tmp_path)
+    with open_result(tmp_path / "out.h5") as result:
+        labels = {*result["label_one"].values.tolist(), *result["label_two"].values.tolist()}
+        assert labels >= {1, 2, 3}
+        names = decode_flags(result["name"]).values
+        assert names.size > 15
+        assert "recurrent" not in names

@@ -6,6 +6,7 @@ import importlib
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 
@@ -31,6 +32,16 @@ def test_what_must_hold_on_branches_holds(checks, separatrix, tmp_path, name):
     off = replace(one, multipliers=one.multipliers * (1 + 1e-6))
     assert any("a multiplier" in item for item in checks.row(case, off, other)[1])
     assert any("product" in item for item in checks.row(case, off, other)[1])
+    # labels of mirror images are one place to rounding, in one run or in the other
+    key, values = next((key, values) for key, values in one.places.items() if values.size)
+    doubled = replace(one, places={**one.places, key: np.append(values, values + 1e-15)})
+    assert checks.apart(case, doubled, one)[1:] == (both_of(checks, case, one) + values.size, 0)
+    assert checks.apart(case, one, doubled)[1:] == (both_of(checks, case, one), 0)
+
+
+def both_of(checks, case, found):
+    """Labels of a run that it has itself."""
+    return checks.apart(case, found, found)[1]
 
 
 def test_every_example_without_a_measured_drive_is_followed_or_refused_in_words(

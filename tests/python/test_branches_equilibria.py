@@ -3,7 +3,6 @@
 """Equilibria of a machine without a clock in what `branches` says, in its file and its figure."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -58,10 +57,7 @@ def test_a_body_comes_to_lie_against_its_stop(separatrix: Path, tmp_path: Path) 
             _ = result.separatrix.labelled_points
 
 
-def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp_path):
-    # 2 x = 1 + h: the belt pulls the block with 1 N through the spring, the floor holds it with |h| <= 0.8 N
-    case = tmp_path / "rest.toml"
-    case.write_text("""
+RESTING = """
 title = "A block on a floor and a running belt"
 body.block.mass = 1
 body.tip.mass = 1
@@ -70,13 +66,43 @@ spring.tip = { between = ["block", "tip"], stiffness = 1, damping = 0.05 }
 friction.floor = { between = ["block"], force = 0.5, static_force = 0.8 }
 friction.belt = { between = ["tip"], force = 1, velocity = 0.5 }
 run.duration = 100
-""")
-    ended = subprocess.run(
-        [separatrix, "branches", case, "--parameter", "friction.belt.velocity", "--from", "0.3", "--to", "1"]
-        + ["--searches", "1", "-o", tmp_path / "rest.h5"],
-        capture_output=True,
-        text=True,
-        check=False,
+"""
+
+
+WALL = 'contact.wall = { between = ["block"], law = "newton", restitution = 0.5, upper = 0.95 }'
+
+
+@pytest.mark.parametrize("stop", ["", WALL], ids=["free", "wall"])
+def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp_path, stop):
+    """2 x = 1 + h: the belt pulls with 1 N, the floor holds with |h| <= 0.8 N, stops are not asked."""
+    (tmp_path / "rest.toml").write_text(RESTING + stop)
+    words = (
+        "--parameter",
+        "friction.belt.velocity",
+        "--from",
+        0.3,
+        "--to",
+        1,
+        "--searches",
+        2,
+        "-o",
+        "rest.h5",
     )
-    assert "dry friction holds friction.floor: places of rest are a family" in ended.stdout
-    assert "x from 0.1000000000 to 0.9000000000 as far as no stop is in the way" in ended.stdout
+    said = succeed(separatrix, "branches", "rest.toml", *words, folder=tmp_path).out
+    assert (
+        "dry friction holds friction.floor: places of rest are a family, not followed; x from 0.1000000000"
+        in said
+    )
+    assert "to 0.9000000000 as far as no stop is in the way" in said
+    with open_result(tmp_path / "rest.h5") as result:
+        assert result.attrs["rest_joints"] == "friction.floor; friction.floor"
+        assert result["rest_parameter"].values == pytest.approx([0.475, 0.825], abs=1e-12)
+        assert result["rest_x_low"].values == pytest.approx(0.1, abs=1e-12)
+        assert result["rest_x_high"].values == pytest.approx(0.9, abs=1e-12)
+        assert result["rest_x_low"].attrs["units"] == "m"
+        assert "as far as no stop is in the way" in result["rest_x_high"].attrs["long_name"]
+        drawn = figures(result, "")["branches"].axes[0]
+        assert drawn.get_ylabel().startswith("position at rest")
+        assert [piece.tolist() for piece in drawn.collections[0].get_segments()] == [
+            [[value, pytest.approx(0.1)], [value, pytest.approx(0.9)]] for value in (0.475, 0.825)
+        ]

@@ -3,6 +3,7 @@
 """`branches` and `stability` of structures and of machines without a clock, against closed forms."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -340,3 +341,32 @@ def test_a_graze_where_friction_turns_round_with_the_impact(follow, tmp_path: Pa
     assert grazes == pytest.approx([0.8628268060133], abs=1e-11)
     assert {point["word"] for point in points} >= {"R....", "R.R..."}
     assert next(point["label"] for point in points if point["label"].startswith("GR")) == "GR-fold"
+
+
+HARDENING = {
+    "structure": """
+body.block.mass = 1
+spring.frame = { law = "polynomial", between = ["block"], stiffness = 1, cubic = 1, damping = 0.02 }
+drive.force = { body = "block", law = "force", amplitude = 0.5, frequency = 3 }
+""",
+    "one body": """
+body.mass = 1
+restoring = { law = "linear", stiffness = 1 }
+friction = { law = "viscous", damping = 0.02 }
+effect.cubic_spring.stiffness = 1
+drive = { law = "harmonic", amplitude = 0.5, ratio = 3 }
+""",
+}
+
+
+@pytest.mark.parametrize(("kind", "place"), [("structure", 3.00972484), ("one body", 4.098403)])
+def test_the_start_of_the_case_is_at_its_crank_angle(separatrix: Path, tmp_path: Path, kind, place):
+    """Near the resonant orbit of a hardening spring, beyond what is searched, a quarter of a period later."""
+    (tmp_path / "case.toml").write_text(HARDENING[kind])
+    words = ["--parameter", "drive.force.frequency" if kind == "structure" else "drive.ratio"]
+    words += ["--from", 3, "--to", 3.0001, "--searches", 1, "-o", "out.h5"]
+    for item in ("x0=1.1487", "v0=-8.4499", f"crank_angle={math.pi / 2}"):
+        words += ["--set", f"start.{item}"]
+    succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path)
+    with open_result(tmp_path / "out.h5") as result:
+        assert result["x"].values.max() == pytest.approx(place, abs=1e-3)

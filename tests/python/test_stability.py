@@ -124,6 +124,32 @@ axis = [{ name = "x0", from = -2.5, to = 0, count = 8 }, { name = "v0", from = -
     assert entries[0]["exponents"][0] < 0
 
 
+def test_a_weak_cycle_of_a_map_is_told_though_its_mean_exponent_is_positive(separatrix: Path, tmp_path: Path):
+    """A cycle contracts with 5e-4/s: means over a thousand seconds are off by more, its multipliers not."""
+    case = tmp_path / "weak.toml"
+    case.write_text(
+        """body.mass = 1
+restoring = { law = "linear", stiffness = 1 }
+friction = { law = "viscous", damping = 1e-3 }
+contact = { law = "newton", restitution = 1, upper = 0 }
+drive = { law = "harmonic", amplitude = 1, ratio = 2.6 }
+run.duration = 500
+attractors.max_period = 1
+axis = [
+  { name = "x0", from = -0.738, to = -0.698, count = 4 },
+  { name = "v0", from = 0.173, to = 0.213, count = 4 },
+]
+"""
+    )
+    target = tmp_path / "map.h5"
+    subprocess.run([separatrix, "basin", case, "-o", target, "-q"], check=True)
+    asked = [separatrix, "stability", target, "--periods", "400", "--json"]
+    ended = subprocess.run(asked, capture_output=True, text=True, check=True)
+    _, entry = map(json.loads, ended.stdout.splitlines())
+    assert entry["exponents"][0] > 0
+    assert (entry["type"], entry["period"]) == ("period_above_the_limit", 4)
+
+
 def test_a_damaged_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):
     target = tmp_path / "map.h5"
     count = ["--set", "axis[1].count=4", "--set", "axis[2].count=4"]
@@ -134,6 +160,10 @@ def test_a_damaged_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: 
     ended = subprocess.run([separatrix, "stability", target], capture_output=True, text=True, check=False)
     assert ended.returncode == 74
     assert "period" in ended.stderr
+    # a file is buffered, a pipe is not
+    with (tmp_path / "said.txt").open("w") as said:
+        subprocess.run([separatrix, "stability", target], stderr=said, check=False)
+    assert (tmp_path / "said.txt").read_text() == ended.stderr
 
 
 def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):

@@ -38,6 +38,8 @@ _LINES = {
     "not_known": ("boundary: leads to what is not known", "0.25", "-."),
 }
 _SADDLES = ("black", "#56B4E9", "#F0E442", "#CC79A7", "#009E73", "#D55E00")
+# Lines of the saddles when the colours begin anew.
+_AGAIN = ("-", (0, (3, 1)), (0, (1, 1)))
 _UNKNOWN = ("edge of what is not known", "0.4", ":")
 # Saddles that a caption describes.
 _MOST_LISTED = 4
@@ -177,15 +179,23 @@ def draw(
             chosen = np.append(chosen, chosen[0])
         text, colour, line = _LINES[names[piece]] if known[piece] else _UNKNOWN
         saddle = int(result["piece_saddle"].values[piece])
-        if saddle:
-            text, colour = f"{text} {saddle}", _SADDLES[(saddle - 1) % len(_SADDLES)]
+        if saddle and known[piece]:
+            again, number = divmod(saddle - 1, len(_SADDLES))
+            text, colour, line = f"{text} {saddle}", _SADDLES[number], _AGAIN[again % len(_AGAIN)]
         ax.plot(x[chosen], y[chosen], "-", color="white", linewidth=1.8, zorder=3)
-        ax.plot(x[chosen], y[chosen], line, color=colour, linewidth=0.8, zorder=4)
+        ax.plot(x[chosen], y[chosen], linestyle=line, color=colour, linewidth=0.8, zorder=4)
         handles.setdefault(text, Line2D([], [], color=colour, linestyle=line, label=text))
+    handles = dict(sorted(handles.items(), key=lambda item: _rank(item[0])))
     if (across, down) in (("x0", "v0"), ("v0", "x0")) and _on_section(result, place):
         handles |= _draw_sets(ax, result, across, factors, place, look)
         handles |= _draw_saddles(ax, result, across, factors, place, look)
     return list(handles.values())
+
+
+def _rank(text: str) -> tuple[int, int]:
+    """Where a line stands in the legend: the saddles by number, then the others as they came."""
+    number = text.rpartition(" ")[2]
+    return (0, int(number)) if number.isdecimal() else (1, 0)
 
 
 def _draw_sets(

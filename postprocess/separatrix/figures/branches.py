@@ -89,10 +89,11 @@ def height(result: xr.Dataset) -> tuple[np.ndarray, str]:
     """Return what is drawn over the parameter, and its name.
 
     The amplitude; between two stops, where that of all that touches both is the play, a point on the section.
-    Of a file of equilibria alone their position.
+    Of a file of equilibria or of places of rest alone their position.
     """
     if "x_max" not in result:
-        return np.empty(0), f"position at rest ({unit(result['equilibrium_x'])})"
+        place = "equilibrium_x" if "equilibrium_x" in result else "rest_x_low"
+        return np.empty(0), f"position at rest ({unit(result[place])})"
     amplitude = (result["x_max"].values - result["x_min"].values) / 2
     lengths = unit(result["x_max"])
     both = np.zeros(amplitude.shape, bool)
@@ -124,7 +125,8 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
     ax = figure.add_subplot()
     handles = draw(ax, result)
-    across = result["parameter" if "parameter" in result else "equilibrium_parameter"].copy()
+    parameters = ("parameter", "equilibrium_parameter", "rest_parameter")
+    across = result[next(name for name in parameters if name in result)].copy()
     across.name = str(result.attrs["parameter"]).replace(".", "_")
     ax.set_xlabel(axis_label(across))
     ax.set_ylabel(height(result)[1])
@@ -133,6 +135,10 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         counts.append(f"{int(result['branch'].max())} branches from {int(result.attrs['seeds'])} seeds")
     if "equilibrium_branch" in result:
         counts.append(f"{int(result['equilibrium_branch'].max())} of equilibria")
+    if not counts:
+        counts.append(
+            f"no orbits; dry friction holds {plain(str(result.attrs['rest_joints']).split('; ')[0])}"
+        )
     caption = [
         *caption_pieces(result, look, describe_case(result)),
         f"{', '.join(counts)}; there may be others",
@@ -152,6 +158,9 @@ def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
         # An equilibrium has no amplitude.
         rest = result["equilibrium_x"].values * (0 if name.startswith("amplitude") else 1)
         labels.append(_draw_lines(ax, result, "equilibrium_", rest, ("C0", "C0")))
+    if "rest_parameter" in result and not name.startswith("amplitude"):
+        ends = (result[f"rest_{which}"].values for which in ("parameter", "x_low", "x_high"))
+        ax.vlines(*ends, color="C4", linewidth=3)
     ax.autoscale_view()
     handles = []
     if "branch" in result:
@@ -161,6 +170,8 @@ def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
         ]
     if "equilibrium_branch" in result:
         handles += [Line2D([], [], color="C0", linestyle="-", label="equilibrium (broken: unstable)")]
+    if "rest_parameter" in result and not name.startswith("amplitude"):
+        handles.append(Line2D([], [], color="C4", linewidth=3, label="friction holds: places of rest"))
     for number, (name, (marker, text)) in enumerate(_MARKS.items()):
         places = [points[chosen == name] for points, chosen in labels if (chosen == name).any()]
         if not places:
