@@ -310,3 +310,66 @@ count = 3
         rf"^  1 to {found[1]}: .*, amplitude 0.07\d+ to 0.07\d+ m, .*come together by 0.99", out, re.M
     )
     assert "an attractor that was not found" not in out
+
+
+TABLE = """
+title = "A block under a curved spring on a table that moves"
+
+[body.block]
+mass = 0.5
+load = {load}
+
+[body.table]
+mass = 1.0
+
+[spring.curved]
+between = ["ground", "block"]
+law = "polynomial"
+stiffness = 1.0
+quadratic = 0.3
+cubic = 3.0
+damping = 0.05
+
+[contact.stop]
+between = ["table", "block"]
+law = "newton"
+restitution = 0.3
+lower = 0.0
+
+[drive.table]
+law = "motion"
+body = "table"
+amplitude = {amplitude}
+angle = {angle}
+frequency = {frequency}
+
+[watch]
+body = "block"
+
+[start]
+x0 = {place}
+
+[run]
+duration = 12
+average = "window"
+"""
+
+
+def test_impacts_under_a_curved_spring_are_at_the_stop(separatrix, tmp_path):
+    """Also the smallest of a chatter on a stop that moves: none is off by more than rounding."""
+    rng = np.random.default_rng(20)
+    for _ in range(5):
+        values = {
+            "load": -rng.uniform(0.03, 0.3),
+            "amplitude": rng.uniform(0.02, 0.1),
+            "angle": rng.uniform(0, 6),
+            "frequency": rng.uniform(1, 4),
+            "place": rng.uniform(0.1, 0.3),
+        }
+        (tmp_path / "case.toml").write_text(TABLE.format(**values))
+        succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", folder=tmp_path)
+        with h5py.File(tmp_path / "out.h5") as file:
+            names = ["no event", *file["event_kind"].attrs["flag_meanings"].split()]
+            impacts = file["event_kind"][:] == names.index("impact_lower")
+            assert impacts.sum() > 4
+            assert np.abs(file["event_joint_x"][impacts]).max() < 1e-14
