@@ -40,7 +40,7 @@ contains
     most_periods = min(max_period, max(1, int(min(span%duration/moving%machine%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
     searching = moving
     call limit(searching%options)
-    call limit(searching%jointed%options)
+    if (allocated(searching%jointed)) call limit(searching%jointed%options)
     call discover_attractors(searching, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
     if (size(own) == 0) return
     call sort_attractors(own)
