@@ -45,20 +45,21 @@ contains
       end do
       values(k + 1) = moved
     end do
-    call leave_out_hidden(matrix, values)
+    call leave_out_hidden(matrix, rounding*norm2(matrix), 2, values)
   end function multipliers_of
 
   !> Makes those of the eigenvalues (largest first) that are not known no numbers: each moves, to first order, by the rounding of
-  !> the matrix times its condition |x||y|/|y'x| (Golub, Van Loan, Matrix Computations, 7.2.2), a double one by the root of that.
-  pure subroutine leave_out_hidden(matrix, values)
-    real(wp), intent(in) :: matrix(:, :)
+  !> the matrix, at most `scatter`, times its condition |x||y|/|y'x| (Golub, Van Loan, Matrix Computations, 7.2.2), a double one by
+  !> the root of that. Those before `first` are known.
+  pure subroutine leave_out_hidden(matrix, scatter, first, values)
+    real(wp), intent(in) :: matrix(:, :), scatter
+    integer, intent(in) :: first
     complex(wp), intent(inout) :: values(:)
     complex(wp), dimension(size(values), size(values)) :: vectors, unit, left
     complex(wp) :: own(size(values))
-    real(wp) :: miss, scatter
+    real(wp) :: miss
     integer :: i, k
     logical :: ok
-    scatter = rounding*norm2(matrix)
     if (scatter < 1e-3_wp*known_to) return
     call general_eigen(matrix, own, vectors, ok)
     unit = 0
@@ -66,7 +67,7 @@ contains
       unit(i, i) = 1
     end do
     if (ok) call solve_complex(vectors, unit, left, ok)
-    do i = 2, size(values)
+    do i = first, size(values)
       miss = sqrt(scatter)
       k = minloc(modulus(own - values(i)), 1)
       if (ok) miss = min(miss, scatter*norm2(modulus(vectors(:, k)))*norm2(modulus(left(k, :))))
@@ -76,13 +77,13 @@ contains
 
   !> Eigenvalues of base - column row/rate, largest modulus first, where the rate is so small that but for one they are those of
   !> the limit: with the first axis along the row that of the rest of the base, less what the column makes of it. They are not
-  !> numbers where the limit is not known to 1e-6.
-  pure function multipliers_beside_graze(base, column, row, rate) result(values)
-    real(wp), intent(in) :: base(:, :), column(:), row(:), rate
+  !> numbers where the limit is not known to 1e-6; what the base is the difference of is `lost` times as large.
+  pure function multipliers_beside_graze(base, column, row, rate, lost) result(values)
+    real(wp), intent(in) :: base(:, :), column(:), row(:), rate, lost
     complex(wp) :: values(size(row))
     real(wp), dimension(size(row), size(row)) :: turn, turned
     real(wp), dimension(size(row)) :: axis, along
-    real(wp) :: lead
+    real(wp) :: lead, scatter
     integer :: i, n
     n = size(row)
     values = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -98,11 +99,14 @@ contains
     along = matmul(turn, column)
     lead = along(1)*sum(turn(1, :)*row)
     if (.not. abs(rate)*max(1.0_wp, maxval(abs(base)))**2 < known_to*abs(lead)) return
+    ! A further event that grazes makes the base large, and what is left of it small.
+    scatter = rounding*lost*norm2(turned)*(1 + norm2(along(2:)/along(1)))
     do i = 2, n
       turned(i, 2:) = turned(i, 2:) - along(i)/along(1)*turned(1, 2:)
     end do
     values(1) = -lead/rate
     values(2:) = multipliers_of(turned(2:, 2:))
+    call leave_out_hidden(turned(2:, 2:), scatter, 1, values(2:))
   end function multipliers_beside_graze
 
   !> det(M + shift).

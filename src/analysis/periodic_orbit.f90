@@ -317,7 +317,8 @@ contains
         do k = 1, n
           split%base(:, k) = split%base(:, k)*machine%size_of(k)/machine%size_of
         end do
-        values = multipliers_beside_graze(split%base, split%column/machine%size_of, split%row*machine%size_of, split%rate)
+        values = multipliers_beside_graze(split%base, split%column/machine%size_of, split%row*machine%size_of, split%rate, &
+                                          split%lost)
         if (.not. all(values(2:) == values(2:))) cycle
         orbit%multipliers(2:) = values(2:)
         return

@@ -15,16 +15,16 @@ module settled_cycle
 
   public :: describe_cycle
 
-  !> A search may take so many times what the motion took, and so many events and steps more.
-  integer, parameter :: most_times = 6, more_events = 10000, more_steps = 20000
+  !> A stretch of the search may take so many times more than its extension what the motion took, and so many events and steps.
+  integer, parameter :: more_times = 2, more_events = 10000, more_steps = 20000
 
 contains
 
   !> The cycle that the motion of `outcome` has come to by its end, period 0 if none; then the steady values are those of
   !> the cycle. Not where they are asked for over the window as it is. A cycle that the motion comes to later, or that is longer
-  !> than the motion, is none of its own, so that chaos is not searched for long; nor is one sought that takes `most_times` the
-  !> events or steps of the motion. `patience`: span of the case, with its extension;
-  !> `start`: x [m], v [m/s], crank angle [rad].
+  !> than the motion, is none of its own, so that chaos is not searched for long; nor is one sought over a stretch that takes far
+  !> more events or steps than the motion and its extension. `patience`: span of the case, with its extension; `start`: x [m],
+  !> v [m/s], crank angle [rad].
   pure subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: patience, span
@@ -35,10 +35,11 @@ contains
     type(attractor_t), allocatable :: own(:)
     type(motion_t) :: searching
     type(outcome_t) :: again
-    integer :: most_periods
+    integer :: most_periods, times
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
     most_periods = min(max_period, max(1, int(min(span%duration/moving%machine%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
     searching = moving
+    times = more_times + ceiling(patience%extension)
     call limit(searching%options)
     if (allocated(searching%jointed)) call limit(searching%jointed%options)
     call discover_attractors(searching, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
@@ -53,8 +54,8 @@ contains
 
     pure subroutine limit(options)
       type(options_t), intent(inout) :: options
-      options%event_budget = min(options%event_budget, most_times*outcome%events + more_events)
-      options%step_budget = min(options%step_budget, most_times*outcome%steps + more_steps)
+      options%event_budget = min(options%event_budget, times*outcome%events + more_events)
+      options%step_budget = min(options%step_budget, times*outcome%steps + more_steps)
     end subroutine limit
 
   end subroutine describe_cycle

@@ -8,7 +8,7 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, points_of_tile, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_report, only: found_text, list_attractors, missed_text, not_known_text
+  use catalogue_report, only: list_attractors, missed_text, not_known_text, tell_found
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use endings, only: report_reasons
@@ -200,18 +200,13 @@ contains
     type(session_t), intent(inout) :: session
     type(basin_work_t), intent(in) :: work
     character(len=:), allocatable :: source, not_known, missed
-    integer :: i, last
     if (size(work%catalogues) == 0) then
       call session%journal%line('catalogue', 'no start is an axis: every point has its own attractor, unlabelled')
       return
     end if
-    last = 0
-    do i = 1, size(work%catalogues)
-      last = max(last, maxval([0, work%catalogues(i)%attractors%id]))
-    end do
-    source = ' discovered'
-    if (len(session%command%catalogue) > 0) source = ' taken from '//session%command%catalogue
-    call session%journal%line('catalogue', found_text(work%catalogues)//source, '"attractors": '//to_text(last))
+    source = 'discovered'
+    if (len(session%command%catalogue) > 0) source = 'taken from '//session%command%catalogue
+    call tell_found(session%journal, work%catalogues, source)
     not_known = not_known_text(work%catalogues, work%span%extension)
     if (len(not_known) > 0) call session%journal%line('warning', not_known)
     missed = missed_text(work%catalogues, session%the_case%attractors%sample)

@@ -13,7 +13,7 @@ module catalogue_report
   implicit none
   private
 
-  public :: found_text, list_attractors, not_known_text, missed_text
+  public :: tell_found, list_attractors, not_known_text, missed_text
 
   !> Confidence of the bound on what the sample has missed.
   real(wp), parameter :: confidence = 0.95_wp
@@ -21,9 +21,9 @@ module catalogue_report
 contains
 
   !> How many attractors the catalogues have, and how many entries of which nobody knows whether they are some.
-  pure function found_text(catalogues) result(line)
+  pure subroutine count_found(catalogues, attractors, not_known)
     type(catalogue_t), intent(in) :: catalogues(:)
-    character(len=:), allocatable :: line
+    integer, intent(out) :: attractors, not_known
     logical, allocatable :: found(:), known(:)
     integer :: slice, last
     last = maxval([0, (maxval([0, catalogues(slice)%attractors%id]), slice=1, size(catalogues))])
@@ -34,12 +34,23 @@ contains
         known(pack(entries%id, entries%kind /= kind_not_known)) = .true.
       end associate
     end do
-    line = counted(count(known), 'attractor')
-    if (count(found .and. .not. known) > 0) then
-      line = line//' and '//counted(count(found .and. .not. known), 'motion')//' not known to be periodic'
-    end if
-    line = line//' in '//counted(size(catalogues), 'slice')
-  end function found_text
+    attractors = count(known)
+    not_known = count(found .and. .not. known)
+  end subroutine count_found
+
+  !> These numbers in a line.
+  subroutine tell_found(journal, catalogues, source)
+    type(journal_t), intent(inout) :: journal
+    type(catalogue_t), intent(in) :: catalogues(:)
+    character(len=*), intent(in) :: source
+    character(len=:), allocatable :: line
+    integer :: attractors, not_known
+    call count_found(catalogues, attractors, not_known)
+    line = counted(attractors, 'attractor')
+    if (not_known > 0) line = line//' and '//counted(not_known, 'motion')//' not known to be periodic'
+    call journal%line('catalogue', line//' in '//counted(size(catalogues), 'slice')//' '//source, &
+                      '"attractors": '//to_text(attractors)//', "not_known": '//to_text(not_known))
+  end subroutine tell_found
 
   !> '1 slice', '2 slices'.
   pure function counted(number, thing) result(words)

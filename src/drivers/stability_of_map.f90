@@ -77,7 +77,7 @@ contains
     call read_map(reader, the_case, grid, entries, total, error)
     call reader%close(ignored)
     if (allocated(error)) return
-    call journal%line('entries', to_text(size(entries))//' of '//to_text(total)//' attractors have no known period', &
+    call journal%line('entries', to_text(size(entries))//' of '//to_text(total)//' entries of the catalogue have no known period', &
                       '"without_period": '//to_text(size(entries))//', "attractors": '//to_text(total))
     if (command%validate .or. command%dry_run) return
     do i = 1, size(entries)

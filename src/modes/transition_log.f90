@@ -10,7 +10,6 @@ module transition_log
   use jointed_log, only: book_change, log_event
   use jointed_state, only: jointed_state_t, turning_at
   use kinds, only: wp
-  use mode_choice, only: accelerations_of
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
     event_turning_point, log_t
@@ -30,7 +29,7 @@ contains
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:)
     type(log_t), intent(inout) :: log
-    type(jointed_state_t) :: struck, late
+    type(jointed_state_t) :: struck
     complex(wp) :: turning(moving%harmonics)
     logical, dimension(size(moving%machine%joints)) :: told, stood, stands
     integer :: g, j, kind
@@ -68,33 +67,17 @@ contains
         if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0 .and. &
             machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
           kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
-          ! At the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled first
+          ! Told of the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled first
           ! comes first.
-          late = struck
-          call carry_on(machine, turning, min(rest_of_chatter(moving, before, turning, j, after%phase(j)), &
-                                              next_action(machine, before) - before%time), late)
-          call log_event(machine, kind, j, late, late, log)
+          call log_event(machine, kind, j, struck, struck, log, &
+                         later=min(rest_of_chatter(moving, before, turning, j, after%phase(j)), &
+                                   next_action(machine, before) - before%time))
         end if
       end do
       ! What an impact or a cascade does to other joints.
       call log_friction(machine, before, struck, stood, stands, told, log)
     end associate
   end subroutine log_transition
-
-  !> The state a short `duration` [s] later in the same mode, to the third order.
-  pure subroutine carry_on(machine, turning, duration, state)
-    type(jointed_t), intent(in) :: machine
-    complex(wp), intent(in) :: turning(:)
-    real(wp), intent(in) :: duration
-    type(jointed_state_t), intent(inout) :: state
-    real(wp) :: a(machine%n), jerk(machine%n)
-    call accelerations_of(machine, state, turning, a, jerk)
-    associate (q => state%q(:machine%n), v => state%v(:machine%n), h => duration)
-      q = q + h*(v + h*(a/2 + h*jerk/6))
-      v = v + h*(a + h*jerk/2)
-    end associate
-    state%time = state%time + duration
-  end subroutine carry_on
 
   !> Friction that holds from here on, or no longer, where that is not `told` yet; of two bodies it goes with what did it.
   pure subroutine log_friction(machine, before, after, stood, stands, told, log)

@@ -34,6 +34,8 @@ module variations
   type, public :: split_t
     real(wp), allocatable :: base(:, :), column(:), row(:)
     real(wp) :: rate = 0
+    !> How much larger than the base the terms are of which it is the difference.
+    real(wp) :: lost = 1
   end type split_t
 
 contains
@@ -169,7 +171,9 @@ contains
     seen = rows(2, n + 1)
     ok = abs(seen) > 0
     if (.not. ok) return
+    split%lost = norm2(split%base) + norm2(split%column)*norm2(rows(2, :n))/abs(seen)
     split%base = split%base - spread(split%column, 2, n)*spread(rows(2, :n), 1, n)/seen
+    split%lost = split%lost/max(norm2(split%base), tiny(1.0_wp))
     split%row = split%row - rates(1)*rows(2, :n)/seen
     split%column = change(:, n + 2) - split%column*rates(2)/seen
     split%rate = -rates(1)*rates(2)/seen
