@@ -4,10 +4,10 @@
 !> The cycle that one motion has come to by its end.
 module settled_cycle
   use attractors, only: attractor_t, kind_cycle, kind_rest
+  use build_motion, only: limit_budgets
   use discover, only: discover_attractors, sort_attractors
   use kinds, only: wp
   use motion, only: motion_t
-  use motion_state, only: options_t
   use status, only: reason_settled, reason_time_over
   use trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -40,8 +40,7 @@ contains
     most_periods = min(max_period, max(1, int(min(span%duration/moving%machine%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
     searching = moving
     times = more_times + ceiling(patience%extension)
-    call limit(searching%options)
-    if (allocated(searching%jointed)) call limit(searching%jointed%options)
+    call limit_budgets(searching, times*outcome%events + more_events, times*outcome%steps + more_steps)
     call discover_attractors(searching, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
     if (size(own) == 0) return
     call sort_attractors(own)
@@ -49,15 +48,6 @@ contains
     if (again%reason /= reason_settled) return
     cycle = own(again%attractor)
     if (cycle%kind == kind_cycle .or. (cycle%kind == kind_rest .and. .not. cycle%rests)) outcome%window = cycle%features
-
-  contains
-
-    pure subroutine limit(options)
-      type(options_t), intent(inout) :: options
-      options%event_budget = min(options%event_budget, times*outcome%events + more_events)
-      options%step_budget = min(options%step_budget, times*outcome%steps + more_steps)
-    end subroutine limit
-
   end subroutine describe_cycle
 
 end module settled_cycle

@@ -109,13 +109,12 @@ contains
           if (flight%guards(g)%from_zero) flight%guards(g)%constant = -start
           rate = sum(abs(row(:n)*state%v(:n))) + sum(abs(row(n + 1:2*n))*accelerations)
           if (guard%held > 0) rate = rate + guard%blur(1)
-          flight%guards(g)%noise = noise_share*[flight%size_of_guard(g), rate, 0.5_wp*sum(abs(row(:n))*accelerations)]
-          call take_as_linear(system, g, flight%guards(g))
-          ! Displacements count from here: of a place that is left, rounding begins with them.
           associate (taken => flight%guards(g))
-            if (taken%from_zero .and. taken%margin == 0 .and. abs(guard%place) > 0 .and. .not. abs(taken%constant) > 0) then
-              taken%noise(0) = 0
-            end if
+            taken%noise = noise_share*flight%size_of_guard(g)
+            taken%noise_rate = noise_share*rate
+            call take_as_linear(system, g, taken)
+            taken%is_left = taken%from_zero .and. taken%margin == 0 .and. abs(guard%place) > 0 .and. .not. abs(taken%constant) > 0
+            taken%noise_bend = 0.5_wp*noise_share*sum(abs(row(:n))*accelerations)
           end associate
         end associate
       end do
@@ -252,6 +251,7 @@ contains
         system%guard(c - 1, g) = system%guard(c - 1, g) + behind(system%guard(:, g))
         if (flight%guards(g)%margin == 0) flight%guards(g)%constant = flight%guards(g)%constant + behind(system%guard(:, g))
       end do
+      flight%guards%is_left = .false.
       system%start = system%start + flight%march%time
       flight%march%time = 0
     end associate

@@ -7,7 +7,7 @@ module build_motion
   use errors, only: error_t
   use jointed, only: jointed_t
   use jointed_motion, only: prepare_jointed
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use law_table, only: law_choice_t
   use motion, only: motion_t, prepare_motion
   use motion_state, only: options_t
@@ -17,7 +17,7 @@ module build_motion
   implicit none
   private
 
-  public :: machine_of, period_of
+  public :: machine_of, period_of, limit_budgets
 
 contains
 
@@ -63,6 +63,15 @@ contains
     allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%jointed)
     call prepare_jointed(machine, options, moving%jointed)
   end subroutine set_structure
+
+  !> So many events and steps a trajectory may take at most, or fewer where it may take fewer already.
+  pure subroutine limit_budgets(moving, events, steps)
+    type(motion_t), intent(inout) :: moving
+    integer(int64), intent(in) :: events, steps
+    moving%options%event_budget = min(moving%options%event_budget, events)
+    moving%options%step_budget = min(moving%options%step_budget, steps)
+    if (allocated(moving%jointed)) moving%jointed%options = moving%options
+  end subroutine limit_budgets
 
   !> Period of the section of the machine that `laws` describe [s].
   pure subroutine period_of(laws, period, error)

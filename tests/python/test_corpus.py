@@ -101,7 +101,7 @@ def test_a_run_that_would_never_end_is_refused(separatrix, tmp_path, command, ch
         more = ["--set", "sweep.to=1e300", "--set", "sweep.step=5e299"] if "ratio" in change else []
     outcome = run(separatrix, command, "case.toml", "--set", change, *more, folder=tmp_path, timeout=20)
     refused(outcome, 65)
-    assert "run.duration" in outcome.err and "drive periods" in outcome.err
+    assert "run.duration" in outcome.err and "periods of the drive" in outcome.err
 
 
 def awkward_lists() -> dict[str, bytes]:
