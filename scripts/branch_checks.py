@@ -270,10 +270,17 @@ def refusals(program: Path) -> tuple[list[list[str]], list[str]]:
     """What the program says of examples whose orbits it does not follow."""
     lines, wrong = [], []
     for name, parameter in REFUSED.items():
-        words = ["branches", SOURCE / "examples" / f"{name}.toml", "--parameter", parameter, "--dry-run"]
-        ended = subprocess.run(
-            [program, *words, "--from", "1", "--to", "2"], capture_output=True, text=True, check=False
-        )
+        words = [
+            program.resolve(),
+            "branches",
+            f"examples/{name}.toml",
+            "--parameter",
+            parameter,
+            "--dry-run",
+        ]
+        words += ["--from", "1", "--to", "2"]
+        # from there, so that the page names no folder of the machine
+        ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=SOURCE)
         said = ended.stderr.strip().removeprefix("separatrix: ")
         lines.append([f"`{name}`", said])
         if ended.returncode != 65 or "\n" in said:

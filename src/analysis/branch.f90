@@ -10,7 +10,7 @@ module branch
     note_bifurcations
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
     label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
-  use branch_return, only: close_up, return_share
+  use branch_return, only: close_up
   use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
   use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
@@ -88,9 +88,8 @@ contains
     type(point_t), allocatable, intent(out) :: points(:)
     integer, intent(out) :: ending
     class(search_watch_t), intent(inout), optional :: watch
-    type(trace_t) :: trace, before
+    type(trace_t) :: first, trace, before
     type(error_t), allocatable :: error
-    real(wp) :: share
     logical :: ok
     integer :: labels, known
     allocate (points(0))
@@ -102,6 +101,7 @@ contains
     points = [trace%now]
     if (.not. ok) return
     trace%step = 0.1_wp*plan%largest_step
+    first = trace
     ending = no_label
     do while (ending == no_label .and. size(points) < plan%most_points)
       before = trace
@@ -109,11 +109,7 @@ contains
       call go_on(family, plan, trace, points, ending)
       if (ending /= no_label) exit
       if (present(watch)) call watch%tell_point(size(points), trace%now%orbit%parameter)
-      if (size(points) < 5) cycle
-      share = return_share(seed, before, trace, family%parameter_size)
-      if (.not. share > 0) cycle
-      ending = label_closed
-      call close_up(family, before, trace, share, points, known)
+      if (known > 3) call close_up(family, first, before, trace, known, points, ending)
     end do
     if (ending == no_label) ending = label_long
     labels = size(points)

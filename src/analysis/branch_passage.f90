@@ -286,8 +286,9 @@ contains
     real(wp), intent(in) :: step
     type(trace_t), intent(inout) :: beyond
     logical, intent(out) :: ok
-    type(trace_t) :: start, there
-    real(wp) :: look, along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
+    type(trace_t) :: start, there, tried(2)
+    real(wp) :: look, beyond_step, along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
+    logical :: fits(2), found
     integer :: way, tries, steps
     along = touches_apart(beyond%now%orbit)
     if (any(abs(along) > 0)) then
@@ -304,20 +305,27 @@ contains
     if (.not. ok) return
     along = start%now%tangent
     look = first_look*step
+    found = .false.
     do tries = 1, 4
-      do way = 1, -1, -2
-        start%now%tangent = way*along
-        call step_to(family, start, look, there, ok, steps)
-        if (ok) ok = all(there%margins%list%value > -no_passage)
-        if (ok) ok = is_admissible(there%machines, there%now%orbit)
-        if (ok) exit
+      do way = 1, 2
+        start%now%tangent = merge(1, -1, way == 1)*along
+        call step_to(family, start, look, tried(way), fits(way), steps)
+        if (fits(way)) fits(way) = all(tried(way)%margins%list%value > -no_passage)
+        if (fits(way)) fits(way) = is_admissible(tried(way)%machines, tried(way)%now%orbit)
       end do
-      if (ok) exit
+      ! So near the point that both sides are on it within rounding: a longer look tells them apart.
+      if (any(fits) .and. .not. (found .and. all(fits))) then
+        there = tried(findloc(fits, .true., 1))
+        beyond_step = max(look, 0.1_wp*step)
+      end if
+      found = found .or. any(fits)
+      if (count(fits) == 1) exit
       look = 10*look
     end do
+    ok = found
     if (.not. ok) return
     beyond = there
-    beyond%step = max(look, 0.1_wp*step)
+    beyond%step = beyond_step
   end subroutine enter_sequence
 
 end module branch_passage

@@ -4,79 +4,122 @@
 !> Whether a branch has come back to the orbit in which it began, and its last point there.
 module branch_return
   use body_family, only: family_t
-  use branch_point, only: point_t, step_to, trace_t
+  use branch_point, only: label_closed, label_not_known, no_label, point_t, step_to, trace_t
   use kinds, only: wp
-  use orbit_sections, only: section_points
+  use machine_family, only: nearest_copy
   use orbit_motion, only: same_sequence
+  use orbit_sections, only: begun_at
   use periodic_orbit, only: orbit_t, scales_of_orbit
   implicit none
   private
 
-  public :: return_share, close_up
+  public :: close_up
+
+  !> The branch is where it began if it is there to this, in natural sizes.
+  real(wp), parameter :: nearly = 1e-8_wp
+  integer, parameter :: most_looks = 6
+  !> A point that is further than this share of a step from its tangent is not looked at: more than the turn of a step allows.
+  real(wp), parameter :: off_tangent = 0.5_wp
 
 contains
 
-  !> The share of a step at which a branch of the same events has passed the orbit in which it began, maybe at another of its
-  !> section points; 0 if it has not.
-  pure real(wp) function return_share(first, before, trace, parameter_size) result(share)
-    type(orbit_t), intent(in) :: first
-    type(trace_t), intent(in) :: before, trace
-    real(wp), intent(in) :: parameter_size
-    real(wp) :: points(size(first%y), first%periods), miss, across
-    integer :: k
-    share = 0
-    if (.not. same_sequence(first, trace%now%orbit) .or. .not. same_sequence(first, before%now%orbit)) return
-    points = section_points(trace%machines, first)
-    do k = 1, first%periods
-      call place_on_step(points(:, k), first%parameter, before, trace, parameter_size, share, across, miss)
-      if (share > 0 .and. share <= 1 .and. across < miss) return
-    end do
-    share = 0
-  end function return_share
-
-  !> Where a section point lies beside a step, as a share of it; its distance `across`, and that which is thought none, in natural
-  !> sizes. The share is 0 for a step of no length.
-  pure subroutine place_on_step(y, parameter, before, trace, parameter_size, share, across, none)
-    real(wp), intent(in) :: y(:), parameter, parameter_size
-    type(trace_t), intent(in) :: before, trace
-    real(wp), intent(out) :: share, across, none
-    real(wp) :: step(size(y) + 1), way(size(y) + 1)
-    share = 0
-    across = huge(across)
-    none = 0
-    associate (now => trace%now%orbit, last => before%now%orbit, sizes => trace%machines%centre%size_of)
-      step = [(now%y - last%y)/sizes, (now%parameter - last%parameter)/parameter_size]
-      if (.not. norm2(step) > 0) return
-      way = [(y - last%y)/sizes, (parameter - last%parameter)/parameter_size]
-      share = sum(way*step)/sum(step**2)
-      across = norm2(way - share*step)
-      none = 0.1_wp*norm2(step)
-    end associate
-  end subroutine place_on_step
-
-  !> Ends a closed branch where it began, at a share of its last step: what was located beyond has been there from the beginning.
-  !> `known` points come before that step.
-  subroutine close_up(family, before, trace, share, points, known)
+  !> Ends a branch that has passed the orbit `first` on its step from `before` to `trace`, maybe at another of its section points,
+  !> in that orbit: `ending` is "closed" then. Only an orbit that Newton's method finds there to rounding is taken for it.
+  !> `known` of the points come before the step; what was located beyond has been there from the beginning. Where the branch comes
+  !> back in the other direction it has turned round unseen, and the ending is not known.
+  subroutine close_up(family, first, before, trace, known, points, ending)
     type(family_t), intent(in) :: family
-    type(trace_t), intent(in) :: before, trace
-    real(wp), intent(in) :: share
-    type(point_t), allocatable, intent(inout) :: points(:)
+    type(trace_t), intent(in) :: first, before, trace
     integer, intent(in) :: known
+    type(point_t), allocatable, intent(inout) :: points(:)
+    integer, intent(out) :: ending
     type(trace_t) :: there
-    logical :: kept(size(points)), ok
-    real(wp) :: at, across, none
-    integer :: i, steps
-    kept = .true.
-    do i = known + 1, size(points)
-      call place_on_step(points(i)%orbit%y, points(i)%orbit%parameter, before, trace, family%parameter_size, at, across, none)
-      kept(i) = at < share
+    type(orbit_t) :: seed
+    integer :: k
+    logical :: found
+    ending = no_label
+    do k = 1, first%now%orbit%periods
+      seed = begun_at(first%machines, first%now%orbit, k)
+      call find_on_step(family, before, seed, 0.0_wp, length_of_step(family, before, points(known + 1:)), there, found)
+      if (found) then
+        points = [points(:known), pack(points(known + 1:), is_before(points(known + 1:)))]
+      else if (.not. same_sequence(before%now%orbit, trace%now%orbit)) then
+        ! The events have changed on the way, or their numbers: it may lie behind the end of the step.
+        call find_on_step(family, trace, seed, -trace%step, 0.0_wp, there, found)
+      end if
+      if (.not. found) cycle
+      ending = merge(label_closed, label_not_known, comes_as_it_left())
+      points = [points, there%now]
+      return
     end do
-    associate (now => trace%now%orbit, last => before%now%orbit)
-      call step_to(family, before, share*norm2([now%y - last%y, now%events%time - last%events%time, now%parameter - &
-                   last%parameter]/scales_of_orbit(trace%machines, now, family%parameter_size)), there, ok, steps)
-    end associate
-    if (.not. ok) there = trace
-    points = [pack(points, kept), there%now]
+
+  contains
+
+    !> Whether the branch goes on as it did in the beginning, as far as its second point has the events of the first.
+    pure logical function comes_as_it_left()
+      type(orbit_t) :: second
+      second = begun_at(first%machines, points(2)%orbit, k)
+      comes_as_it_left = .not. same_sequence(seed, second)
+      if (.not. comes_as_it_left) comes_as_it_left = sum(difference(family, there, seed, second)*there%now%tangent) > 0
+    end function comes_as_it_left
+
+    !> Whether points of the step come before the place that was found.
+    pure elemental logical function is_before(point)
+      type(point_t), intent(in) :: point
+      is_before = same_sequence(point%orbit, there%now%orbit)
+      if (is_before) is_before = sum(difference(family, there, point%orbit, there%now%orbit)*there%now%tangent) > 0
+    end function is_before
+
   end subroutine close_up
+
+  !> How far a step goes with the events with which it begins, whose points are given.
+  pure real(wp) function length_of_step(family, before, points) result(length)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: before
+    type(point_t), intent(in) :: points(:)
+    integer :: i
+    length = 0
+    do i = 1, size(points)
+      if (.not. same_sequence(before%now%orbit, points(i)%orbit)) return
+      length = max(length, sum(difference(family, before, before%now%orbit, points(i)%orbit)*before%now%tangent))
+    end do
+  end function length_of_step
+
+  !> From one orbit to another with the same events, in natural sizes.
+  pure function difference(family, trace, from, to) result(way)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace
+    type(orbit_t), intent(in) :: from, to
+    real(wp) :: way(size(from%y) + size(from%events) + 1)
+    way = [nearest_copy(trace%machines%centre, to%y, from%y) - from%y, to%events%time - from%events%time, &
+           to%parameter - from%parameter]
+    way = way/scales_of_orbit(trace%machines, from, family%parameter_size)
+  end function difference
+
+  !> The point of a branch at the height of the orbit `seed`, if that is within `low` to `high` of a point, and the same orbit.
+  subroutine find_on_step(family, from, seed, low, high, there, found)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: from
+    type(orbit_t), intent(in) :: seed
+    real(wp), intent(in) :: low, high
+    type(trace_t), intent(out) :: there
+    logical, intent(out) :: found
+    real(wp) :: way(size(from%now%tangent)), along
+    integer :: i, steps
+    found = same_sequence(from%now%orbit, seed)
+    if (.not. found) return
+    way = difference(family, from, from%now%orbit, seed)
+    along = sum(way*from%now%tangent)
+    found = along >= low .and. along <= high .and. norm2(way - along*from%now%tangent) <= off_tangent*(high - low)
+    ! Natural sizes may change on the way, so that it is not there at once.
+    do i = 1, merge(most_looks, 0, found)
+      call step_to(family, from, along, there, found, steps)
+      if (.not. found) return
+      way = difference(family, from, there%now%orbit, seed)
+      if (norm2(way) < nearly) return
+      along = along + sum(way*from%now%tangent)
+    end do
+    found = .false.
+  end subroutine find_on_step
 
 end module branch_return

@@ -11,7 +11,7 @@ module orbit_sections
   implicit none
   private
 
-  public :: rotate_to_section, section_points
+  public :: rotate_to_section, section_points, begun_at
 
 contains
 
@@ -126,5 +126,36 @@ contains
       call machines%centre%fly(mode, t, y, section, points(:, i + 1))
     end do
   end function section_points
+
+  !> The orbit begun at its section point number `k`: the same events from there on. Their states stay as they are, and so do the
+  !> multipliers.
+  pure type(orbit_t) function begun_at(machines, orbit, k) result(begun)
+    type(neighbourhood_t), intent(in) :: machines
+    type(orbit_t), intent(in) :: orbit
+    integer, intent(in) :: k
+    real(wp) :: points(size(orbit%y), orbit%periods), from, span
+    integer :: before, i
+    begun = orbit
+    if (k == 1) return
+    points = section_points(machines, orbit)
+    begun%y = points(:, k)
+    if (machines%centre%has_clock) then
+      from = (k - 1)*machines%centre%period
+      span = orbit%periods*machines%centre%period
+      before = count(orbit%events%time <= from)
+    else
+      before = 0
+      do i = 1, k - 1
+        before = before + findloc(orbit%events(before + 1:)%guard, turns_round, 1)
+      end do
+      from = orbit%events(before)%time
+      span = orbit%events(size(orbit%events))%time
+    end if
+    if (before > 0) begun%mode = orbit%events(before)%after
+    begun%events = [orbit%events(before + 1:), orbit%events(:before)]
+    begun%events%time = begun%events%time - from
+    i = size(orbit%events) - before
+    begun%events(i + 1:)%time = begun%events(i + 1:)%time + span
+  end function begun_at
 
 end module orbit_sections

@@ -17,6 +17,7 @@ module matrix_market
 
   !> Where the reader is.
   type :: cursor_t
+    !> `line` is nothing at the end of the file.
     character(len=:), allocatable :: text, line
     integer(int64) :: from = 1
     integer :: number = 0
@@ -53,7 +54,7 @@ contains
       end if
     end if
     if (.not. allocated(problem)) then
-      if (next_line(cursor)) problem = 'found '''//shown(cursor%line)//''', allowed nothing after the last number'
+      if (next_line(cursor)) problem = 'found '//shown(cursor)//', allowed nothing after the last number'
     end if
     if (allocated(problem)) problem = path//':'//to_text(cursor%number)//': '//problem
   end subroutine read_matrix_market
@@ -72,14 +73,14 @@ contains
       next_line = len_trim(cursor%line) > 0 .and. (cursor%number == 1 .or. .not. starts_with(cursor%line, '%'))
       if (next_line) return
     end do
-    cursor%line = 'the end of the file'
+    if (allocated(cursor%line)) deallocate (cursor%line)
   end function next_line
 
   subroutine read_header(cursor, layout, symmetry, problem)
     type(cursor_t), intent(inout) :: cursor
     character(len=16), intent(out) :: layout, symmetry
     character(len=:), allocatable, intent(out) :: problem
-    character(len=*), parameter :: allowed = ''', allowed ''%%MatrixMarket matrix coordinate|array real|integer '// &
+    character(len=*), parameter :: allowed = ', allowed ''%%MatrixMarket matrix coordinate|array real|integer '// &
       'general|symmetric|skew-symmetric'''
     character(len=16) :: words(5)
     integer :: status
@@ -92,7 +93,7 @@ contains
     if (status == 0 .and. words(1) == '%%matrixmarket' .and. words(2) == 'matrix' .and. &
         (layout == 'coordinate' .or. layout == 'array') .and. (words(4) == 'real' .or. words(4) == 'integer') .and. &
         (symmetry == 'general' .or. symmetry == 'symmetric' .or. symmetry == 'skew-symmetric')) return
-    problem = 'found '''//shown(cursor%line)//allowed
+    problem = 'found '//shown(cursor)//allowed
   end subroutine read_header
 
   !> Rows, columns and, of a list of coordinates, entries.
@@ -106,7 +107,7 @@ contains
     status = 1
     if (next_line(cursor)) read (cursor%line, *, iostat=status) sizes(:merge(3, 2, layout == 'coordinate'))
     if (status /= 0 .or. any(sizes < 0)) then
-      problem = 'found '''//shown(cursor%line)//''', allowed the numbers of rows and columns'
+      problem = 'found '//shown(cursor)//', allowed the numbers of rows and columns'
       if (layout == 'coordinate') problem = problem//' and entries'
     else if (sizes(1) /= sizes(2) .or. sizes(1) < 1 .or. sizes(1) > most_file_coordinates) then
       problem = 'found '//to_text(sizes(1))//' rows and '//to_text(sizes(2))//' columns, allowed as many of both, at most '// &
@@ -128,7 +129,7 @@ contains
       column = 0
       if (next_line(cursor)) read (cursor%line, *, iostat=status) row, column, value
       if (status /= 0 .or. min(row, column) < 1 .or. max(row, column) > size(matrix, 1)) then
-        problem = 'found '//to_text(i - 1)//' entries and then '''//shown(cursor%line)//''', allowed '//to_text(entries)// &
+        problem = 'found '//to_text(i - 1)//' entries and then '//shown(cursor)//', allowed '//to_text(entries)// &
                   ' lines of row, column and number, up to '//to_text(size(matrix, 1))
         return
       end if
@@ -153,7 +154,7 @@ contains
         status = 1
         if (next_line(cursor)) read (cursor%line, *, iostat=status) value
         if (status /= 0) then
-          problem = 'found '''//shown(cursor%line)//''', allowed a number for row '//to_text(row)//' of column '// &
+          problem = 'found '//shown(cursor)//', allowed a number for row '//to_text(row)//' of column '// &
                     to_text(column)
           return
         end if
@@ -182,15 +183,20 @@ contains
     end do
   end function lower
 
-  !> The beginning of a line, for messages.
-  pure function shown(line) result(text)
-    character(len=*), intent(in) :: line
+  !> The beginning of the line, or that there is none, for messages.
+  pure function shown(cursor) result(text)
+    type(cursor_t), intent(in) :: cursor
     character(len=:), allocatable :: text
     integer :: i
-    text = trim(line(:min(len(line), 60)))
+    if (.not. allocated(cursor%line)) then
+      text = 'the end of the file'
+      return
+    end if
+    text = trim(cursor%line(:min(len(cursor%line), 60)))
     do i = 1, len(text)
       if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) > 126) text(i:i) = '?'
     end do
+    text = ''''//text//''''
   end function shown
 
 end module matrix_market

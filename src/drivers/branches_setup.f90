@@ -126,7 +126,10 @@ contains
     end do
     watched(:, starts + near_starts + 1) = [the_case%start%x0, the_case%start%v0]
     search%starts = starts_of_section(machine, watched(:, :last), spread(:last))
-    if (last == starts .or. .not. (machine%has_clock .and. modulo(the_case%start%crank_angle, two_pi) > 0)) return
+    if (last == starts) return
+    ! By itself, so that the other coordinates are as the machine says.
+    search%starts(:, last:) = starts_of_section(machine, watched(:, last:))
+    if (.not. (machine%has_clock .and. modulo(the_case%start%crank_angle, two_pi) > 0)) return
     allocate (own(machine%n))
     call fly_to_section(machine, [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], own, events, ok)
     if (ok) search%starts(:, last) = own

@@ -270,7 +270,7 @@ LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit
   mask pulls, proven = pressed & ~t.lost & positive_until(t.fall, pressed, t.end) &
                        pushes(m, pressed & ~t.lost, t, g, pulls);
   if (fades)
-    proven = proven & keeps_within(t.fall, t.end, 1.5 * room);
+    proven = proven & keeps_within(t.fall, t.end, room_pressed * room);
   // A body that neither moves nor presses stays for ever in the variable of the series.
   mask idle = (p.u[0] <= 0.0) & (magnitude(g.v) < 1e-12);
   // Where its law comes to pull, the contact has no force: a kink.
@@ -328,7 +328,7 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
     stride_of_lanes t = look_for_events(m, p, flying, within, barrier, length, g);
     mask proven = flying & kept & ~t.lost & positive_until(t.fall, flying, t.end);
     if (any(flying & (room < 1e299)))
-      proven = proven & keeps_within(t.fall, t.end, 1.2 * room);
+      proven = proven & keeps_within(t.fall, t.end, room_free * room);
     // At a barrier that it moves towards, a body hits at once.
     left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
     proven = proven & ~left;

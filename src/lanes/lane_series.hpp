@@ -286,7 +286,12 @@ LANE_DEVICE inline vec speed_room(const lane_law &l, const lane_group &g, mask w
   return room;
 }
 
-// Does the speed keep within so much of that over the step? Where forces change on the way, it may pass it.
+// How far a step may pass that: a free one has its length from the speed at its beginning, and one in a
+// contact turns faster.
+constexpr double room_free = 1.2, room_pressed = 1.5;
+
+// Does the speed keep within so much over the step? Where forces change on the way, it may pass what there is
+// room for.
 LANE_DEVICE inline mask keeps_within(const vec (&c)[order], vec end, vec room) {
   vec power = end, sum = {};
   for (int k = 1; k < order; k++) {

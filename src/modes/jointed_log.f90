@@ -351,14 +351,14 @@ contains
     end associate
   end function work_of_stops
 
-  !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own; its time is so much
-  !> `later` [s].
-  pure subroutine log_event(machine, kind, j, before, after, log, later)
+  !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own; its time is that of
+  !> the state before it, or `at` [s].
+  pure subroutine log_event(machine, kind, j, before, after, log, at)
     type(jointed_t), intent(in) :: machine
     integer, intent(in) :: kind, j
     type(jointed_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
-    real(wp), intent(in), optional :: later
+    real(wp), intent(in), optional :: at
     complex(wp) :: turning(harmonics_of(machine))
     real(wp) :: s, u, u_after
     turning = turning_at(machine%frequency, before%time, size(turning))
@@ -366,7 +366,7 @@ contains
     call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u)
     call record_change(machine, kind, before, after, log)
     call put_column(log%event_joint, log%events, [real(j, wp), s, u, u_after])
-    if (present(later)) log%event_data(1, log%events) = log%event_data(1, log%events) + later
+    if (present(at)) log%event_data(1, log%events) = log%origin + at
     call put_in_order(log)
   end subroutine log_event
 

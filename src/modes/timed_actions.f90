@@ -11,7 +11,7 @@ module timed_actions
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use jointed_transition, only: judge_friction, settle
   use kinds, only: wp
-  use motion_state, only: event_blow, log_t, put_column, put_in_order
+  use motion_state, only: event_blow, log_t, put_column
   implicit none
   private
 
@@ -132,7 +132,6 @@ contains
       ! In the place of a joint stands the number after the last.
       call put_column(log%event_joint, log%events, &
                       [count(machine%joints%kind /= joint_section) + 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
-      call put_in_order(log)
     end associate
   end subroutine give_impulse
 

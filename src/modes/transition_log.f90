@@ -70,8 +70,8 @@ contains
           ! Told of the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled first
           ! comes first.
           call log_event(machine, kind, j, struck, struck, log, &
-                         later=min(rest_of_chatter(moving, before, turning, j, after%phase(j)), &
-                                   next_action(machine, before) - before%time))
+                         at=min(before%time + rest_of_chatter(moving, before, turning, j, after%phase(j)), &
+                                next_action(machine, before)))
         end if
       end do
       ! What an impact or a cascade does to other joints.

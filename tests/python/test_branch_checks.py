@@ -50,6 +50,8 @@ def test_every_example_without_a_measured_drive_is_followed_or_refused_in_words(
     lines, wrong = checks.refusals(separatrix)
     assert wrong == []
     assert len(lines) == len(checks.REFUSED)
+    # the page that they are written to names no folder of a machine
+    assert not any(str(source_dir) in said for _, said in lines)
     known = {case.path for case in checks.CASES} | checks.REFUSED.keys() | checks.SAME_MACHINE
     there = {path.stem for path in (source_dir / "examples").glob("*.toml")}
     assert there <= known

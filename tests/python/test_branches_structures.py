@@ -94,6 +94,59 @@ def test_a_graze_that_is_met_from_the_side_of_the_impact_has_its_name(follow, tm
     assert grazes == pytest.approx([0.8506164517288], abs=1e-11)
 
 
+def labelled(out: Path) -> list[tuple[int, str, float, float]]:
+    """Branch, label, parameter and place of every labelled point."""
+    with open_result(out) as result:
+        labels = decode_flags(result["label"]).values
+        named = labels != "none"
+        values = (result[name].values[named] for name in ("parameter", "x"))
+        return list(zip(result["branch"].values[named], labels[named], *values, strict=True))
+
+
+@pytest.mark.parametrize(("restitution", "closed"), [(0.65, 1), (0.7, 1), (0.75, 1)])
+def test_no_branch_is_run_through_twice(follow, tmp_path: Path, restitution: float, closed: int):
+    """A branch that has turned back at a graze, or whose instants pass the section, was said to be closed."""
+    case = tmp_path / "two.toml"
+    case.write_text(MANY_GRAZES)
+    points, out = follow(
+        case,
+        "drive.force.frequency",
+        1,
+        1.8,
+        "--searches",
+        "4",
+        "--set",
+        f"contact.stop.restitution={restitution}",
+    )
+    there = [(branch, label, round(at, 9), round(x, 4)) for branch, label, at, x in labelled(out)]
+    assert len(set(there)) == len(there)
+    assert sum(point["label"] == "closed" for point in points) == closed
+    assert not any(point["label"] == "not_known" for point in points)
+    if restitution == 0.7:
+        # the orbit with an impact more that begins at the graze of one of half its period
+        near = {
+            point["label"]: point["parameter"]
+            for point in points
+            if 1.6884 < point["parameter"] < 1.6887 or 1.6895 < point["parameter"] < 1.68961
+        }
+        assert near["SN"] == pytest.approx(1.689606082241, abs=1e-10)
+        assert near["PD"] == pytest.approx(1.688467345599, abs=1e-10)
+        assert near["GR-fold"] == pytest.approx(1.689527898042, abs=1e-10)
+
+
+MANY_GRAZES = """
+body.first.mass = 1
+body.second.mass = 0.6
+spring.frame = { between = ["first"], stiffness = 1, damping = 0.06 }
+spring.coupling = { between = ["first", "second"], stiffness = 0.8, damping = 0.05 }
+contact.stop = { between = ["second"], law = "newton", restitution = 0.7, upper = 0.8 }
+drive.force = { law = "force", body = "first", amplitude = 0.9, frequency = 1.3 }
+watch.body = "second"
+run = { duration = 800, window = 50, extension = 2 }
+axis = [ { name = "x0", from = -2, to = 0.8, count = 21 }, { name = "v0", from = -3, to = 3, count = 21 } ]
+"""
+
+
 def test_multipliers_beside_a_graze_are_finite_but_for_one(follow, tmp_path: Path):
     """Mirror images of one motion graze at one place: one multiplier has no bound, the rest are the same."""
     case = tmp_path / "three.toml"

@@ -65,7 +65,7 @@ def test_what_a_file_gives_is_said_as_it_is(tmp_path):
         '[body.b]\nmass = 1\n[friction.f]\nbetween = ["b"]\nlaw = "coulomb"\nforce = 1\nstatic_force = -0.5\n'
     )
     for text, said in (
-        (structure, "stiffness.mtx:4: found 'the end of the file', allowed a number for row 1 of column 2"),
+        (structure, "stiffness.mtx:4: found the end of the file, allowed a number for row 1 of column 2"),
         (friction, "key 'friction.f.static_force': found -0.5 N, allowed at least the force"),
     ):
         (tmp_path / "case.toml").write_text(text + "[run]\nduration = 5\n")
