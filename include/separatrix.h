@@ -120,8 +120,8 @@ int separatrix_contact(const separatrix_model *model, int index, char *name, siz
  *
  * In:
  *   start [segment_count][2*coordinate_count + 1]
- *     places [m], then velocities [m/s] of all coordinates, crank angle [rad]; springs of elastic friction
- *     start without stretch
+ *     places [m], then velocities [m/s] of all coordinates, crank angle [rad]; elastic friction has slid so
+ *     far that its spring is stretched by all of the friction
  * Out:
  *   motion [m][2*coordinate_count]
  *     places, then velocities at the samples

@@ -4,10 +4,11 @@
 !> As `segments`, of a structure: stretches of a motion of all its coordinates, each from a start of its own, with the derivatives
 !> of the samples along directions in the space of the parameters and by the start.
 module coordinate_segments
-  use jointed, only: is_stop
+  use jointed, only: is_stop, joint_elastic
   use jointed_motion, only: advance_jointed, advance_jointed_period, jointed_motion_t
   use jointed_section, only: start_of_jointed
-  use jointed_state, only: jointed_state_t
+  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use jointed_transition, only: rounding_of_speed
   use kinds, only: wp
   use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
     tally_t
@@ -50,8 +51,8 @@ module coordinate_segments
 contains
 
   !> Flies every segment of a structure: `start` = places [m], velocities [m/s], crank angle [rad] by column, its samples are at
-  !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. Springs of elastic friction start without stretch. Segments that
-  !> cannot be flown, and steady ones: as in `propagate`.
+  !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. Elastic friction has slid so far that its spring is stretched
+  !> by all of the friction. Segments that cannot be flown, and steady ones: as in `propagate`.
   pure subroutine propagate_coordinates(family, start, first, times, derivatives, samples, report)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(:, :), times(:)
@@ -120,6 +121,7 @@ contains
                                  reshape(transpose(reshape(start(:2*n), [n, 2])), [2*n]))
       end associate
       if (.not. ieee_is_finite(state%q(1))) run%reason = exit_bad_case
+      call let_slide(moving, state)
     else
       run%reason = exit_bad_case
     end if
@@ -137,6 +139,21 @@ contains
     end if
     call read_impacts(moving, run)
   end subroutine fly
+
+  !> Elastic friction slides as its surfaces move.
+  pure subroutine let_slide(moving, state)
+    type(jointed_motion_t), intent(in) :: moving
+    type(jointed_state_t), intent(inout) :: state
+    complex(wp) :: turning(moving%harmonics)
+    real(wp) :: s, u
+    integer :: j
+    turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
+    do j = 1, size(moving%machine%joints)
+      if (moving%machine%joints(j)%kind /= joint_elastic) cycle
+      call joint_motion(moving%machine, j, state%q, state%v, state%time, turning, s, u)
+      if (abs(u) > rounding_of_speed(moving%machine, j, state)) state%phase(j) = merge(1, -1, u > 0)
+    end do
+  end subroutine let_slide
 
   pure real(wp) function not_a_number()
     not_a_number = ieee_value(1.0_wp, ieee_quiet_nan)

@@ -4,13 +4,66 @@
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "referee"))
 import structures
+from scipy.integrate import solve_ivp
 from structures import Structure
+
+
+@dataclass
+class Sprung:
+    """M q'' = force(t, q, v) and friction with a spring before it slides, along a row: no closed form."""
+
+    mass: Sequence[float]
+    force: Callable[[float, np.ndarray, np.ndarray], np.ndarray]
+    row: Sequence[float]
+    stiffness: float
+    level: float
+    # +1 or -1: it slides so at the start; 0: its spring has no stretch
+    slides: int = 0
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.mass)
+
+    def along(self, q: Sequence[float], v: Sequence[float], times: np.ndarray) -> np.ndarray:
+        """Places, then velocities (times, 2 n) of a motion from its start at the first of the times."""
+        n, row = self.n, np.asarray(self.row, float)
+        longest = self.level / self.stiffness
+
+        def slope(t, y, mode):
+            total = self.force(t, y[:n], y[n:-1]) - row * self.stiffness * y[-1]
+            return np.concatenate([y[n:-1], total / np.asarray(self.mass), [0 if mode else row @ y[n:-1]]])
+
+        def ends(t, y, mode):
+            # a slide that has just begun is not ended by rounding
+            return mode * (row @ y[n:-1]) + 1e-12 if mode else longest - abs(y[-1])
+
+        ends.terminal, ends.direction = True, -1
+        mode, t = self.slides, float(times[0])
+        y = np.concatenate([q, v, [mode * longest]]).astype(float)
+        found = np.zeros((times.size, 2 * n))
+        while True:
+            span, options = (t, float(times[-1])), {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
+            way = solve_ivp(
+                slope, span, y, dense_output=True, events=ends, args=(mode,), max_step=0.05, **options
+            )
+            here = (times >= t) & (times <= way.t[-1])
+            if here.any():
+                found[here] = way.sol(times[here]).T[:, :-1]
+            if way.status != 1:
+                return found
+            t, y = float(way.t[-1]), way.y[:, -1].copy()
+            mode = 0 if mode else int(np.sign(y[-1]))
+            # just short of what it takes to slide
+            y[-1] = np.sign(y[-1]) * longest * (1 if mode else 1 - 1e-12)
 
 
 def flown(machine: Structure, q: Sequence[float], v: Sequence[float], times: np.ndarray) -> np.ndarray:
@@ -62,7 +115,7 @@ def write(
 
 def record(
     path: Path,
-    machine: Structure,
+    machine: Structure | Sprung,
     frequency: float,
     shown: Callable[[np.ndarray], Mapping[str, np.ndarray]],
     *,
@@ -79,6 +132,7 @@ def record(
     count = periods * samples
     times = period * np.concatenate([[0.0], settle + np.arange(count) / samples])
     q = np.zeros(machine.n) if start is None else np.asarray(start, float)
-    motion = flown(machine, q, np.zeros(machine.n), times)[1:]
+    follow = machine.along if isinstance(machine, Sprung) else partial(flown, machine)
+    motion = follow(q, np.zeros(machine.n), times)[1:]
     header = {"drive_frequency_rad_s": float(frequency), "phase": 0.0}
     return write(path, times[1:], shown(motion), noise, header, seed, stated)

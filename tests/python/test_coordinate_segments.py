@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from hidden_bodies import flown
+from hidden_bodies import Sprung, flown
 from separatrix.library import CaseError, Model
 from structures import Friction, Rigid, Structure
 
@@ -69,6 +69,19 @@ def test_segments_are_the_motion_of_another_simulator() -> None:
     assert found.impacts.sum() >= 3
     assert set(found.contact) == {0}
     assert found.impact.speed_after == pytest.approx(0.7 * found.impact.speed_before)
+
+
+@pytest.mark.usefixtures("library")
+def test_elastic_friction_begins_in_slide() -> None:
+    law = 'law = "elastic_coulomb"\nstiffness = 80\nforce = 0.5'
+    model = Model.from_text(CASE[: CASE.index("[contact")].replace("force = 0.15", law))
+    start, first, times = segments(6, 40)
+    found = model.coordinate_segments([], np.zeros(0), start, first, times, derivatives=False)
+    whole = machine()
+    for i, one in enumerate(start):
+        other = Sprung(whole.mass, whole.force, [1, 0], 80.0, 0.5, int(np.sign(one[2])))
+        wanted = other.along(one[:2], one[2:4], one[4] / 7 + times[:40])
+        assert found.motion[first[i] : first[i + 1]] == pytest.approx(wanted, abs=1e-7)
 
 
 @pytest.mark.usefixtures("library")

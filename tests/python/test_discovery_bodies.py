@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_bodies import record
+from hidden_bodies import Sprung, record
 from separatrix.discovery import Options, discover
 from separatrix.errors import SeparatrixError
 from structures import Friction, Rigid, Soft, Structure
@@ -36,6 +36,24 @@ between = ["second"]
 law = "newton"
 restitution = 0.73
 upper = 0.123
+"""
+RAIL = """
+body.first.mass = 1
+body.second.mass = 0.8
+watch.body = "second"
+drive.force = {law = "force", body = "first", amplitude = 6.1, frequency = 5}
+run.duration = 20
+[spring.frame]
+between = ["first"]
+stiffness = 41
+damping = 0.28
+[spring.coupling]
+between = ["first", "second"]
+stiffness = 58
+damping = 0.22
+[friction.rail]
+between = ["first"]
+force = 0.85
 """
 PAIR = """
 body = {law = "backlash_pair", mass = 1, driven_mass = 0.52, friction = 0.41}
@@ -90,6 +108,32 @@ def two(w: float, extra=lambda q, v: np.zeros(2), restitution=lambda u: 0.7) -> 
 
     rail = Friction([1, 0], lambda u: 0.15, 0.15)
     return Structure([1, 0.8], force, [rail], rigid=[Rigid([0, 1], 0.12, 1, restitution)], tolerance=1e-10)
+
+
+def played(w: float, half: float = 0.002) -> Structure:
+    """Two masses whose coupling has a free play: within it there is its damper alone."""
+
+    def force(t, q, v):
+        damper = 0.2 * (v[1] - v[0])
+        return np.array([-40 * q[0] - 0.3 * v[0] + damper + 4 * np.cos(w * t), -damper])
+
+    def spring(p, rate):
+        return 60 * p
+
+    soft = [Soft([-1, 1], half, 1, spring), Soft([-1, 1], -half, -1, spring)]
+    rail, stop = Friction([1, 0], lambda u: 0.15, 0.15), Rigid([0, 1], 0.12, 1, lambda u: 0.7)
+    return Structure([1, 0.8], force, [rail], soft, [stop], tolerance=1e-10)
+
+
+def sprung(w: float) -> Sprung:
+    """Two masses, the first on a rail whose friction has a spring."""
+
+    def force(t, q, v):
+        frame = -40 * q[0] - 0.3 * v[0]
+        coupling = 60 * (q[1] - q[0]) + 0.2 * (v[1] - v[0])
+        return np.array([frame + coupling + 6 * np.cos(w * t), -coupling])
+
+    return Sprung([1, 0.8], force, [1, 0], 100.0, 0.9)
 
 
 def pair(w: float, level=lambda u: 0.4, static=0.4) -> Structure:
@@ -159,6 +203,7 @@ class Hidden:
     noise: float = 2e-3
     frequencies: tuple[float, float, float] = (6.0, 7.5, 9.0)
     others: Mapping[str, float] = ()
+    not_tested: tuple[str, ...] = ()
 
 
 CASES = {
@@ -170,6 +215,16 @@ CASES = {
         TWO, lambda w: two(w, restitution=lambda u: 0.75 * max(u, 0.1) ** -0.2), places("first", "second"),
         "restitution_falloff@contact.stop", {"falloff": 0.2}, ("restitution_falloff", "viscous"),
         others={"body.second.mass": 0.8, "spring.coupling.stiffness": 60, "contact.stop.upper": 0.12},
+    ),
+    "a play": Hidden(
+        TWO, played, places("first", "second"), "backlash@spring.coupling",
+        {"upper": 0.002, "lower": -0.002}, ("backlash", "cubic_spring", "viscous"), noise=5e-3,
+        others={"contact.added_2.stiffness": 60, "spring.coupling.damping": 0.2},
+    ),
+    "friction with a spring": Hidden(
+        RAIL, sprung, places("first", "second"), "dahl@friction.rail",
+        {"stiffness": 100, "force": 0.9}, ("dahl", "stribeck", "viscous", "linear_spring"),
+        noise=5e-4, frequencies=(5.0, 5.5, 6.0), others={"spring.frame.stiffness": 40},
     ),
     "a pair": Hidden(
         PAIR, lambda w: pair(w, lambda u: 0.4 + 0.2 * np.exp(-((u / 0.3) ** 2)), 0.6),
@@ -183,7 +238,8 @@ CASES = {
     ),
     "place and forces": Hidden(
         ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), place_and_forces,
-        "quadratic_drag@slide", {"drag": 0.4}, others={"body.slide.mass": 1, "spring.frame.stiffness": 40},
+        "quadratic_drag@slide", {"drag": 0.4}, ("backlash", "quadratic_drag", "cubic_spring"),
+        not_tested=("backlash@spring.frame",), others={"body.slide.mass": 1, "spring.frame.stiffness": 40},
     ),
 }  # fmt: skip
 
@@ -207,6 +263,7 @@ def test_a_hidden_effect_is_named_with_its_place(name: str, tmp_path: Path) -> N
     base, made = records(hidden, tmp_path)
     verdict = discover(base, made[:2], made[2:], Options(seed=1, quick=True, candidates=hidden.asked))
     assert (verdict["outcome"], verdict["effects"]) == ("named", [hidden.effect])
+    assert set(hidden.not_tested) <= set(verdict["not_tested"])
     place = hidden.effect.partition("@")[2].split(".")[-1]
     assert place.split("-")[-1] in verdict["places"][hidden.effect]
     gap = verdict["gap"]
@@ -225,13 +282,31 @@ def test_a_hidden_effect_is_named_with_its_place(name: str, tmp_path: Path) -> N
         assert abs(one_found["value"] - value) < 4 * one_found["standard_error"], key
 
 
+ELASTIC = RAIL.replace("force = 0.85", 'law = "elastic_coulomb"\nforce = 0.85\nstiffness = 105')
+
+
 @pytest.mark.usefixtures("library")
-def test_where_nothing_is_hidden_nothing_is_found(tmp_path: Path) -> None:
-    asked = ("viscous", "quadratic_drag", "offset_force")
-    hidden = Hidden(TWO, two, places("", "second"), "", {}, noise=5e-3)
+@pytest.mark.parametrize(("case", "machine", "frequencies"), [
+    (TWO, two, (6.0, 7.5, 9.0)),
+    (ELASTIC, sprung, (5.0, 5.5, 6.0)),
+])  # fmt: skip
+def test_where_nothing_is_hidden_nothing_is_found(case, machine, frequencies, tmp_path: Path) -> None:
+    asked = ("viscous", "quadratic_drag", "offset_force", "backlash", "dahl")
+    shown = places("", "second") if case == TWO else places("first", "second")
+    hidden = Hidden(case, machine, shown, "", {}, noise=5e-3, frequencies=frequencies)
     base, made = records(hidden, tmp_path)
     verdict = discover(base, made[:2], made[2:], Options(seed=1, quick=True, candidates=asked))
     assert (verdict["outcome"], verdict["effects"]) == ("none", [])
+
+
+@pytest.mark.usefixtures("library")
+def test_a_gap_that_no_effect_asked_for_closes_gets_no_name(tmp_path: Path) -> None:
+    hidden = Hidden(TWO, lambda w: played(w, 0.01), places("first", "second"), "", {}, noise=5e-3)
+    base, made = records(hidden, tmp_path)
+    asked = Options(seed=1, quick=True, candidates=("linear_spring", "viscous"))
+    verdict = discover(base, made[:2], made[2:], asked)
+    assert verdict["effects"] == []
+    assert verdict["outcome"] in ("characterised", "not-in-catalogue")
 
 
 @pytest.mark.usefixtures("library")
@@ -256,5 +331,6 @@ def test_columns_that_mean_nothing_are_refused(columns, why, tmp_path: Path) -> 
 def test_effects_of_one_body_are_none_of_several(tmp_path: Path) -> None:
     base = tmp_path / "base.toml"
     base.write_text(TWO)
-    with pytest.raises(SeparatrixError, match="effects: found dahl, allowed for this machine viscous, "):
-        discover(base, [tmp_path / "unread.csv"], options=Options(candidates=("dahl",)))
+    why = "effects: found sensor_gain, allowed for this machine viscous, "
+    with pytest.raises(SeparatrixError, match=why):
+        discover(base, [tmp_path / "unread.csv"], options=Options(candidates=("sensor_gain",)))

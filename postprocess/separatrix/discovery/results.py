@@ -150,10 +150,10 @@ def machine_text(fitted: Fitted) -> str:
 def machine_values(fitted: Fitted) -> dict[str, float]:
     """Values of the machine as fitted, with the drive at the ratio of the case."""
     values = {
-        path: one.physical(value)
+        path: number
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
         if not one.is_nuisance
-        for path in one.paths
+        for path, number in one.numbers(value).items()
     }
     for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
         if one.path == "nuisance:drive_scale":

@@ -137,8 +137,8 @@ def _directions(
             for path, size in one.problem.amplitudes.items():
                 row[paths.index(path)] = scale * size
         elif not free.is_nuisance:
-            for path in free.paths:
-                row[paths.index(path)] = free.slope(one.fit.values[place])
+            for path, slope in free.slopes(one.fit.values[place]).items():
+                row[paths.index(path)] = slope
         if row.any():
             rows.append(row)
             places.append(place)

@@ -50,10 +50,12 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
     highest = max([1e-300, *(one.evidence for one in found.judged)])
     shares = {}
     for member in MEMBERS:
+        if not fits_machine(member, found.base.model):
+            continue
         allowed = wanted is None or any(
             name == member.effect or effect_of(name).family == member.family for name in wanted
         )
-        if not allowed or not fits_machine(member, found.base.model):
+        if not allowed:
             continue
         closed = [one.evidence for one in found.judged if effect_of(one.name).family == member.family]
         share = max([free.get(member.explains, 0.0) / most, *(one / highest for one in closed)])

@@ -8,7 +8,7 @@ import numpy as np
 
 from separatrix.discovery.decision.hypotheses import Hypothesis, Motion
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import clock_of, kicks_of
+from separatrix.discovery.fitting.joint_forces import POWERS, clock_of, kicks_of
 from separatrix.discovery.fitting.joint_response import columns_of
 from separatrix.discovery.fitting.motions import knots_of, splines
 from separatrix.discovery.fitting.refit import Fitted
@@ -67,7 +67,9 @@ def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
     for path in kicks_of(training.problem, training.fit):
 
         def at_impacts(m: Motion, _: float, path=path) -> tuple:
-            return kicks_of(m.problem, m.fit).get(path), None
+            # a held-out record may have too few of these impacts
+            nothing = np.zeros((*m.fit.evaluation.residual.shape, POWERS))
+            return kicks_of(m.problem, m.fit).get(path, nothing), None
 
         yield Hypothesis((f"impact speed at {path}",), at_impacts)
 

@@ -280,15 +280,15 @@ def _parameters(fitted: Fitted) -> dict:
             continue
         parameter = fitted.model.parameters.get(one.path)
         known = error > 0 and not held
-        ends = [one.physical(value - 1.96 * error), one.physical(value + 1.96 * error)]
-        told = {
-            "value": one.physical(value),
-            "standard_error": one.slope(value) * float(error) if known else None,
-            "interval_95": ends if known else None,
-            "note": "" if known else "at its bound" if held else "these records say nothing about it",
-            "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
-        }
-        found |= {path: dict(told) for path in one.paths}
+        low, high = (one.numbers(value + side * 1.96 * error) for side in (-1, 1))
+        for path, number in one.numbers(value).items():
+            found[path] = {
+                "value": number,
+                "standard_error": one.slope(value) * float(error) if known else None,
+                "interval_95": sorted((low[path], high[path])) if known else None,
+                "note": "" if known else "at its bound" if held else "these records say nothing about it",
+                "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
+            }
     return found
 
 

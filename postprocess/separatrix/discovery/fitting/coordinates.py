@@ -74,10 +74,10 @@ class CoordinateProblem(Problem):
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
         chosen = {
-            path: one.physical(value)
+            path: number
             for one, value in zip(self.free, values, strict=True)
             if not one.is_nuisance
-            for path in one.paths
+            for path, number in one.numbers(value).items()
         }
         prepared = self.prepared[number]
         scale = self._nuisance("nuisance:drive_scale", number, values, None)

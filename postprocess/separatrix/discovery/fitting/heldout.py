@@ -192,7 +192,10 @@ def _records_own(guess: Prediction, free: list[Free], values: np.ndarray) -> np.
 
 def _with(model, known: list[tuple[Free, float]]):
     """The machine with values written in; None where they make no case."""
-    chosen = {path: one.physical(value) for one, value in known if not one.is_nuisance for path in one.paths}
+    chosen: dict[str, float] = {}
+    for one, value in known:
+        if not one.is_nuisance:
+            chosen |= one.numbers(value)
     for one, value in known:
         if one.path == "nuisance:drive_scale":
             chosen |= {path: value * amplitude for path, amplitude in drive_amplitudes(model).items()}

@@ -7,7 +7,7 @@ ordinary one. A row of the table is an effect; its name in a verdict is `EFFECT@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -31,6 +31,8 @@ AT = "@"
 _FAR = 20.0
 # of the usual impact speed, above which a stop yields
 _YIELDS = 0.5
+# what a spring with a play in series must not have
+_NO_PLAY = ("free_length", "modulation", "modulation_cosine", "modulation_sine")
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class JointEffect:
 
     `change` (case, place, joint, scales) edits the case and returns the path of the joint whose `keys` are
     fitted, their values to start from: several of each are tried. `of` is the kind and law of the joint that
-    it needs there, '' for none.
+    it needs there, '' for none. Numbers of that joint may go over to the path that `change` returns.
     """
 
     name: str
@@ -51,6 +53,10 @@ class JointEffect:
     sizes: tuple[str, ...] = ()
     of: tuple[str, str] = ("", "")
     acts: str = "flight"
+    # numbers of the joint that are those of the returned path now
+    moved: tuple[str, ...] = ()
+    # a key and the one that is minus it
+    mirrored: tuple[str, str] = ("", "")
     # names that can be the same motion there, and when
     confused: tuple[tuple[str, str], ...] = ()
 
@@ -97,6 +103,36 @@ def _softened(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> st
     return joint.path
 
 
+def _played(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
+    """The spring acts from both ends of a play on, its damper always."""
+    family, name = joint.path.split(".")
+    table = case[family][name]
+    if any(np.any(table.get(key, 0.0)) for key in _NO_PLAY):
+        raise SeparatrixError("the spring of a play is not at its middle, or not of constant stiffness")
+    contacts = case.setdefault("contact", {})
+    added = f"added_{len(contacts) + 1}"
+    half = 0.025 * scales.length
+    contacts[added] = {
+        "between": table["between"],
+        "law": "kelvin_voigt",
+        "stiffness": table["stiffness"],
+        "upper": half,
+        "lower": -half,
+    }
+    table["stiffness"] = 0.0
+    return f"contact.{added}"
+
+
+def _sprung(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
+    """Friction with a spring in place of the friction, whose force is found anew: without, it may be 0."""
+    family, name = joint.path.split(".")
+    table = case[family].pop(name)
+    added = f"added_{len(case[family]) + 1}"
+    kept = {key: table[key] for key in ("between", "velocity") if key in table}
+    case[family][added] = {**kept, "law": "elastic_coulomb", "force": 1.0, "stiffness": 1.0}
+    return f"{family}.{added}"
+
+
 JOINT_EFFECTS = {
     one.name: one
     for one in (
@@ -136,6 +172,18 @@ JOINT_EFFECTS = {
             "linear_spring", "a spring that the case lacks", "spring over stretch",
             _new("spring", stiffness=0.0),
             lambda s: {"stiffness": [0.02 * s.force / s.length]}, ("stiffness",),
+        ),
+        JointEffect(
+            "backlash", "free play in series with a spring", "spring over stretch", _played,
+            lambda s: {"upper": [share * s.length for share in (0.025, 0.1, 0.005)]}, (), ("upper",),
+            ("spring", "linear"), moved=("stiffness",), mirrored=("upper", "lower"),
+        ),
+        JointEffect(
+            "dahl", "friction with a spring before it slides", "friction before sliding",
+            _sprung,
+            lambda s: {"stiffness": [s.friction / (share * s.length) for share in (0.02, 0.005, 0.1)],
+                       "force": [s.friction]},
+            (), ("stiffness", "force"), ("friction", "coulomb"),
         ),
         JointEffect(
             "offset_force", "a constant force", "force over place", _load,
@@ -223,8 +271,12 @@ def candidate_of(
     size = scales.at(where)
     if size is None:
         return "nothing moves there in these records"
-    if row.of[0] and not size.impact_speed > 0:
+    if row.acts == "barrier" and not size.impact_speed > 0:
         return "there are no impacts in these records"
+    if row.moved and where in scales.measured:
+        return "the force of this joint is measured, which would be that of two"
+    if row.of[0] == "friction" and not size.friction > 0:
+        return "there is no friction"
     path = ""
 
     def change(case: dict) -> None:
@@ -237,7 +289,9 @@ def candidate_of(
     except SeparatrixError as reason:
         return str(reason)
     added = []
-    whole = [one for one in free if one.is_nuisance or one.path in extended.parameters]
+    goes_over = {f"{joint.path}.{key}": f"{path}.{key}" for key in row.moved} if joint else {}
+    whole = [replace(one, path=goes_over.get(one.path, one.path)) for one in free]
+    whole = [one for one in whole if one.is_nuisance or one.path in extended.parameters]
     own = {f"{path}.{key}" for key in keys}
     if any(one.path in own for one in whole):
         return "the base machine has it, and it is fitted"
@@ -245,7 +299,9 @@ def candidate_of(
         parameter = extended.parameters[f"{path}.{key}"]
         if key in row.sizes:
             ends = np.log([min(values) / _FAR, max(values) * _FAR])
-            added.append(Free(f"{path}.{key}", float(np.log(values[0])), *ends, 0.1, positive=True))
+            mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
+            start = float(np.log(values[0]))
+            added.append(Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror))
         else:
             lower, upper = bounds_of(parameter)
             if key == "static_force":
@@ -267,5 +323,7 @@ def candidate_of(
 
 
 def _with_starts(model, added: list[Free]):
-    values = {one.path: one.physical(one.value) for one in added}
+    values: dict[str, float] = {}
+    for one in added:
+        values |= one.numbers(one.value)
     return type(model).from_text(model.to_text(values))

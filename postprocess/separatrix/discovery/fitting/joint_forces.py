@@ -17,6 +17,8 @@ _KNOTS, _HARMONICS = 6, 3
 _ALL_HARMONICS = 6
 # impacts of a contact from which on its kicks are tried
 _FEWEST_IMPACTS = 4
+POWERS = 4
+"""Of the speed before an impact, of which kicks are made: from 0 on."""
 # standard deviation of a fault of a rig over the signal
 _SIZE = 1e-3
 
@@ -76,8 +78,8 @@ def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
             row = rows[int(segment)]
             j = int(np.searchsorted(times[row][problem.segments.inside[row]], time))
             if j < problem.segments.inside[row].sum() and before > 0:
-                table = tables.setdefault(int(contact), np.zeros((*times.shape, 4)))
-                table[row, j] = -side * before ** np.arange(4)
+                table = tables.setdefault(int(contact), np.zeros((*times.shape, POWERS)))
+                table[row, j] = -side * before ** np.arange(POWERS)
     found = {}
     for contact, table in tables.items():
         hit = np.any(table != 0, axis=2)

@@ -46,8 +46,9 @@ class Free:
     varies: bool = False
     # standard error of a nuisance about 0 that a measurement of its own leaves
     error: float | None = None
-    # another path of the machine that has the same value
+    # another path of the machine that has the same value, or minus that
     also: str | None = None
+    mirrored: bool = False
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -57,6 +58,20 @@ class Free:
     def physical(self, value: float) -> float:
         """The number itself, from what is fitted."""
         return float(np.exp(value)) if self.positive else float(value)
+
+    def numbers(self, value: float) -> dict[str, float]:
+        """The numbers of all paths, from what is fitted."""
+        return self._over_paths(self.physical(value))
+
+    def slopes(self, value: float) -> dict[str, float]:
+        """Derivatives of those numbers by what is fitted."""
+        return self._over_paths(self.slope(value))
+
+    def _over_paths(self, number: float) -> dict[str, float]:
+        found = {self.path: number}
+        if self.also is not None:
+            found[self.also] = -number if self.mirrored else number
+        return found
 
     def slope(self, value: float) -> float:
         """Derivative of the number by what is fitted."""

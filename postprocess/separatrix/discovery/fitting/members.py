@@ -177,10 +177,10 @@ def _no_harmonics(known: Fitted, base: Fitted, orders: np.ndarray) -> list[np.nd
 def _values(fitted: Fitted) -> dict[str, float]:
     """Values of the machine as fitted, nuisances aside."""
     return {
-        path: one.physical(value)
+        path: number
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
         if not one.is_nuisance
-        for path in one.paths
+        for path, number in one.numbers(value).items()
     }
 
 

@@ -12,17 +12,23 @@ from separatrix.discovery.measured.bodies import Structure, structure_of
 
 # stretch or speed over the largest at any place, below which nothing moves there
 _STILL = 1e-9
+# of the friction of the case, below which a fitted one says nothing of its size
+_LOST_FRICTION = 0.1
 
 
 @dataclass(frozen=True)
 class PlaceScales:
-    """Of a place: mass that a force moves, stretch, speed, force, impact speed (0: none), in SI units."""
+    """Of a place, in SI units: mass that a force moves, stretch, speed, force, impact speed (0: none).
+
+    Of a friction of the case also its force.
+    """
 
     mass: float
     length: float
     speed: float
     force: float
     impact_speed: float
+    friction: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,8 @@ class SensedScales:
     places: dict[str, PlaceScales | None]
     # of what forces are over; they are counted on the coordinates themselves
     mass: float = 1.0
+    # joints whose force is a column
+    measured: frozenset[str] = frozenset()
 
     def at(self, name: str) -> PlaceScales | None:
         """Sizes at a place, or joint; None where nothing moves."""
@@ -63,9 +71,25 @@ def place_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
         mass = 1 / float(row @ (row / structure.mass))
         size = float(np.median(np.abs(rates @ row)) / 0.6745)
         found[name] = PlaceScales(
-            mass, length, speed, mass * size, _impact_speed(problem, fit, structure, name)
+            mass,
+            length,
+            speed,
+            mass * size,
+            _impact_speed(problem, fit, structure, name),
+            _friction(problem, fit, name),
         )
-    return SensedScales(found)
+    sensors = [sensor for one in problem.prepared for sensor in one.sensors]
+    return SensedScales(found, measured=frozenset(one.of for one in sensors if one.kind == "F"))
+
+
+def _friction(problem: CoordinateProblem, fit: Fit, name: str) -> float:
+    """Force of a friction as fitted, of the case where the fit has all but lost it; 0 of other joints [N]."""
+    path = f"{name}.force"
+    if not name.startswith("friction."):
+        return 0.0
+    of_case = problem.model.parameters[path].value
+    fitted = problem.machine_values(0, fit.values).get(path, of_case)
+    return fitted if fitted > _LOST_FRICTION * of_case else of_case
 
 
 def _impact_speed(problem: CoordinateProblem, fit: Fit, structure: Structure, name: str) -> float:

@@ -306,10 +306,10 @@ class Problem:
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
         chosen = {
-            path: one.physical(value)
+            path: number
             for one, value in zip(self.free, values, strict=True)
             if not one.is_nuisance
-            for path in one.paths
+            for path, number in one.numbers(value).items()
         }
         prepared = self.prepared[number]
         scale = self._nuisance("nuisance:drive_scale", number, values, None)
@@ -356,8 +356,8 @@ class Problem:
             elif one.path == SENSOR_ZERO and one.record == number:
                 chain[active.index(SENSOR_BIAS), j] = 1.0
             elif not one.is_nuisance:
-                for path in one.paths:
-                    chain[active.index(path), j] = one.slope(values[j])
+                for path, slope in one.slopes(values[j]).items():
+                    chain[active.index(path), j] = slope
         if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
             row = active.index("drive.ratio")
             for j, one in enumerate(self.free):

@@ -104,12 +104,6 @@ def structure_of(model: Model) -> Structure:
     for kind in KINDS:
         for name, table in case.get(kind, {}).items():
             ends = tuple(table["between"])
-            if table["law"] == "elastic_coulomb":
-                raise SeparatrixError(
-                    f"{kind}.{name}.law: found elastic_coulomb, whose stretch no start of a segment "
-                    "says; allowed "
-                    "for a base machine all other laws"
-                )
             joints.append(Joint(f"{kind}.{name}", table["law"], ends, _row(ends, names), table))
     places: dict[tuple[str, str], list[str]] = {}
     for joint in joints:
