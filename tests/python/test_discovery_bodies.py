@@ -310,6 +310,30 @@ def test_a_gap_that_no_effect_asked_for_closes_gets_no_name(tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(("row", "size", "depends_on"), [
+    # the machine of the case moves quite otherwise
+    ([0, -1, 1], 0.6, [["stretch at b-c"]]),
+    # no joint, and so no place
+    ([-1, 0, 1], 0.05, []),
+])  # fmt: skip
+def test_a_gap_without_a_name_is_told_with_its_place_or_not_at_all(row, size, depends_on, tmp_path) -> None:
+    row = np.array(row)
+
+    def waved(q: np.ndarray) -> np.ndarray:
+        return -row * size * np.sin(40 * (row @ q))
+
+    hidden = Hidden(
+        CHAIN, lambda w: chain(w, lambda q, v: waved(q)), places("a", "b", "c"), "", {},
+        frequencies=(4.0, 6.5, 8.0),
+    )  # fmt: skip
+    base, made = records(hidden, tmp_path)
+    asked = Options(seed=1, quick=True, candidates=("viscous",), most_effects=1)
+    verdict = discover(base, made[:2], made[2:], asked)
+    assert verdict["effects"] == []
+    assert [one["depends_on"] for one in verdict["character"]] == depends_on
+
+
+@pytest.mark.usefixtures("library")
 @pytest.mark.parametrize(("columns", "why"), [
     ({"x.third": 1.0}, "column 'x.third': no coordinate of this name; allowed first, second"),
     ({"x.first": 1.0, "F.rail": 1.0}, "'F.rail': the force of a joint with law coulomb is no function"),

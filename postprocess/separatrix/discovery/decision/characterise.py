@@ -83,7 +83,7 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
     if decision.outcome != "not-in-catalogue" or foretold is None or foretold.fit.excess <= 0:
         return decision
     if isinstance(base.problem, CoordinateProblem):
-        training, held_out = motion_at(base), motion_at(foretold)
+        training, held_out = motion_at(base, bench.training), motion_at(foretold, bench.held_out)
         tried = hypotheses_at(training)
     else:
         natural = _natural_frequency(bench)

@@ -3,6 +3,7 @@
 """What a missing force of a machine of several bodies may depend on, and at which place it acts."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,16 +13,32 @@ from separatrix.discovery.fitting.joint_forces import POWERS, clock_of, kicks_of
 from separatrix.discovery.fitting.joint_response import columns_of
 from separatrix.discovery.fitting.motions import knots_of, splines
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.sensed import SensedData
 
 _KNOTS, _FEWER, _HARMONICS = 8, 4, 3
 
 
-def motion_at(one: Fitted | Prediction) -> Motion:
+@dataclass(frozen=True)
+class SensedMotion(Motion):
+    """Of several bodies; `places` (segments, length, 2 n) as measured, where there is a sensor.
+
+    A missing force is that of the true motion: where the gap is large, the fitted one is another.
+    """
+
+    places: np.ndarray | None = None
+
+
+def motion_at(one: Fitted | Prediction, data: SensedData) -> SensedMotion:
     """The motion of a fit of several bodies; `t` is the time over a record, -1 to 1."""
     problem, fit = one.problem, one.fit
     good = problem.segments.inside & fit.good[:, None]
     time, phase = clock_of(problem, fit)
-    return Motion(problem, fit, 1.0, 1.0, 1.0, time, phase, None, good)
+    places = fit.evaluation.motion.copy()
+    for number in range(len(problem.prepared)):
+        rows = np.flatnonzero(problem.segments.record == number)
+        seen = data.measured(number)[problem.segments.index[rows]]
+        places[rows] = np.where(np.isnan(seen), places[rows], seen)
+    return SensedMotion(problem, fit, 1.0, 1.0, 1.0, time, phase, None, good, places)
 
 
 def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
@@ -78,9 +95,9 @@ def _pushed(motion: Motion, forces: np.ndarray, row: np.ndarray) -> np.ndarray:
     return columns_of(motion.problem, motion.fit, forces, row)
 
 
-def _stretch(motion: Motion, row: np.ndarray) -> np.ndarray:
-    return motion.fit.evaluation.motion[:, :, : row.size] @ row
+def _stretch(motion: SensedMotion, row: np.ndarray) -> np.ndarray:
+    return motion.places[:, :, : row.size] @ row
 
 
-def _speed(motion: Motion, row: np.ndarray) -> np.ndarray:
-    return motion.fit.evaluation.motion[:, :, row.size :] @ row
+def _speed(motion: SensedMotion, row: np.ndarray) -> np.ndarray:
+    return motion.places[:, :, row.size :] @ row

@@ -105,7 +105,7 @@ class SensedData(Data):
         prepared = self.prepared[number]
         key = (number, prepared.phase, prepared.frequency)
         if key not in self._guesses:
-            known = self._measured(number)
+            known = self.measured(number)
             unseen = np.isnan(known[0])
             self._guesses = {one: table for one, table in self._guesses.items() if one[0] != number}
             self._guesses[key] = known
@@ -114,7 +114,7 @@ class SensedData(Data):
                 self._guesses[key] = self._chained(number, known, observed, unseen)
         return self._guesses[key]
 
-    def _measured(self, number: int) -> np.ndarray:
+    def measured(self, number: int) -> np.ndarray:
         """What sensors show of places and velocities; not numbers elsewhere."""
         structure, seen = self.structure, self.bodies[number]
         n = structure.n
