@@ -40,6 +40,8 @@ module branch
   real(wp), parameter :: no_turn = 1e-11_wp
   !> Nearness of a multiplier to that of a doubling at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-2_wp
+  !> The halves of an orbit are the same where they differ by less than this share of what they did a step before.
+  real(wp), parameter :: same_halves = 1e-2_wp
 
 contains
 
@@ -142,7 +144,7 @@ contains
     end do
     if (swaps_halves(trace, next)) then
       call end_at_parent(family, trace, length, points, ending)
-      return
+      if (ending /= no_label) return
     end if
     if (has_vanished(trace, next)) then
       call end_at_rest(family, trace, length, points, ending)
@@ -186,14 +188,16 @@ contains
     difference = difference/trace%machines%centre%size_of
   end function halves_differ
 
-  !> Whether the halves of an orbit have changed places: in between it was one of half the period.
+  !> Whether the halves of an orbit have changed places: in between it was one of half the period, or an impact has passed the
+  !> section.
   pure logical function swaps_halves(trace, next)
     type(trace_t), intent(in) :: trace, next
     swaps_halves = modulo(trace%now%orbit%periods, 2) == 0
     if (swaps_halves) swaps_halves = sum(halves_differ(trace)*halves_differ(next)) < 0
   end function swaps_halves
 
-  !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze.
+  !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze; none if the halves are not
+  !> the same anywhere on the step.
   subroutine end_at_parent(family, trace, length, points, ending)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: trace
@@ -202,10 +206,10 @@ contains
     integer, intent(out) :: ending
     type(trace_t) :: there, tried
     real(wp) :: low, high, middle
-    logical :: ok
+    logical :: ok, all_ok
     integer :: i, steps
-    ending = label_not_known
     there = trace
+    all_ok = .true.
     low = 0
     high = length
     do i = 1, most_secants
@@ -213,6 +217,7 @@ contains
       call step_to(family, trace, middle, tried, ok, steps)
       ! At the end itself the equations are singular: it is approached from this side.
       if (ok) there = tried
+      all_ok = all_ok .and. ok
       if (.not. ok .or. sum(halves_differ(trace)*halves_differ(there)) < 0) then
         high = middle
       else
@@ -220,6 +225,8 @@ contains
       end if
       if (high - low <= 4*spacing(high)) exit
     end do
+    ending = no_label
+    if (all_ok .and. norm2(halves_differ(there)) > same_halves*norm2(halves_differ(trace))) return
     ending = label_pd
     ! It began in a graze, or in a doubling, where the orbit of twice the period has a multiplier +1.
     if (any(there%margins%list%kind == of_impact .and. abs(there%margins%list%value) < at_graze)) then
