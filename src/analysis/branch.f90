@@ -21,7 +21,7 @@ module branch
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
   use orbit_motion, only: is_admissible, orbit_of_motion
-  use periodic_orbit, only: correct_orbit, direct, move_along, orbit_t, scales_of_orbit
+  use periodic_orbit, only: closing_time, correct_orbit, direct, move_along, orbit_t, scales_of_orbit
   use search_watch, only: search_watch_t
   use soft_graze, only: is_touch
   implicit none
@@ -178,18 +178,26 @@ contains
     trace = next
   end subroutine go_on
 
-  !> What the second half of an orbit of even period differs by from the first, in natural sizes.
+  !> What the second half of an orbit of even period differs by from the first, in natural sizes: in the instants of the events, and
+  !> without any in the section points. Points would jump where an impact passes the section.
   pure function halves_differ(trace) result(difference)
     type(trace_t), intent(in) :: trace
-    real(wp) :: difference(size(trace%now%orbit%y))
+    real(wp), allocatable :: difference(:)
     real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
-    points = section_points(trace%machines, trace%now%orbit)
-    difference = points(:, 1 + trace%now%orbit%periods/2) - points(:, 1)
-    difference = difference/trace%machines%centre%size_of
+    associate (orbit => trace%now%orbit, machine => trace%machines%centre, half => size(trace%now%orbit%events)/2)
+      if (size(orbit%events) == 0) then
+        points = section_points(trace%machines, orbit)
+        difference = (points(:, 1 + orbit%periods/2) - points(:, 1))/machine%size_of
+      else if (modulo(size(orbit%events), 2) == 0) then
+        difference = orbit%events(half + 1:)%time - orbit%events(:half)%time - closing_time(machine, orbit)/2
+        difference = difference/machine%size_of_time()
+      else
+        allocate (difference(0))
+      end if
+    end associate
   end function halves_differ
 
-  !> Whether the halves of an orbit have changed places: in between it was one of half the period, or an impact has passed the
-  !> section.
+  !> Whether the halves of an orbit may have changed places: in between it was one of half the period.
   pure logical function swaps_halves(trace, next)
     type(trace_t), intent(in) :: trace, next
     swaps_halves = modulo(trace%now%orbit%periods, 2) == 0
