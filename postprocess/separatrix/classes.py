@@ -138,4 +138,7 @@ def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
         return "not periodic"
     names = flag_names(catalogue["kind"])
     kinds = {names.get(int(kind), "") for kind in np.unique(catalogue["kind"].values[mine])}
-    return "chaotic" if kinds == {"chaotic"} else "not known to be periodic"
+    texts = {"chaotic": "chaotic", "family": "a family of cycles"}
+    return (
+        texts.get(kinds.pop(), "not known to be periodic") if len(kinds) == 1 else "not known to be periodic"
+    )

@@ -79,9 +79,13 @@ CATALOGUE = {
     "mean_impact_speed": (np.float64, "m/s", "mean speed before impact"),
     "grazing_margin": (np.float64, "m", "smallest distance to a barrier missed"),
     "count": (np.int64, "1", "points of the map captured"),
-    "kind": (np.int8, "1", "whether it is a cycle, rest, chaotic, or nothing of them is known"),
+    "kind": (
+        np.int8,
+        "1",
+        "whether it is a cycle, rest, chaotic, a family of cycles, or nothing of them is known",
+    ),
 }
-KINDS = ("cycle", "rest", "chaotic", "not_known")
+KINDS = ("cycle", "rest", "chaotic", "not_known", "family")
 # name: dimensions, unit, meaning
 CYCLES = {
     "multiplier_real": (("entry", "coordinate"), "1", "real parts of the multipliers"),

@@ -21,7 +21,7 @@ module branch
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
   use orbit_motion, only: is_admissible, orbit_of_motion
-  use periodic_orbit, only: correct_orbit, direct, move_along, orbit_t, scales_of_orbit
+  use periodic_orbit, only: closing_time, correct_orbit, direct, move_along, orbit_t, scales_of_orbit
   use search_watch, only: search_watch_t
   use soft_graze, only: is_touch
   implicit none
@@ -40,6 +40,8 @@ module branch
   real(wp), parameter :: no_turn = 1e-11_wp
   !> Nearness of a multiplier to that of a doubling at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-2_wp
+  !> The halves of an orbit are the same where they differ by less than this share of what they did a step before.
+  real(wp), parameter :: same_halves = 1e-2_wp
 
 contains
 
@@ -142,7 +144,7 @@ contains
     end do
     if (swaps_halves(trace, next)) then
       call end_at_parent(family, trace, length, points, ending)
-      return
+      if (ending /= no_label) return
     end if
     if (has_vanished(trace, next)) then
       call end_at_rest(family, trace, length, points, ending)
@@ -176,24 +178,34 @@ contains
     trace = next
   end subroutine go_on
 
-  !> What the second half of an orbit of even period differs by from the first, in natural sizes.
+  !> What the second half of an orbit of even period differs by from the first, in natural sizes: in the instants of the events, and
+  !> without any in the section points. Points would jump where an impact passes the section.
   pure function halves_differ(trace) result(difference)
     type(trace_t), intent(in) :: trace
-    real(wp) :: difference(size(trace%now%orbit%y))
+    real(wp), allocatable :: difference(:)
     real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
-    points = section_points(trace%machines, trace%now%orbit)
-    difference = points(:, 1 + trace%now%orbit%periods/2) - points(:, 1)
-    difference = difference/trace%machines%centre%size_of
+    associate (orbit => trace%now%orbit, machine => trace%machines%centre, half => size(trace%now%orbit%events)/2)
+      if (size(orbit%events) == 0) then
+        points = section_points(trace%machines, orbit)
+        difference = (points(:, 1 + orbit%periods/2) - points(:, 1))/machine%size_of
+      else if (modulo(size(orbit%events), 2) == 0) then
+        difference = orbit%events(half + 1:)%time - orbit%events(:half)%time - closing_time(machine, orbit)/2
+        difference = difference/machine%size_of_time()
+      else
+        allocate (difference(0))
+      end if
+    end associate
   end function halves_differ
 
-  !> Whether the halves of an orbit have changed places: in between it was one of half the period.
+  !> Whether the halves of an orbit may have changed places: in between it was one of half the period.
   pure logical function swaps_halves(trace, next)
     type(trace_t), intent(in) :: trace, next
     swaps_halves = modulo(trace%now%orbit%periods, 2) == 0
     if (swaps_halves) swaps_halves = sum(halves_differ(trace)*halves_differ(next)) < 0
   end function swaps_halves
 
-  !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze.
+  !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze; none if the halves are not
+  !> the same anywhere on the step.
   subroutine end_at_parent(family, trace, length, points, ending)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: trace
@@ -202,10 +214,10 @@ contains
     integer, intent(out) :: ending
     type(trace_t) :: there, tried
     real(wp) :: low, high, middle
-    logical :: ok
+    logical :: ok, all_ok
     integer :: i, steps
-    ending = label_not_known
     there = trace
+    all_ok = .true.
     low = 0
     high = length
     do i = 1, most_secants
@@ -213,6 +225,7 @@ contains
       call step_to(family, trace, middle, tried, ok, steps)
       ! At the end itself the equations are singular: it is approached from this side.
       if (ok) there = tried
+      all_ok = all_ok .and. ok
       if (.not. ok .or. sum(halves_differ(trace)*halves_differ(there)) < 0) then
         high = middle
       else
@@ -220,6 +233,8 @@ contains
       end if
       if (high - low <= 4*spacing(high)) exit
     end do
+    ending = no_label
+    if (all_ok .and. norm2(halves_differ(there)) > same_halves*norm2(halves_differ(trace))) return
     ending = label_pd
     ! It began in a graze, or in a doubling, where the orbit of twice the period has a multiplier +1.
     if (any(there%margins%list%kind == of_impact .and. abs(there%margins%list%value) < at_graze)) then

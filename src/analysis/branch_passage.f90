@@ -313,13 +313,13 @@ contains
         if (fits(way)) fits(way) = all(tried(way)%margins%list%value > -no_passage)
         if (fits(way)) fits(way) = is_admissible(tried(way)%machines, tried(way)%now%orbit)
       end do
-      ! So near the point that both sides are on it within rounding: a longer look tells them apart.
       if (any(fits) .and. .not. (found .and. all(fits))) then
         there = tried(findloc(fits, .true., 1))
         beyond_step = max(look, 0.1_wp*step)
+        found = .true.
+        ! So near the point both sides may be on it within rounding: a longer look tells them apart.
+        if (.not. all(fits) .and. all(there%margins%list%value > no_passage)) exit
       end if
-      found = found .or. any(fits)
-      if (count(fits) == 1) exit
       look = 10*look
     end do
     ok = found

@@ -83,21 +83,29 @@ contains
   end subroutine put_on_graze
 
   !> Whether an impact loses its speed where another barrier is just missed: an orbit and its mirror image become one there, and
-  !> all that touches in other sequences begins there too.
+  !> all that touches in other sequences begins there too. A barrier that is missed beside an impact that loses its speed is that
+  !> impact's own.
   pure logical function grazes_twice(trace)
     type(trace_t), intent(in) :: trace
-    integer :: i
+    logical :: lost(size(trace%margins%list))
+    integer :: i, k
     grazes_twice = .false.
-    do i = 1, size(trace%margins%list)
-      associate (one => trace%margins%list(i))
-        if (one%kind /= of_impact .or. .not. abs(one%value) < at_graze .or. is_touch(trace%now%orbit, one)) cycle
-        associate (event => trace%now%orbit%events(one%event))
-          grazes_twice = grazes_twice .or. any(trace%margins%list%kind == of_gap .and. &
-            abs(trace%margins%list%value) < at_graze .and. (trace%margins%list%side /= event%side .or. &
-                                                            trace%margins%list%joint /= event%joint))
-        end associate
-      end associate
-    end do
+    associate (list => trace%margins%list, events => trace%now%orbit%events)
+      do i = 1, size(list)
+        lost(i) = list(i)%kind == of_impact .and. abs(list(i)%value) < at_graze
+        if (lost(i)) lost(i) = .not. is_touch(trace%now%orbit, list(i))
+      end do
+      if (.not. any(lost)) return
+      do k = 1, size(list)
+        if (list(k)%kind /= of_gap .or. .not. abs(list(k)%value) < at_graze) cycle
+        grazes_twice = .true.
+        do i = 1, size(list)
+          if (.not. lost(i)) cycle
+          if (events(list(i)%event)%side == list(k)%side .and. events(list(i)%event)%joint == list(k)%joint) grazes_twice = .false.
+        end do
+        if (grazes_twice) return
+      end do
+    end associate
   end function grazes_twice
 
   !> Whether an orbit is one of a shorter period, run through several times: in the graze of that the branch ends.

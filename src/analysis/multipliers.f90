@@ -28,13 +28,20 @@ contains
     complex(wp) :: values(size(matrix, 1)), vectors(size(matrix, 1), size(matrix, 1)), moved
     logical :: ok
     integer :: i, k
-    if (size(matrix, 1) <= 2 .or. .not. all(abs(matrix) < unreachable)) then
-      values = matrix(1, 1)
-      if (size(matrix, 1) <= 2) values = eigenvalues(matrix, determinant)
+    if (size(matrix, 1) <= 2) then
+      values = eigenvalues(matrix, determinant)
+      return
+    else if (.not. all(abs(matrix) < unreachable)) then
+      values = ieee_value(1.0_wp, ieee_quiet_nan)
+      values(1) = matrix(1, 1)
       return
     end if
     call general_eigen(matrix, values, vectors, ok)
-    if (.not. ok) values = unreachable
+    if (.not. ok) then
+      values = ieee_value(1.0_wp, ieee_quiet_nan)
+      values(1) = unreachable
+      return
+    end if
     where (abs(aimag(values)) <= 1e-12_wp*maxval(abs(values))) values = cmplx(real(values), 0.0_wp, wp)
     do i = 2, size(values)
       moved = values(i)

@@ -286,7 +286,7 @@ contains
       if (allocated(determinant)) deallocate (determinant)
     end if
     orbit%multipliers = multipliers_of(orbit%matrix, determinant)
-    if (ok .and. any(orbit%multipliers /= orbit%multipliers)) call add_hidden(machines, orbit)
+    if (any(orbit%multipliers /= orbit%multipliers)) call add_hidden(machines, orbit)
   end subroutine set_multipliers
 
   !> Finite multipliers that rounding hides behind that of a graze: the event whose guard is met at the least rate apart from the

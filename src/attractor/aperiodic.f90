@@ -1,15 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A motion that has come to no cycle: the box of its section points, its features over many periods, and whether neighbouring
-!> motions drift apart, without which nobody knows what it is: perhaps a long transient.
+!> A motion that has come to no attracting cycle: the box of its section points, its features over many periods, and whether
+!> neighbouring motions drift apart, or it is one of a family of cycles, without which nobody knows what it is: perhaps a long
+!> transient.
 module aperiodic
-  use attractors, only: attractor_t, kind_chaotic, kind_not_known, make_points, most_coordinates
+  use attractors, only: attractor_t, kind_chaotic, kind_family, kind_not_known, make_points, most_coordinates
   use capture, only: captor_of
   use circle, only: nearest_turn, point_near
+  use cycle, only: derivative, map_point
   use elementary, only: exponential, logarithm
   use exact_return, only: returns_t, watch_returns
   use kinds, only: int64, wp
+  use matrices, only: eigenvalues
   use motion, only: motion_t
   use motion_features, only: features_over
   use motion_state, only: tally_t
@@ -18,7 +21,7 @@ module aperiodic
   implicit none
   private
 
-  public :: watch_long, outlast, meets_chaos, add_aperiodic
+  public :: watch_long, tell_family, outlast, meets_chaos, add_aperiodic
 
   !> Drive periods over which the motion is watched, and batches of them whose mean drifts are compared.
   integer, parameter :: box_periods = 512, batches = 16
@@ -30,6 +33,8 @@ module aperiodic
   real(wp), parameter :: errors_apart = 3
   !> Growth of the distance of neighbours a period (a logarithm) below which it may be that of a family, whose periods differ.
   real(wp), parameter :: slowest_drift = 1e-3_wp
+  !> One of a family of cycles comes back to this, in units of the motion's size, and has a multiplier that is 1 to that.
+  real(wp), parameter :: comes_back = 1e-10_wp, neutral = 1e-6_wp
 
 contains
 
@@ -75,6 +80,39 @@ contains
     found%features%word = 0
     call judge_drift(drift, found)
   end subroutine watch_long
+
+  !> Whether a motion of half range `amplitude` [m] that `watch_long` did not know, now at `strobe`, is one of a family of cycles of
+  !> at most `max_period` drive periods: it comes back to rounding, and has a multiplier +1. Beside a fold of cycles it does not
+  !> come back so well.
+  pure subroutine tell_family(moving, strobe, amplitude, max_period, found)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    real(wp), intent(in) :: amplitude
+    integer, intent(in) :: max_period
+    type(attractor_t), intent(inout) :: found
+    real(wp), dimension(found%coordinates) :: point, image
+    real(wp) :: jacobian(found%coordinates, found%coordinates), scale(most_coordinates), here(most_coordinates)
+    type(tally_t) :: unused
+    integer :: n, period
+    logical :: ok
+    if (found%kind /= kind_not_known) return
+    n = found%coordinates
+    scale = max(scales_of(moving, amplitude), tiny(amplitude))
+    here = section_point(moving, strobe)
+    point = here(:n)
+    do period = 1, max_period
+      call map_point(moving, point, period, image, unused, ok)
+      if (.not. ok) return
+      if (norm2((point_near(image, point, moving%machine%turn) - point)/scale(:n)) <= comes_back) exit
+    end do
+    if (period > max_period) return
+    call derivative(moving, point, period, scale(:n), jacobian, ok)
+    if (.not. ok) return
+    if (minval(abs(eigenvalues(jacobian) - 1)) > neutral) return
+    found%kind = kind_family
+    found%multiplier = 1
+    found%duration = period*moving%machine%period
+  end subroutine tell_family
 
   !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the catalogue
   !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly.
@@ -165,7 +203,8 @@ contains
     found%kind = merge(kind_chaotic, kind_not_known, mean > max(errors_apart*error, slowest_drift))
   end subroutine judge_drift
 
-  !> Adds what `watch_long` found to a catalogue. One of the same regime whose box meets it is widened instead.
+  !> Adds what `watch_long` found to a catalogue. One of the same regime whose box meets it is widened instead; cycles of a family
+  !> are one entry.
   pure subroutine add_aperiodic(moving, found, catalogue)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: found
@@ -173,7 +212,7 @@ contains
     integer :: k
     do k = 1, size(catalogue)
       if (catalogue(k)%period /= 0 .or. catalogue(k)%features%regime /= found%features%regime) cycle
-      if (boxes_meet(found, catalogue(k))) then
+      if (belong_together(found, catalogue(k))) then
         ! What is not known does not widen what is.
         if (found%kind == kind_not_known .and. catalogue(k)%kind == kind_chaotic) return
         if (found%kind == kind_chaotic .and. catalogue(k)%kind == kind_not_known) then
@@ -190,6 +229,16 @@ contains
     k = size(catalogue)
     catalogue(k)%section = section_state(moving, found%points(:, 1))
   end subroutine add_aperiodic
+
+  !> Whether two motions without a period of one regime are one entry.
+  pure logical function belong_together(a, b)
+    type(attractor_t), intent(in) :: a, b
+    if (a%kind == kind_family .or. b%kind == kind_family) then
+      belong_together = a%kind == b%kind .and. .not. abs(a%duration - b%duration) > 0
+    else
+      belong_together = boxes_meet(a, b)
+    end if
+  end function belong_together
 
   !> Whether the boxes of two motions have a point in common.
   pure logical function boxes_meet(a, b)

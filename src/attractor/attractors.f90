@@ -22,9 +22,11 @@ module attractors
     'stuck']
 
   !> What an entry of a catalogue is: a cycle; the positions of rest; a motion that is not periodic, for neighbouring motions
-  !> drift apart; one that is neither known to be periodic nor seen to be anything else, perhaps a long transient.
-  integer, parameter, public :: kind_cycle = 1, kind_rest = 2, kind_chaotic = 3, kind_not_known = 4, last_kind = 4
-  character(len=*), parameter, public :: kind_names(last_kind) = [character(len=9) :: 'cycle', 'rest', 'chaotic', 'not_known']
+  !> drift apart; one that is neither known to be periodic nor seen to be anything else, perhaps a long transient; cycles side by
+  !> side that neither attract nor repel each other, so that every start has its own.
+  integer, parameter, public :: kind_cycle = 1, kind_rest = 2, kind_chaotic = 3, kind_not_known = 4, kind_family = 5, last_kind = 5
+  character(len=*), parameter, public :: kind_names(last_kind) = [character(len=9) :: 'cycle', 'rest', 'chaotic', 'not_known', &
+    'family']
 
   !> Longest period in drive periods that is looked for near a return of the motion, and of one that returns to the bit.
   integer, parameter, public :: longest_period = 64, longest_exact_period = 1024
@@ -73,7 +75,7 @@ module attractors
     integer :: places = 0
     !> A cycle of a machine without a clock: its section is where the watched coordinate turns round, see `turn_section`.
     logical :: by_event = .false.
-    !> Time that one cycle takes [s]; 0 of what is none.
+    !> Time that one cycle takes, of a family each [s]; 0 of what is none.
     real(wp) :: duration = 0
     !> Section points, canonical one first; for period 0 lower and upper corner of the box.
     real(wp), allocatable :: points(:, :)

@@ -23,6 +23,8 @@ module cycle
   public :: map_point, refine_cycle, scale_of, derivative, direction
 
   integer, parameter :: most_newton = 20, most_halvings = 30
+  !> A cycle attracts if its largest multiplier is below this: nearer to 1 rounding of the derivatives decides.
+  real(wp), parameter, public :: unattractive = 1 - 1e-7_wp
   !> Differences that change by less when their step is quartered are taken as they are; divisions tried otherwise.
   real(wp), parameter :: smooth = 1e-6_wp
   integer, parameter :: most_divisions = 7
@@ -90,7 +92,7 @@ contains
       if (.not. found) return
       if (i == 1) attractor%multiplier = spectral_radius(jacobian)
       if (i == 1) attractor%multipliers(:n) = eigenvalues(jacobian)
-      found = attractor%multiplier < 1 - 1e-7_wp
+      found = attractor%multiplier < unattractive
       if (.not. found) return
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do

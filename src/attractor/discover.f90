@@ -4,7 +4,7 @@
 !> Builds the catalogue of attractors of one machine from a sample of starts. Serial and in a fixed order; frozen
 !> before any trajectory of a map is labelled.
 module discover
-  use aperiodic, only: add_aperiodic, meets_chaos, outlast, watch_long
+  use aperiodic, only: add_aperiodic, meets_chaos, outlast, tell_family, watch_long
   use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_rest, longest_period, make_points, &
     most_coordinates, regime_at_rest, regime_non_impact
   use capture, only: captor_of
@@ -112,6 +112,7 @@ contains
         if (.not. holds(catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
         return
       end if
+      if (.not. has_no_clock(moving)) call tell_family(moving, strobe, stretch%amplitude, min(max_period, longest_period), found)
       if (lasts .or. found%kind /= kind_chaotic .or. meets_chaos(catalogue, found)) exit
       call outlast(moving, catalogue, strobe, known, ok)
       if (known .or. .not. ok) return

@@ -7,7 +7,7 @@
 module exact_return
   use attractors, only: attractor_t, longest_exact_period, make_points, most_coordinates
   use circle, only: point_near
-  use cycle, only: derivative, direction, directions, rings, scale_of
+  use cycle, only: derivative, direction, directions, rings, scale_of, unattractive
   use kinds, only: int64, wp
   use matrices, only: eigenvalues
   use motion, only: motion_t
@@ -68,7 +68,7 @@ contains
   end subroutine watch_returns
 
   !> The attractor of a state on the section that comes back after `period` drive periods. `found` is false if it is not
-  !> stable, or its return owed to rounding. A cycle with a completed chatter has the multipliers 0.
+  !> stable, one of a family, or its return owed to rounding. A cycle with a completed chatter has the multipliers 0.
   pure subroutine exact_cycle(moving, strobe, period, attractor, found)
     type(motion_t), intent(in) :: moving
     type(strobe_t), intent(in) :: strobe
@@ -109,6 +109,8 @@ contains
       if (.not. found) return
       attractor%multipliers(:n) = eigenvalues(jacobian)
       attractor%multiplier = abs(attractor%multipliers(1))
+      found = attractor%multiplier < unattractive
+      if (.not. found) return
     end if
     call verify(moving, attractor, chattered(:attractor%period), found)
   end subroutine exact_cycle

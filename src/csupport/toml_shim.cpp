@@ -259,7 +259,9 @@ bool refuse_bad_bytes(const std::string &text, Document &document) {
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t length = sequence_at(text, at);
     if (length == 0) {
-      document.fail("the text is not valid UTF-8", line, static_cast<int>(at - line_begin) + 1);
+      const bool hdf5 = text.compare(0, 4, "\x89HDF") == 0;
+      document.fail(hdf5 ? "found an HDF5 file, allowed a case in TOML" : "the text is not valid UTF-8", line,
+                    static_cast<int>(at - line_begin) + 1);
       return true;
     }
     if (text[at] == '\n') {

@@ -4,7 +4,7 @@
 !> What is said of the attractors of a map.
 module catalogue_report
   use angle_units, only: unit_of
-  use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_not_known, regime_names
+  use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_family, kind_not_known, regime_names
   use basin, only: catalogue_t
   use journal, only: journal_t
   use kinds, only: wp
@@ -107,6 +107,8 @@ contains
         line = line//', chaotic'
       case (kind_not_known)
         line = line//', not known to be periodic'
+      case (kind_family)
+        line = line//', a family of cycles: every start has its own'
       case default
         if (attractor%by_event) then
           line = line//', limit cycle of '//to_text(attractor%duration, 8)//' s'

@@ -164,8 +164,8 @@ contains
             all_of_them%kind /= kind_not_known))
     call add('count', type_int64, '1', 'points of the map captured', real(counts, wp))
     call schema%add_variable('kind', type_int8, ['entry'], units=coded_unit, group='catalogue', &
-      long_name='whether it is a cycle, rest, chaotic, or nothing of them is known', flag_values=[(i, i=1, last_kind)], &
-      flag_meanings=join(kind_names, ' '), data=real(all_of_them%kind, wp))
+      long_name='whether it is a cycle, rest, chaotic, a family of cycles, or nothing of them is known', &
+      flag_values=[(i, i=1, last_kind)], flag_meanings=join(kind_names, ' '), data=real(all_of_them%kind, wp))
     call add_cycles(schema, all_of_them)
 
   contains

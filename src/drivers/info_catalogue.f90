@@ -3,7 +3,7 @@
 
 !> The catalogue of a file as `separatrix info` tells it.
 module info_catalogue
-  use attractors, only: kind_chaotic, kind_names, kind_not_known, last_kind, regime_names
+  use attractors, only: kind_chaotic, kind_family, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t
   use event_words, only: word_text
   use journal, only: json_text
@@ -130,6 +130,8 @@ contains
       text = ', "kind": '//json_text(trim(kind_names(kind)))
     else if (kind == kind_chaotic) then
       text = ', chaotic'
+    else if (kind == kind_family) then
+      text = ', a family of cycles'
     else if (kind == kind_not_known) then
       text = ', not known to be periodic: perhaps a long transient'
     end if

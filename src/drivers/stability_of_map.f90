@@ -3,7 +3,7 @@
 
 !> `separatrix stability MAP`: what the entries of a map's catalogue are that have no period.
 module stability_of_map
-  use attractors, only: kind_rest
+  use attractors, only: kind_family, kind_rest
   use body_family, only: family_t
   use case_reader, only: load_case_text
   use case_setup, only: grid_of
@@ -118,7 +118,7 @@ contains
     if (reader%has('/catalogue/kind')) then
       call reader%read_values('/catalogue/kind', kinds, error)
       if (allocated(error)) return
-      wanted = wanted .and. nint(kinds) /= kind_rest
+      wanted = wanted .and. nint(kinds) /= kind_rest .and. nint(kinds) /= kind_family
     end if
     rows = pack([(i, i=1, total)], wanted)
     allocate (entries(size(rows)))

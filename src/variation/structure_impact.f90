@@ -101,7 +101,7 @@ contains
   end subroutine strike_with_slopes
 
   !> Impulses of the contacts in `list` for their opening speeds `gamma` [m/s], and the derivatives of these, not a number where an
-  !> impulse is not smooth.
+  !> impulse is not smooth. One alone goes on smoothly where the contact opens already, beyond a graze: it pulls there.
   pure subroutine find_impulses(machine, list, side, plastic, gamma, impulse, slopes)
     type(jointed_t), intent(in) :: machine
     integer, intent(in) :: list(:), side(:)
@@ -111,10 +111,13 @@ contains
     real(wp) :: near(most_joints), h, values(most_joints, -2:2), forth, back
     integer :: m, i, k
     m = size(list)
-    call impulses(gamma, impulse)
     slopes = 0
-    if (m == 1) slopes(1, 1) = lone_slope(machine, list(1), gamma(1), plastic)
-    do i = 1, merge(m, 0, m > 1)
+    if (m == 1) then
+      call lone_impulse(machine, list(1), gamma(1), plastic, impulse(1), slopes(1, 1))
+      return
+    end if
+    call impulses(gamma, impulse)
+    do i = 1, m
       ! What rests on a contact stays there: only what really closes is varied.
       h = step*maxval(abs(gamma(:m)))
       do k = -2, 2
@@ -152,13 +155,14 @@ contains
 
   end subroutine find_impulses
 
-  !> How the impulse of one contact alone, -(1 + e) gamma/g, changes with its opening speed.
-  pure real(wp) function lone_slope(machine, j, gamma, plastic) result(slope)
+  !> The impulse of one contact alone, -(1 + e) gamma/g, and how it changes with its opening speed.
+  pure subroutine lone_impulse(machine, j, gamma, plastic, impulse, slope)
     type(jointed_t), intent(in) :: machine
     integer, intent(in) :: j
     real(wp), intent(in) :: gamma
     logical, intent(in) :: plastic
-    real(wp) :: h, e(-2:2), change
+    real(wp), intent(out) :: impulse, slope
+    real(wp) :: h, e(-2:2), change, g
     integer :: k
     associate (joint => machine%joints(j))
       change = 0
@@ -169,8 +173,10 @@ contains
         ! Of a restitution that depends on the speed.
         if (joint%contact%kind /= 0) change = (8*(e(1) - e(-1)) - (e(2) - e(-2)))/(12*h)
       end if
-      slope = -(1 + e(0) + change*gamma)/sum(joint%row*matmul(machine%mobility, joint%row))
+      g = sum(joint%row*matmul(machine%mobility, joint%row))
+      impulse = -(1 + e(0))*gamma/g
+      slope = -(1 + e(0) + change*gamma)/g
     end associate
-  end function lone_slope
+  end subroutine lone_impulse
 
 end module structure_impact

@@ -69,6 +69,21 @@ def test_a_family_of_orbits_is_called_one(run):
         assert result["branch"].values.max() == 1
 
 
+def test_an_impact_may_pass_the_section_where_a_doubling_ends(run):
+    """A machine without symmetry has no branch points: the doubled orbits end in the orbit that doubled."""
+    out, ended = run(
+        "budd_dux", "--parameter", "contact.upper", "--from", "-1", "--to", "-0.85", "--searches", "3"
+    )
+    assert ended.returncode == 0, ended.stderr
+    with open_result(out) as result:
+        labels = decode_flags(result["label"]).values
+        assert not {"BP", "closed"} & set(labels)
+        doubled = (labels == "PD") & (result["period"].values == 4)
+        near = doubled & (abs(result["parameter"].values + 0.9435527583705) < 1e-9)
+        assert near.sum() == 1
+        assert result["multiplier_real"].values[near][0] == pytest.approx([1, 0.8**16], abs=1e-8)
+
+
 STOPS = """
 body = { mass = 2, gravity = 9.81 }
 restoring = { law = "linear", stiffness = 50 }

@@ -3,6 +3,7 @@
 """Equilibria of a machine without a clock in what `branches` says, in its file and its figure."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -101,7 +102,11 @@ def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp
         assert result["rest_x_high"].values == pytest.approx(0.9, abs=1e-12)
         assert result["rest_x_low"].attrs["units"] == "m"
         assert "as far as no stop is in the way" in result["rest_x_high"].attrs["long_name"]
+        unknown = {name: result[name] * math.nan for name in ("rest_x_low", "rest_x_high")}
+        texts = figures(result.assign(unknown), "")["branches"].axes[0].texts
+        assert [text.get_text() for text in texts] == ["between which places is not known"]
         drawn = figures(result, "")["branches"].axes[0]
+        assert not drawn.texts
         assert drawn.get_ylabel().startswith("position at rest")
         assert [piece.tolist() for piece in drawn.collections[0].get_segments()] == [
             [[value, pytest.approx(0.1)], [value, pytest.approx(0.9)]] for value in (0.475, 0.825)
