@@ -210,7 +210,8 @@ int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
 
 /* Attractor `index`, from 0.
  *   numbers [55]
- *     label, regime, period in drive periods (0: not periodic), event word; x [m] and v [m/s] on the section
+ *     label, regime, period in drive periods (0: not periodic, or a family), event word; x [m] and v [m/s]
+ *     on the section
  *     at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude
  *     [m], largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s],
  *     grazing margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be

@@ -16,7 +16,7 @@ module branch
   use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
   use hybrid_machine, only: event_t
   use kinds, only: wp
-  use machine_family, only: machine_neighbourhood
+  use machine_family, only: machine_neighbourhood, nearest_copy
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
   use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
   use orbit_sections, only: rotate_to_section, section_points
@@ -40,8 +40,9 @@ module branch
   real(wp), parameter :: no_turn = 1e-11_wp
   !> Nearness of a multiplier to that of a doubling at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-2_wp
-  !> The halves of an orbit are the same where they differ by less than this share of what they did a step before.
-  real(wp), parameter :: same_halves = 1e-2_wp
+  !> The halves of an orbit may be the same where they differ by less than this share of what they did a step before, and are where
+  !> they differ by less than that in natural sizes.
+  real(wp), parameter :: same_halves = 1e-2_wp, no_difference = 1e-6_wp
 
 contains
 
@@ -129,7 +130,7 @@ contains
     type(margin_t) :: passed
     real(wp) :: length
     logical :: ok, turned
-    integer :: tries, steps
+    integer :: tries, steps, known
     ending = no_label
     do tries = 1, 60
       length = trace%step
@@ -155,6 +156,7 @@ contains
       return
     end if
     call first_passed(family, trace, next, length, passed)
+    known = size(points)
     call note_bifurcations(family, trace, next, length, passed%kind /= 0, points)
     if (passed%kind /= 0) then
       call pass_margin(family, trace, next, passed, points, ending)
@@ -164,12 +166,15 @@ contains
     if (.not. is_admissible(next%machines, next%now%orbit)) then
       ! A turn of events that no margin foretells, or one that is nearer than the look along the flights.
       trace%step = length/4
+      ! What was located on a step that is taken anew is found once more.
+      points = points(:known)
       if (trace%step >= smallest_step*plan%largest_step) return
       call leave_by_graze(family, plan, trace, points, ending)
       if (ending == label_not_known) ending = unforeseen(trace, next)
       return
     end if
     next%step = min(plan%largest_step, length*merge(0.7_wp, 1.4_wp, steps > many_steps))
+    next%came = length
     if (turned) call set_point(family, next, direct(next%now%orbit, &
                                                     nint(sign(1.0_wp, next%now%tangent(size(next%now%tangent))))), ok)
     points = [points, next%now]
@@ -178,22 +183,33 @@ contains
     trace = next
   end subroutine go_on
 
-  !> What the second half of an orbit of even period differs by from the first, in natural sizes: in the instants of the events, and
-  !> without any in the section points. Points would jump where an impact passes the section.
+  !> What the second half of an orbit of even period differs by from the first, in natural sizes: in the instants and states of the
+  !> events, and without any in the section points, which jump where an impact passes the section. Nothing where the halves have
+  !> other events.
   pure function halves_differ(trace) result(difference)
     type(trace_t), intent(in) :: trace
     real(wp), allocatable :: difference(:)
     real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
-    associate (orbit => trace%now%orbit, machine => trace%machines%centre, half => size(trace%now%orbit%events)/2)
-      if (size(orbit%events) == 0) then
+    integer :: k
+    associate (orbit => trace%now%orbit, machine => trace%machines%centre, m => size(trace%now%orbit%events), &
+               half => size(trace%now%orbit%events)/2, n => size(trace%now%orbit%y))
+      allocate (difference(0))
+      if (m == 0) then
         points = section_points(trace%machines, orbit)
         difference = (points(:, 1 + orbit%periods/2) - points(:, 1))/machine%size_of
-      else if (modulo(size(orbit%events), 2) == 0) then
-        difference = orbit%events(half + 1:)%time - orbit%events(:half)%time - closing_time(machine, orbit)/2
-        difference = difference/machine%size_of_time()
-      else
-        allocate (difference(0))
+        return
       end if
+      if (modulo(m, 2) > 0) return
+      do k = 1, half
+        associate (one => orbit%events(k), other => orbit%events(half + k))
+          if (one%kind /= other%kind .or. one%side /= other%side .or. one%joint /= other%joint) then
+            difference = [real(wp) ::]
+            return
+          end if
+          difference = [difference, (other%time - one%time - closing_time(machine, orbit)/2)/machine%size_of_time(), &
+                        (nearest_copy(machine, other%arrival(:n), one%arrival(:n)) - one%arrival(:n))/machine%size_of]
+        end associate
+      end do
     end associate
   end function halves_differ
 
@@ -213,8 +229,8 @@ contains
     type(point_t), allocatable, intent(inout) :: points(:)
     integer, intent(out) :: ending
     type(trace_t) :: there, tried
-    real(wp) :: low, high, middle
-    logical :: ok, all_ok
+    real(wp) :: low, high, middle, left
+    logical :: ok, all_ok, together
     integer :: i, steps
     there = trace
     all_ok = .true.
@@ -233,14 +249,16 @@ contains
       end if
       if (high - low <= 4*spacing(high)) exit
     end do
+    left = norm2(halves_differ(there))
     ending = no_label
-    if (all_ok .and. norm2(halves_differ(there)) > same_halves*norm2(halves_differ(trace))) return
-    ending = label_pd
+    together = left <= same_halves*norm2(halves_differ(trace))
+    if (all_ok .and. .not. together) return
+    ending = label_not_known
     ! It began in a graze, or in a doubling, where the orbit of twice the period has a multiplier +1.
     if (any(there%margins%list%kind == of_impact .and. abs(there%margins%list%value) < at_graze)) then
       ending = label_gr
-    else if (minval(abs(there%now%orbit%multipliers - 1)) > at_doubling) then
-      ending = label_not_known
+    else if (together .and. (left < no_difference .or. minval(abs(there%now%orbit%multipliers - 1)) < at_doubling)) then
+      ending = label_pd
     end if
     there%now%label = ending
     points = [points, there%now]
@@ -361,6 +379,7 @@ contains
     if (passed%kind == of_gap .and. longest_run(at%now%orbit) >= long_run) ending = label_long
     if (ending /= no_label) return
     points = [points, beyond%now]
+    beyond%came = beyond%step
     trace = beyond
   end subroutine pass_margin
 

@@ -29,6 +29,8 @@ module branch_passage
   real(wp), parameter, public :: no_passage = 1e-11_wp
   real(wp), parameter :: together = 1e-9_wp
   integer, parameter, public :: most_secants = 60
+  !> A test of multipliers that is below this on both sides of a step is zero throughout.
+  real(wp), parameter :: rounding = 1e-9_wp
   !> First look beyond a point where the sequence changes, as a share of the largest step.
   real(wp), parameter :: first_look = 1e-4_wp
 
@@ -60,12 +62,42 @@ contains
       next = there
       passed = candidate
       i = vanishing_touch(there%now%orbit, there%margins, candidate%joint)
+      if (i == 0) i = lost_impact(there%margins, candidate)
+      if (i == 0) i = changed_order(there%now%orbit, there%margins, candidate)
       if (i == 0) cycle
       ! The order of its events and the gap pass zero with it.
       passed = there%margins%list(i)
       return
     end do
   end subroutine first_passed
+
+  !> The number of an impact that loses its speed where friction between the same bodies would turn round with it: the slide's
+  !> margin passes zero with it; 0 without.
+  pure integer function lost_impact(margins, candidate) result(number)
+    type(margins_t), intent(in) :: margins
+    type(margin_t), intent(in) :: candidate
+    number = 0
+    if (all(candidate%kind /= [of_turning, of_stick, of_slip, of_hold])) return
+    do number = 1, size(margins%list)
+      if (margins%list(number)%kind == of_impact .and. abs(margins%list(number)%value) <= together) return
+    end do
+    number = 0
+  end function lost_impact
+
+  !> The number of the order of two events of different joints that change places, where what the first has just done to its own
+  !> guard seems to be undone after the second: that margin passes zero with it; 0 without.
+  pure integer function changed_order(orbit, margins, candidate) result(number)
+    type(orbit_t), intent(in) :: orbit
+    type(margins_t), intent(in) :: margins
+    type(margin_t), intent(in) :: candidate
+    do number = 1, size(margins%list)
+      associate (one => margins%list(number))
+        if (one%kind /= of_order .or. one%event /= -candidate%event - 1 .or. .not. abs(one%value) <= together) cycle
+        if (orbit%events(one%event - 1)%joint == candidate%joint .and. orbit%events(one%event)%joint /= candidate%joint) return
+      end associate
+    end do
+    number = 0
+  end function changed_order
 
   !> The margin that falls below zero first, as far as a straight line tells.
   pure subroutine most_negative(before, after, candidate)
@@ -183,7 +215,12 @@ contains
 
     logical function changes(test)
       integer, intent(in) :: test
-      changes = test_value(test, trace)*test_value(test, end_point) < 0
+      real(wp) :: before, after
+      before = test_value(test, trace)
+      after = test_value(test, end_point)
+      changes = before*after < 0
+      ! What stays zero, as without losses, changes its sign by rounding.
+      if (test /= test_turn) changes = changes .and. max(abs(before), abs(after)) > rounding
     end function changes
 
     subroutine add(label, test)

@@ -58,7 +58,8 @@ module branch_point
     type(point_t) :: now
     type(neighbourhood_t) :: machines
     type(margins_t) :: margins
-    real(wp) :: step = 0
+    !> The next step, and that which led here.
+    real(wp) :: step = 0, came = 0
     !> How the tangent turns per length; nothing where it is not known.
     real(wp), allocatable :: bend(:)
   end type trace_t

@@ -24,7 +24,7 @@ module branch_return
 contains
 
   !> Ends a branch that has passed the orbit `first` on its step from `before` to `trace`, maybe at another of its section points,
-  !> in that orbit: `ending` is "closed" then. Only an orbit that Newton's method finds there to rounding is taken for it.
+  !> in that orbit: `ending` is "closed" then. Only an orbit that Newton's method finds there is taken for it.
   !> `known` of the points come before the step; what was located beyond has been there from the beginning. Where the branch comes
   !> back in the other direction it has turned round unseen, and the ending is not known.
   subroutine close_up(family, first, before, trace, known, points, ending)
@@ -43,25 +43,20 @@ contains
       call find_on_step(family, before, seed, 0.0_wp, length_of_step(family, before, points(known + 1:)), there, found)
       if (found) then
         points = [points(:known), pack(points(known + 1:), is_before(points(known + 1:)))]
-      else if (.not. same_sequence(before%now%orbit, trace%now%orbit)) then
+      else
         ! The events have changed on the way, or their numbers: it may lie behind the end of the step.
-        call find_on_step(family, trace, seed, -trace%step, 0.0_wp, there, found)
+        call find_on_step(family, trace, seed, -trace%came, 0.0_wp, there, found)
+        if (found) points = points(:size(points) - 1)
       end if
       if (.not. found) cycle
-      ending = merge(label_closed, label_not_known, comes_as_it_left())
+      associate (last => size(there%now%tangent), first_last => size(first%now%tangent))
+        ending = merge(label_closed, label_not_known, there%now%tangent(last)*first%now%tangent(first_last) > 0)
+      end associate
       points = [points, there%now]
       return
     end do
 
   contains
-
-    !> Whether the branch goes on as it did in the beginning, as far as its second point has the events of the first.
-    pure logical function comes_as_it_left()
-      type(orbit_t) :: second
-      second = begun_at(first%machines, points(2)%orbit, k)
-      comes_as_it_left = .not. same_sequence(seed, second)
-      if (.not. comes_as_it_left) comes_as_it_left = sum(difference(family, there, seed, second)*there%now%tangent) > 0
-    end function comes_as_it_left
 
     !> Whether points of the step come before the place that was found.
     pure elemental logical function is_before(point)
@@ -105,18 +100,20 @@ contains
     type(trace_t), intent(out) :: there
     logical, intent(out) :: found
     real(wp) :: way(size(from%now%tangent)), along
+    logical :: near
     integer :: i, steps
     found = same_sequence(from%now%orbit, seed)
     if (.not. found) return
     way = difference(family, from, from%now%orbit, seed)
     along = sum(way*from%now%tangent)
     found = along >= low .and. along <= high .and. norm2(way - along*from%now%tangent) <= off_tangent*(high - low)
-    ! Natural sizes may change on the way, so that it is not there at once.
+    ! Natural sizes may change on the way, so that it is not there at once; the last look is for the digits.
+    near = .false.
     do i = 1, merge(most_looks, 0, found)
       call step_to(family, from, along, there, found, steps)
-      if (.not. found) return
+      if (.not. found .or. near) return
       way = difference(family, from, there%now%orbit, seed)
-      if (norm2(way) < nearly) return
+      near = norm2(way) < nearly
       along = along + sum(way*from%now%tangent)
     end do
     found = .false.

@@ -8,7 +8,7 @@ module branch_search
   use body_family, only: family_t
   use branch, only: trace_branch
   use branch_ends, only: join_ends
-  use branch_point, only: branch_t, label_bp, label_hb, label_pd, plan_t, point_t, set_sizes
+  use branch_point, only: branch_t, label_bp, label_gr, label_gr_fold, label_hb, label_pd, label_sn, plan_t, point_t, set_sizes
   use equilibrium_branch, only: equilibria_t, find_equilibria
   use errors, only: error_t
   use hopf_cycles, only: begin_cycle, mark_births
@@ -194,6 +194,9 @@ contains
       return
     end if
     search%branches = [search%branches, found]
+    ! Where none of the seeds does what the parameter says, an orbit further on may.
+    search%depends = search%depends .or. any(found%points%label == label_gr .or. found%points%label == label_gr_fold .or. &
+                                             found%points%label == label_pd .or. found%points%label == label_sn)
     call note_passages(search, found)
     do i = 1, size(found%points)
       select case (found%points(i)%label)

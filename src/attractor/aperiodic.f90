@@ -5,10 +5,10 @@
 !> neighbouring motions drift apart, or it is one of a family of cycles, without which nobody knows what it is: perhaps a long
 !> transient.
 module aperiodic
-  use attractors, only: attractor_t, kind_chaotic, kind_family, kind_not_known, make_points, most_coordinates
+  use attractors, only: attractor_t, features_t, kind_chaotic, kind_family, kind_not_known, make_points, most_coordinates
   use capture, only: captor_of
   use circle, only: nearest_turn, point_near
-  use cycle, only: derivative, map_point
+  use cycle, only: derivative, map_point, unattractive
   use elementary, only: exponential, logarithm
   use exact_return, only: returns_t, watch_returns
   use kinds, only: int64, wp
@@ -34,7 +34,7 @@ module aperiodic
   !> Growth of the distance of neighbours a period (a logarithm) below which it may be that of a family, whose periods differ.
   real(wp), parameter :: slowest_drift = 1e-3_wp
   !> One of a family of cycles comes back to this, in units of the motion's size, and has a multiplier that is 1 to that.
-  real(wp), parameter :: comes_back = 1e-10_wp, neutral = 1e-6_wp
+  real(wp), parameter :: comes_back = 1e-10_wp, neutral = 1 - unattractive
 
 contains
 
@@ -108,7 +108,7 @@ contains
     if (period > max_period) return
     call derivative(moving, point, period, scale(:n), jacobian, ok)
     if (.not. ok) return
-    if (minval(abs(eigenvalues(jacobian) - 1)) > neutral) return
+    if (.not. minval(abs(eigenvalues(jacobian) - 1)) <= neutral) return
     found%kind = kind_family
     found%multiplier = 1
     found%duration = period*moving%machine%period
@@ -221,6 +221,7 @@ contains
           catalogue(k)%multiplier = found%multiplier
         end if
         call widen(catalogue(k), found%points)
+        if (found%kind == kind_family) call widen_features(found%features, catalogue(k)%features)
         catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
         return
       end if
@@ -234,11 +235,24 @@ contains
   pure logical function belong_together(a, b)
     type(attractor_t), intent(in) :: a, b
     if (a%kind == kind_family .or. b%kind == kind_family) then
-      belong_together = a%kind == b%kind .and. .not. abs(a%duration - b%duration) > 0
+      belong_together = a%kind == b%kind .and. .not. abs(a%duration - b%duration) > 0 .and. &
+        .not. abs(a%features%impacts_per_period - b%features%impacts_per_period) > 0
     else
       belong_together = boxes_meet(a, b)
     end if
   end function belong_together
+
+  !> What the cycles of a family have at most: of the places and speeds; of the distance to stops at least.
+  pure subroutine widen_features(one, all_of_them)
+    type(features_t), intent(in) :: one
+    type(features_t), intent(inout) :: all_of_them
+    all_of_them%x_max = max(all_of_them%x_max, one%x_max)
+    all_of_them%x_min = min(all_of_them%x_min, one%x_min)
+    all_of_them%amplitude = max(all_of_them%amplitude, one%amplitude)
+    all_of_them%v_max = max(all_of_them%v_max, one%v_max)
+    all_of_them%mean_impact_speed = max(all_of_them%mean_impact_speed, one%mean_impact_speed)
+    all_of_them%grazing_margin = min(all_of_them%grazing_margin, one%grazing_margin)
+  end subroutine widen_features
 
   !> Whether the boxes of two motions have a point in common.
   pure logical function boxes_meet(a, b)

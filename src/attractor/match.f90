@@ -3,7 +3,7 @@
 
 !> Carries labels from one parameter value to the next, so that a branch keeps its number and its colour.
 module match
-  use attractors, only: attractor_t
+  use attractors, only: attractor_t, kind_family
   use circle, only: point_near
   use kinds, only: wp
   implicit none
@@ -76,6 +76,7 @@ contains
     n = a%coordinates
     if (a%period /= b%period .or. a%features%regime /= b%features%regime .or. n /= b%coordinates .or. &
         (a%by_event .neqv. b%by_event)) return
+    if ((a%kind == kind_family) .neqv. (b%kind == kind_family)) return
     if (abs(a%features%rotation - b%features%rotation) > 0 .and. a%period > 0) return
     if (a%rests .or. a%period == 0) then
       distance = 0

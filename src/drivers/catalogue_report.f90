@@ -20,21 +20,24 @@ module catalogue_report
 
 contains
 
-  !> How many attractors the catalogues have, and how many entries of which nobody knows whether they are some.
-  pure subroutine count_found(catalogues, attractors, not_known)
+  !> How many attractors the catalogues have, how many families of cycles, and how many entries of which nobody knows whether they
+  !> are some.
+  pure subroutine count_found(catalogues, attractors, families, not_known)
     type(catalogue_t), intent(in) :: catalogues(:)
-    integer, intent(out) :: attractors, not_known
-    logical, allocatable :: found(:), known(:)
+    integer, intent(out) :: attractors, families, not_known
+    logical, allocatable :: found(:), known(:), family(:)
     integer :: slice, last
     last = maxval([0, (maxval([0, catalogues(slice)%attractors%id]), slice=1, size(catalogues))])
-    allocate (found(last), known(last), source=.false.)
+    allocate (found(last), known(last), family(last), source=.false.)
     do slice = 1, size(catalogues)
       associate (entries => catalogues(slice)%attractors)
         found(entries%id) = .true.
         known(pack(entries%id, entries%kind /= kind_not_known)) = .true.
+        family(pack(entries%id, entries%kind == kind_family)) = .true.
       end associate
     end do
-    attractors = count(known)
+    families = count(family)
+    attractors = count(known .and. .not. family)
     not_known = count(found .and. .not. known)
   end subroutine count_found
 
@@ -44,12 +47,14 @@ contains
     type(catalogue_t), intent(in) :: catalogues(:)
     character(len=*), intent(in) :: source
     character(len=:), allocatable :: line
-    integer :: attractors, not_known
-    call count_found(catalogues, attractors, not_known)
+    integer :: attractors, families, not_known
+    call count_found(catalogues, attractors, families, not_known)
     line = counted(attractors, 'attractor')
+    if (families > 0) line = line//' and '//to_text(families)//trim(merge(' family  ', ' families', families == 1))//' of cycles'
     if (not_known > 0) line = line//' and '//counted(not_known, 'motion')//' not known to be periodic'
     call journal%line('catalogue', line//' in '//counted(size(catalogues), 'slice')//' '//source, &
-                      '"attractors": '//to_text(attractors)//', "not_known": '//to_text(not_known))
+                      '"attractors": '//to_text(attractors)//', "families": '//to_text(families)// &
+                      ', "not_known": '//to_text(not_known))
   end subroutine tell_found
 
   !> '1 slice', '2 slices'.

@@ -51,8 +51,8 @@ module command_table
       'Lyapunov exponents of one motion, and whether it is periodic, quasi-periodic or chaotic', &
       'separatrix stability CASE|MAP [--periods N]: Lyapunov exponents and the kind of a motion'//nl// &
       '  The motion from [start] after its transients: exponents with standard errors, their exact sum as a check,'//nl// &
-      '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period (chaotic, quasi-periodic,'//nl// &
-      '  long transient, period above the limit, not known). Writes no file.'//nl// &
+      '  the 0-1 test, and what the motion is. Of a map: every attractor without a known period, but families of'//nl// &
+      '  cycles (chaotic, quasi-periodic, long transient, period above the limit, not known). Writes no file.'//nl// &
       '  --periods N        drive periods watched, after a quarter as many (default 20000)'//nl), &
     command_row_t('trajectory', 'CASE', &
       'one motion with all its events', &

@@ -7,12 +7,13 @@ module body_family
   use build_motion, only: machine_of
   use errors, only: error_t, fail
   use hybrid_machine, only: event_t
-  use kinds, only: wp
+  use kinds, only: real64, wp
   use law_table, only: change_parameter, law_choice_t
   use motion, only: advance_period, motion_t, start_state
   use motion_state, only: log_t, mode_stick, open_log, options_t, reset_tally, state_t, tally_t
   use one_body, only: mode_of_body, one_body_of, one_body_t, why_not_varied
   use status, only: exit_bad_case
+  use text, only: to_text
   use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
   implicit none
   private
@@ -69,6 +70,10 @@ contains
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
     why = why_not_varied(moving)
+    associate (contact => moving%machine%contact)
+      if (contact%lower > contact%upper) why = 'contact.lower: found '//to_text(real(contact%lower, real64))// &
+        ' m, allowed at most upper = '//to_text(real(contact%upper, real64))//' m'
+    end associate
     if (len(why) > 0) then
       call fail(error, exit_bad_case, why)
       return

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from program import succeed
 from separatrix import style, table
 from separatrix.figures import branches
 from separatrix.open import decode_flags, decode_words, open_result
@@ -218,6 +219,88 @@ def test_a_parameter_without_effect_has_straight_branches(run):
         assert set(decode_flags(result["label"]).values) == {"none", "end_of_range"}
     assert "body.gravity has no effect on any orbit that was found" in ended.stdout
     assert "ends: end of range" in ended.stdout
+
+
+BETWEEN_STOPS_OF_ONE = """
+body = { mass = 1 }
+restoring = { law = "linear", stiffness = 1 }
+friction = { law = "viscous", damping = 0.1 }
+contact = { law = "newton", restitution = 0.8, upper = 1, lower = -1 }
+drive = { law = "harmonic", amplitude = 0.5, ratio = 0.7 }
+run = { duration = 100 }
+"""
+BETWEEN_STOPS_OF_A_STRUCTURE = """
+body.a.mass = 1
+spring.s = { between = ["a"], stiffness = 1, damping = 0.1 }
+contact.wall = { between = ["a"], law = "newton", restitution = 0.8, upper = 1, lower = -1 }
+drive.d = { law = "force", body = "a", amplitude = 0.5, frequency = 0.7 }
+watch.body = "a"
+run = { duration = 100 }
+"""
+LOSSLESS = """
+body = { mass = 1, gravity = 1 }
+restoring = { law = "linear", stiffness = 1 }
+contact = { law = "newton", restitution = 1.0, upper = 1 }
+drive = { law = "harmonic", amplitude = 0.5, ratio = 2.3 }
+start = { x0 = 0.1 }
+run = { duration = 300 }
+"""
+TOUCHED_FURTHER_ON = """
+body = { mass = 1.372, gravity = 0.7288629737609329 }
+restoring = { law = "linear", stiffness = 1.182 }
+friction = { law = "coulomb_viscous", kinetic_coefficient = 0.04, static_coefficient = 0.06, damping = 0.73 }
+contact = { law = "kelvin_voigt", stiffness = 23.64, damping = 0.637, tension = 0, upper = 0.606 }
+drive = { law = "harmonic", amplitude = 0.358, ratio = 2.124 }
+run = { duration = 200 }
+"""
+
+
+def test_what_stays_on_the_unit_circle_does_not_pass_it(separatrix: Path, tmp_path: Path):
+    """Without losses the product of the multipliers is 1 but for rounding; gravity moves nothing."""
+    (tmp_path / "case.toml").write_text(LOSSLESS)
+    words = ("--parameter", "body.gravity", "--from", "0.5", "--to", "2", "--searches", "3", "-o", "out.h5")
+    said = succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path).out
+    assert "body.gravity has no effect" in said
+    with open_result(tmp_path / "out.h5") as result:
+        assert set(decode_flags(result["label"]).values) == {"none", "end_of_range"}
+
+
+def test_a_parameter_may_have_its_effect_further_on(separatrix: Path, tmp_path: Path):
+    """No orbit at the values searched touches the stop, but others of their branch do."""
+    (tmp_path / "case.toml").write_text(TOUCHED_FURTHER_ON)
+    words = (
+        "--parameter",
+        "contact.upper",
+        "--from",
+        "0.006",
+        "--to",
+        "1.206",
+        "--searches",
+        "4",
+        "-o",
+        "out.h5",
+    )
+    said = succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path).out
+    assert "GR at contact.upper" in said
+    assert "no effect" not in said
+
+
+@pytest.mark.parametrize("one", [BETWEEN_STOPS_OF_ONE, BETWEEN_STOPS_OF_A_STRUCTURE])
+def test_a_range_in_which_stops_change_places_is_refused(separatrix: Path, tmp_path: Path, one: str):
+    (tmp_path / "case.toml").write_text(one)
+    name = "contact.upper" if one == BETWEEN_STOPS_OF_ONE else "contact.wall.upper"
+    words = ("--parameter", name, "--from", "-2", "--to", "1", "-o", "out.h5")
+    ended = subprocess.run(
+        [separatrix, "branches", "case.toml", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert ended.returncode == 65
+    assert "lower: found -1.0 m, allowed" in ended.stderr
+    assert "upper = -2.0 m" in ended.stderr
+    assert not (tmp_path / "out.h5").exists()
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,11 @@ from separatrix.errors import BAD_DATA, SeparatrixError
 from separatrix.measuring.sampling import NO_START
 from separatrix.runner import cores
 from separatrix.simulate import Attractor, Catalogue, section_points
+from separatrix.variables import KINDS
 
 # Starts of one call, as in a map.
 _PIECE = 1024
+_FAMILY = 1 + KINDS.index("family")
 _COLUMNS = {"x0": 0, "v0": 1, "crank_angle": 2}
 
 
@@ -72,6 +74,9 @@ class Machine:
             if any(mine[name] != entry[name] for name in ("period", "regime", "event_word")):
                 continue
             if mine["period"] == 0:
+                # a family of cycles is no other motion without a period; older files do not tell
+                if "kind" in entry and (mine["kind"] == _FAMILY) != (entry["kind"] == _FAMILY):
+                    continue
                 return one
             size = max(abs(entry["amplitude"]), 1e-9)
             if np.abs(one.points[:, 0] - entry["x"]).min(initial=np.inf) < 1e-6 * size:

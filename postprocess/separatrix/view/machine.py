@@ -14,6 +14,7 @@ import numpy as np
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 from separatrix.simulate import Catalogue, Motion, StopFlag, trajectory
+from separatrix.variables import KINDS
 from separatrix.view.files import ResultFile
 
 __all__ = ["Machine"]
@@ -27,6 +28,7 @@ REASONS = (
     "not_run", "settled", "time_over", "left_domain", "not_finite", "event_budget", "step_failed",
     "step_budget",
 )  # fmt: skip
+_FAMILY = 1 + KINDS.index("family")
 _KEPT = 64  # catalogues
 _SAME = 1e-6  # relative distance of section points up to which two attractors are one
 
@@ -101,6 +103,8 @@ class Machine:
             for i in range(len(known.get("attractor", []))):
                 same = known["slice"][i] == slice_number and known["attractor"][i] not in taken
                 same = same and all(known[key][i] == one.numbers[key] for key in ("regime", "period"))
+                if "kind" in known:
+                    same = same and (known["kind"][i] == _FAMILY) == (one.numbers["kind"] == _FAMILY)
                 if same and (
                     one.numbers["period"] == 0 or one.numbers["rests"] or _near(known, i, one.numbers)
                 ):
