@@ -43,6 +43,8 @@ module branch
   !> The halves of an orbit may be the same where they differ by less than this share of what they did a step before, and are where
   !> they differ by less than that in natural sizes.
   real(wp), parameter :: same_halves = 1e-2_wp, no_difference = 1e-6_wp
+  !> What is left of that difference where it is none.
+  real(wp), parameter :: rounding_of_halves = 1e-6_wp
 
 contains
 
@@ -217,8 +219,17 @@ contains
   pure logical function swaps_halves(trace, next)
     type(trace_t), intent(in) :: trace, next
     swaps_halves = modulo(trace%now%orbit%periods, 2) == 0
-    if (swaps_halves) swaps_halves = sum(halves_differ(trace)*halves_differ(next)) < 0
+    if (swaps_halves) swaps_halves = .not. still_differ(trace, next)
   end function swaps_halves
+
+  !> Whether the halves of the orbit `next` differ as those of `trace` do: not the other way round, and not by rounding alone, as
+  !> where a step has ended on the branch of half the period.
+  pure logical function still_differ(trace, next)
+    type(trace_t), intent(in) :: trace, next
+    real(wp), allocatable :: before(:)
+    before = halves_differ(trace)
+    still_differ = sum(before*halves_differ(next)) >= rounding_of_halves*sum(before**2)
+  end function still_differ
 
   !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze; none if the halves are not
   !> the same anywhere on the step.
@@ -230,7 +241,7 @@ contains
     integer, intent(out) :: ending
     type(trace_t) :: there, tried
     real(wp) :: low, high, middle, left
-    logical :: ok, all_ok, together
+    logical :: ok, all_ok
     integer :: i, steps
     there = trace
     all_ok = .true.
@@ -242,7 +253,7 @@ contains
       ! At the end itself the equations are singular: it is approached from this side.
       if (ok) there = tried
       all_ok = all_ok .and. ok
-      if (.not. ok .or. sum(halves_differ(trace)*halves_differ(there)) < 0) then
+      if (.not. ok .or. .not. still_differ(trace, there)) then
         high = middle
       else
         low = middle
@@ -251,13 +262,12 @@ contains
     end do
     left = norm2(halves_differ(there))
     ending = no_label
-    together = left <= same_halves*norm2(halves_differ(trace))
-    if (all_ok .and. .not. together) return
+    if (all_ok .and. left > same_halves*norm2(halves_differ(trace))) return
     ending = label_not_known
     ! It began in a graze, or in a doubling, where the orbit of twice the period has a multiplier +1.
     if (any(there%margins%list%kind == of_impact .and. abs(there%margins%list%value) < at_graze)) then
       ending = label_gr
-    else if (together .and. (left < no_difference .or. minval(abs(there%now%orbit%multipliers - 1)) < at_doubling)) then
+    else if (left < no_difference .or. minval(abs(there%now%orbit%multipliers - 1)) < at_doubling) then
       ending = label_pd
     end if
     there%now%label = ending
@@ -361,6 +371,8 @@ contains
     end if
     call change_all(at, passed, beyond%now%orbit, known)
     if (known) call enter_sequence(family, at, trace%step, beyond, known)
+    ! An orbit of a shorter period near by is not what goes on there.
+    if (known) known = .not. is_repeated(beyond)
     if (known) then
       rise_before = at%now%tangent(size(at%now%tangent))
       if (is_touch(at%now%orbit, passed)) then
