@@ -270,15 +270,8 @@ def refusals(program: Path) -> tuple[list[list[str]], list[str]]:
     """What the program says of examples whose orbits it does not follow."""
     lines, wrong = [], []
     for name, parameter in REFUSED.items():
-        words = [
-            program.resolve(),
-            "branches",
-            f"examples/{name}.toml",
-            "--parameter",
-            parameter,
-            "--dry-run",
-        ]
-        words += ["--from", "1", "--to", "2"]
+        words = [program.resolve(), "branches", f"examples/{name}.toml", "--dry-run"]
+        words += ["--parameter", parameter, "--from", "1", "--to", "2"]
         # from there, so that the page names no folder of the machine
         ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=SOURCE)
         said = ended.stderr.strip().removeprefix("separatrix: ")

@@ -139,6 +139,4 @@ def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
     names = flag_names(catalogue["kind"])
     kinds = {names.get(int(kind), "") for kind in np.unique(catalogue["kind"].values[mine])}
     texts = {"chaotic": "chaotic", "family": "a family of cycles"}
-    return (
-        texts.get(kinds.pop(), "not known to be periodic") if len(kinds) == 1 else "not known to be periodic"
-    )
+    return texts.get("".join(kinds), "not known to be periodic")

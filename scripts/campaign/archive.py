@@ -37,7 +37,7 @@ def pack(archive: Path, folders: object, numbers: Sequence[int]) -> int:
             continue
         sealed = folders.sealed / f"{number:04}.json"
         truth = sealed.read_text() if sealed.is_file() else None
-        result = json.loads(folders.result(number).read_text().replace(f"{folders.cases}/", ""))
+        result = folders.told(number)
         lines.append(json.dumps({"number": number, "truth": truth, "result": result}) + "\n")
     draft = archive.with_name(archive.name + ".new")
     draft.parent.mkdir(parents=True, exist_ok=True)

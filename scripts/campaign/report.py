@@ -154,7 +154,7 @@ def undecided(folders: object, found: list[Score]) -> list[list[str]]:
     for one in found:
         if not one.strong or one.decided:
             continue
-        verdict = json.loads(folders.result(one.number).read_text())["verdict"]
+        verdict = folders.told(one.number)["verdict"]
         for text in verdict.get("reasons") or ["nothing was detected"]:
             key = (one.column, text)
             reasons[key] = reasons.get(key, 0) + 1

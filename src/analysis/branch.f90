@@ -40,8 +40,8 @@ module branch
   real(wp), parameter :: no_turn = 1e-11_wp
   !> Nearness of a multiplier to that of a doubling at the end of a branch.
   real(wp), parameter :: at_doubling = 1e-2_wp
-  !> The halves of an orbit may be the same where they differ by less than this share of what they did a step before, and are where
-  !> they differ by less than that in natural sizes.
+  !> The halves of an orbit may be the same where they differ by less than the first, a share of what they did a step before; they
+  !> are where they differ by less than the second, in natural sizes.
   real(wp), parameter :: same_halves = 1e-2_wp, no_difference = 1e-6_wp
   !> What is left of that difference where it is none.
   real(wp), parameter :: rounding_of_halves = 1e-6_wp

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from types import SimpleNamespace
 
 import pytest
 
@@ -445,8 +446,9 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
     assert untimed["whole"] == untimed["killed"]
 
 
-def test_the_archive_names_no_folder_of_the_machine(campaign, tmp_path):
+def test_the_archive_and_the_page_name_no_folder_of_the_machine(campaign, tmp_path):
     import archive
+    import report
     from campaign import Folders
 
     folders = Folders(tmp_path / "seed")
@@ -458,6 +460,11 @@ def test_the_archive_names_no_folder_of_the_machine(campaign, tmp_path):
     text = lzma.open(kept, "rt").read()
     assert "0000/base.toml:3: key" in text
     assert str(tmp_path) not in text
+    # nor does the page
+    strong = SimpleNamespace(strong=True, decided=False, number=0, column="no verdict")
+    assert report.undecided(folders, [strong]) == [
+        ["no verdict", "0000/base.toml:3: key 'body.mass': missing", "1"]
+    ]
 
 
 def test_the_page_can_be_written_again_from_the_archive_alone(source_dir, tmp_path):
