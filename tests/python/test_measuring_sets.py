@@ -92,7 +92,7 @@ def test_a_share_is_that_of_the_area() -> None:
 
 
 def test_a_share_without_any_crossed_cell_is_not_beyond_doubt() -> None:
-    """A basin smaller than a cell lies between the points: its share is within the interval, which has a width."""
+    """A basin smaller than a cell lies between the points: the interval of its share has a width."""
     labels, area = ellipse((0.02, 0.02)), np.pi * 0.02**2 / 2.4**2
     grid, axes = grid_of(labels, WIDE.lower, WIDE.upper, 20)
     share = areas.global_share(labels, grid, axes, 1, 2000)
