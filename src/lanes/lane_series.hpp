@@ -115,11 +115,13 @@ LANE_DEVICE inline vec next_excess(const lane_law &l, int i, mask within, vec d,
 struct table_series {
   vec u[order], square[order];
 
-  // Coefficient k, from that of the variable.
-  LANE_LEAF vec next(const table_piece &piece, vec variable, int k) {
+  // Coefficient k, from that of the variable. Pieces are cubic, or parabolas.
+  template <int degree> LANE_LEAF vec next(const table_piece &piece, vec variable, int k) {
     u[k] = k == 0 ? variable - piece.from : variable;
     square[k] = square_of(u, k);
-    vec sum = piece.c[1] * u[k] + piece.c[2] * square[k] + piece.c[3] * product(square, u, k);
+    vec sum = piece.c[1] * u[k] + piece.c[2] * square[k];
+    if constexpr (degree > 2)
+      sum += piece.c[3] * product(square, u, k);
     return k == 0 ? piece.c[0] + sum : sum;
   }
 };
@@ -157,13 +159,13 @@ struct force_series {
       a += l.cubic * product(square, stretch, k);
     }
     if (l.table[over_stretch].knots > 0)
-      a += table[over_stretch].next(pieces[over_stretch], stretch[k], k);
+      a += table[over_stretch].next<3>(pieces[over_stretch], stretch[k], k);
     if (l.table[over_play].knots > 0)
-      a += table[over_play].next(pieces[over_play], stretch[k], k);
+      a += table[over_play].next<2>(pieces[over_play], stretch[k], k);
     if (l.table[over_place].knots > 0)
-      a += table[over_place].next(pieces[over_place], x[k], k);
+      a += table[over_place].next<3>(pieces[over_place], x[k], k);
     if (l.table[over_speed].knots > 0)
-      a -= d * table[over_speed].next(pieces[over_speed], d * v[k], k);
+      a -= d * table[over_speed].next<3>(pieces[over_speed], d * v[k], k);
     if (l.quadratic != 0 || l.cubic_damping != 0)
       speed_square[k] = square_of(v, k);
     if (l.quadratic != 0)
@@ -190,7 +192,7 @@ struct force_series {
       a += l.offset;
     }
     if (l.table[factor_over_place].knots > 0)
-      factor[k] += table[factor_over_place].next(pieces[factor_over_place], x[k], k);
+      factor[k] += table[factor_over_place].next<3>(pieces[factor_over_place], x[k], k);
     else if (!(m.friction_slope != 0))
       return a - dry[k];
     return a - product(factor, dry, k);
