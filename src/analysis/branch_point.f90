@@ -8,6 +8,7 @@ module branch_point
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, machine_of_family, section_sizes
+  use multipliers, only: nearly_neutral
   use orbit_margins, only: margins_t
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
   use structure_margins, only: margins_of_machine
@@ -66,11 +67,11 @@ module branch_point
 
 contains
 
-  !> Whether all multipliers are within the unit circle.
+  !> Whether all multipliers are within the unit circle, by more than what one is known to where it is 1.
   pure logical function is_stable(orbit)
     type(orbit_t), intent(in) :: orbit
     ! The largest comes first; those that are not known are smaller.
-    is_stable = abs(orbit%multipliers(1)) < 1
+    is_stable = abs(orbit%multipliers(1)) < 1 - nearly_neutral
   end function is_stable
 
   !> Sets the sizes of a family: of the parameter by its range, of the state by the largest motion that the drive alone brings

@@ -87,7 +87,7 @@ contains
     end if
     if (session%team%is_root()) then
       if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, exit_bad_case, &
-        'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
+        'no isolated periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
         to_text(search%plan%highest)//'; nothing is written')
     end if
     call session%stop_if(error)
@@ -134,7 +134,7 @@ contains
     end if
     families = sum(search%found%families)
     if (maxval(search%found%families) > 1) then
-      call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
+      call session%journal%line('family', 'orbits that are not isolated (a multiplier within 1e-6 of 1: a family) were met '// &
                                 to_text(families)//' times; they are not followed')
     else if (families > 0) then
       call session%journal%line('neutral', 'an orbit with a multiplier 1 was met that does not go on: one of a family, or '// &
