@@ -23,7 +23,7 @@ module multipliers
 contains
 
   !> Eigenvalues, largest modulus first; with imaginary parts that are none left out. `determinant`: of a matrix of two
-  !> rows, from its factors: the entries of one with a large multiplier know the small one no more. Of more rows those that rounding
+  !> rows, from its factors: the entries of one with a large multiplier know the small one no more. Without it those that rounding
   !> of the entries hides, beside a graze, are not numbers.
   pure function multipliers_of(matrix, determinant) result(values)
     real(wp), intent(in) :: matrix(:, :)
@@ -31,12 +31,17 @@ contains
     complex(wp) :: values(size(matrix, 1)), vectors(size(matrix, 1), size(matrix, 1)), moved
     logical :: ok
     integer :: i, k
-    if (size(matrix, 1) <= 2) then
+    if (size(matrix, 1) <= 2 .and. (present(determinant) .or. size(matrix, 1) == 1)) then
       values = eigenvalues(matrix, determinant)
       return
     else if (.not. all(abs(matrix) < unreachable)) then
       values = ieee_value(1.0_wp, ieee_quiet_nan)
       values(1) = matrix(1, 1)
+      return
+    end if
+    if (size(matrix, 1) == 2) then
+      values = eigenvalues(matrix)
+      call leave_out_hidden(matrix, rounding*norm2(matrix), 2, values)
       return
     end if
     call general_eigen(matrix, values, vectors, ok)
