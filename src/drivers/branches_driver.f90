@@ -21,6 +21,7 @@ module branches_driver
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
+  use motion_state, only: event_touch_lower, event_touch_upper
   use orbit_margins, only: is_impact
   use orbit_words, only: symmetry_text, word_of
   use periodic_orbit, only: orbit_t
@@ -253,8 +254,9 @@ contains
     call schema%add_variable('period', type_int16, along, units='1', long_name='period in '// &
                              trim(merge('drive periods', 'returns      ', search%has_clock)), &
                              data=[(real(points(i)%orbit%periods, wp), i=1, size(points))])
-    call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts in a period of the orbit', &
-                             data=[(real(count(is_impact(points(i)%orbit%events%kind)), wp), i=1, size(points))])
+    call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts, or touches of a soft contact, '// &
+                             'in a period of the orbit', &
+                             data=[(real(count_contacts(points(i)%orbit), wp), i=1, size(points))])
     call schema%add_variable('event_word', type_int64, along, units='1', &
                              long_name='events of one period of the orbit, three bits each', &
                              data=[(real(word_of(points(i)%orbit, search), wp), i=1, size(points))])
@@ -278,6 +280,13 @@ contains
     end subroutine add
 
   end subroutine describe_branches
+
+  !> Impacts and touches of soft contacts; a completed chatter is neither.
+  pure integer function count_contacts(orbit)
+    type(orbit_t), intent(in) :: orbit
+    count_contacts = count(is_impact(orbit%events%kind) .or. orbit%events%kind == event_touch_upper .or. &
+                           orbit%events%kind == event_touch_lower)
+  end function count_contacts
 
   !> The first so many multipliers of the points.
   subroutine describe_multipliers(points, shown, schema)
