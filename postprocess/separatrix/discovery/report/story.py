@@ -23,6 +23,7 @@ GATES = {
     "admissible": "sign and size make sense, and differ from zero",
     "stable": "the effect pays in nearly every resampling of the record",
     "adequate": "what is left is noise",
+    "foretold": "held-out records are followed as well",
     "drop": "each of the effects is needed beside the other",
 }
 
