@@ -19,6 +19,7 @@ from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted, shared_values
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.fitting.rig import cleaned
@@ -56,6 +57,22 @@ class Decision:
     # what is told only if it closes the gap as a table
     suspected: object | None = None
     not_added: str = ""
+
+    @property
+    def in_families(self) -> list[str]:
+        """Families that the best and all its rivals agree on, where nothing else is in doubt; else none.
+
+        Forms of one family that fit alike are one function within what the records tell of it.
+        """
+        best = self.accepted[0] if self.accepted else None
+        if (
+            best is None
+            or not self.rivals
+            or any(not ok for gate, ok in best.gates.items() if gate != "separate")
+        ):
+            return []
+        found = [sorted(effect_of(name).family for name in one.fitted.names) for one in (best, *self.rivals)]
+        return found[0] if self.outcome == "ambiguous" and all(one == found[0] for one in found) else []
 
     @property
     def corrected(self) -> Judged | None:
