@@ -47,6 +47,7 @@ FAMILIES = {
         "quadratic_drag",
         "cubic_damping",
         "stribeck",
+        "static_excess",
         "friction_curve",
     },
     "friction over place": {"position_dependent_friction", "friction_place_curve"},

@@ -93,7 +93,13 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     best, rivals = _lead(bench, first)
     found = first
     if not _detected(best):
-        return _shape_alone(bench, _without_name(bench, decision), first)
+        decision = _shape_alone(bench, _without_name(bench, decision), first)
+        if best.gates["detect"] and not decision.accepted:
+            decision.reasons.append(
+                f"{best.name} gains more than chance does (p = {best.p:.1g}), but few segments carry that, "
+                "which may be in a wrong minimum: longer records would tell"
+            )
+        return decision
     shaped = None if best.gates["adequate"] else _shaped(bench, first)
     if shaped is None and not (best.gates["adequate"] or bench.options.quick):
         # the linear screen may have passed over the effect that closes the gap
