@@ -213,7 +213,7 @@ def score(truth: dict, result: dict) -> Score:
     in_catalogue = truth["kind"] in ("single", "pair")
     # one name only is a name, also where the verdict doubts it
     alone = len(sets) == 1
-    part = truth["kind"] == "pair" and alone and next(iter(sets)) < names
+    part = truth["kind"] == "pair" and (alone or in_family) and any(one < names for one in sets)
     errors, covered = precision(truth, verdict) if right and in_catalogue else ((), ())
     held_out = verdict.get("gap", {}).get("held_out")
     return Score(

@@ -155,6 +155,12 @@ JUDGED = [
         (True, False, False, True),
         "set without the truth",
     ),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("ambiguous", ["quadratic_drag"], ["viscous"], in_families=["friction over speed"]),
+        (True, False, False, False),
+        "set without the truth",
+    ),
     # that the verdict calls them one family is not enough
     (
         truth(["viscous"]),
