@@ -31,8 +31,8 @@ from design import Unreachable, draw  # noqa: E402
 CI_SEED, CI_CASES = 1, (0, 12, 14, 16, 17, 32)
 """Nothing hidden, one effect, an effect that is one of a set; quick ones."""
 KEPT = (
-    "outcome effects alternatives equivalent parameters gap gates leaves p_value reasons detectable d_prime"
-    " decoys character where warnings records seed version runtime_s"
+    "outcome effects alternatives equivalent in_families parameters gap gates leaves p_value reasons"
+    " detectable d_prime decoys character where warnings records seed version runtime_s"
 ).split()
 UNREACHABLE = "unreachable"
 

@@ -184,6 +184,7 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "mean_long": mean_seconds([one for one in found if one.whole >= LONG]),
         "long": sum(one.whole >= LONG for one in found),
         "shaped": sum(one.shaped for one in found),
+        "in_family": sum(one.in_family for one in found if one.strong),
         "by_family": sum(one.by_family for one in found),
         "right": sum(one.right for one in found if one.in_catalogue),
         "faulty": sum(one.rig for one in found),

@@ -47,6 +47,7 @@ FAMILIES = {
         "quadratic_drag",
         "cubic_damping",
         "stribeck",
+        "static_excess",
         "friction_curve",
     },
     "friction over place": {"position_dependent_friction", "friction_place_curve"},
@@ -99,6 +100,8 @@ class Score:
     right: bool
     contains: bool
     """The set that was reported has the truth."""
+    in_family: bool
+    """Decided because all that was reported is of the family, though its form is in doubt."""
     wrong_name: bool
     errors: tuple[float, ...]
     """Relative errors of the parameters of the effect, where it was named rightly."""
@@ -180,12 +183,28 @@ def only_equivalent(sets: set[frozenset[str]]) -> bool:
     return len(sets) > 1 and all(len(one) == 1 and one <= EQUIVALENT for one in rest)
 
 
+def one_family(sets: set[frozenset[str]]) -> bool:
+    """Whether sets of effects differ by the forms of their families only."""
+    found = {
+        tuple(
+            sorted(
+                next((family for family, members in FAMILIES.items() if name in members), name)
+                for name in one
+            )
+        )
+        for one in sets
+    }
+    return len(sets) > 1 and len(found) == 1
+
+
 def score(truth: dict, result: dict) -> Score:
     """Judge one case."""
     verdict, names = result["verdict"], frozenset(truth["names"])
     sets = {as_hidden(one, truth) for one in reported(verdict)}
     answer = verdict["outcome"] if verdict["outcome"] in ANSWERS else "failed"
-    one_answer = answer == "named" or (answer == "ambiguous" and bool(sets) and only_equivalent(sets))
+    in_family = answer == "ambiguous" and bool(verdict.get("in_families")) and one_family(reported(verdict))
+    alike = answer == "ambiguous" and bool(sets) and only_equivalent(sets)
+    one_answer = answer == "named" or alike or in_family
     contains = names in sets
     right = {
         "none": answer == "none",
@@ -194,7 +213,7 @@ def score(truth: dict, result: dict) -> Score:
     in_catalogue = truth["kind"] in ("single", "pair")
     # one name only is a name, also where the verdict doubts it
     alone = len(sets) == 1
-    part = truth["kind"] == "pair" and alone and next(iter(sets)) < names
+    part = truth["kind"] == "pair" and (alone or in_family) and any(one < names for one in sets)
     errors, covered = precision(truth, verdict) if right and in_catalogue else ((), ())
     held_out = verdict.get("gap", {}).get("held_out")
     return Score(
@@ -214,6 +233,7 @@ def score(truth: dict, result: dict) -> Score:
         decided=one_answer,
         right=right,
         contains=contains,
+        in_family=in_family and not alike,
         wrong_name=(one_answer or alone) and not contains and not part,
         errors=errors,
         covered=covered,

@@ -143,6 +143,31 @@ JUDGED = [
         (True, False, False, True),
         "set without the truth",
     ),
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["quadratic_drag"], ["viscous"], in_families=["friction over speed"]),
+        (True, True, True, False),
+        "equivalent set",
+    ),
+    (
+        truth(["dahl"]),
+        verdict("ambiguous", ["quadratic_drag"], ["viscous"], in_families=["friction over speed"]),
+        (True, False, False, True),
+        "set without the truth",
+    ),
+    (
+        truth(["viscous", "offset_force"], "pair"),
+        verdict("ambiguous", ["quadratic_drag"], ["viscous"], in_families=["friction over speed"]),
+        (True, False, False, False),
+        "set without the truth",
+    ),
+    # that the verdict calls them one family is not enough
+    (
+        truth(["viscous"]),
+        verdict("ambiguous", ["viscous"], ["dahl"], in_families=["friction"]),
+        (False, False, True, False),
+        "set with the truth",
+    ),
     (truth(["viscous"]), verdict("none"), (False, False, False, False), "none"),
     (truth(["viscous"]), verdict("failed"), (False, False, False, False), "no verdict"),
     (truth([], "none"), verdict("none"), (False, True, False, False), "none"),

@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Two machines compared on held-out records, and the choice among machines that are all wrong."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.misfit import foretold_chi2, refuted
 from separatrix.discovery.decision.partial import preferred
 from separatrix.discovery.fitting.heldout import Prediction, _records_own, ahead, gained, gained_together
 from separatrix.discovery.fitting.machine import Free
@@ -123,3 +125,40 @@ def test_a_guess_gives_crank_and_clock_of_the_record():
     guess.fit.values = np.array([8.0, 1e-4])
     own = [Free("nuisance:phase", 0.0, record=0), Free("nuisance:clock", 0.0, record=0)]
     assert _records_own(guess, own, np.array([0.3, 0.0])).tolist() == [0.3, 1e-4]
+
+
+def told(chi2: np.ndarray, gradient: float, information: float, error: float) -> Prediction:
+    """A prediction with one parameter of a machine, known to `error`."""
+    one = prediction(chi2, np.zeros(chi2.size), 1.0)
+    one.fit.unknowns, one.fit.evaluation = 2, SimpleNamespace(failed=np.zeros(chi2.size, bool))
+    one.fit.reduced = SimpleNamespace(
+        matrix=np.full((chi2.size, 1, 1), information), gradient=np.full((chi2.size, 1), gradient)
+    )
+    return replace(one, covariance=np.array([[error**2]]))
+
+
+def test_a_machine_that_leaves_noise_in_training_is_refuted_by_a_held_out_record_that_it_misses():
+    fitted, options = SimpleNamespace(reduced_chi2=0.98), Options()
+    noise = np.full(SEGMENTS, 48.0)
+    assert not refuted(told(noise, 0.0, 1.0, 0.1), fitted, options)
+    far = told(2238 * noise, 0.0, 1.0, 0.1)
+    assert refuted(far, fitted, options)
+    assert foretold_chi2(far, fitted) == pytest.approx(2238)
+    # a few segments may be caught in a wrong minimum
+    caught = noise.copy()
+    caught[:3] *= 2238
+    assert not refuted(told(caught, 0.0, 1.0, 0.1), fitted, options)
+    caught[:6] *= 2238
+    assert refuted(told(caught, 0.0, 1.0, 0.1), fitted, options)
+    # noise that is larger than stated in training is so here
+    assert not refuted(told(3 * noise, 0.0, 1.0, 0.1), SimpleNamespace(reduced_chi2=1.7), options)
+
+
+def test_what_an_error_of_the_parameters_explains_refutes_no_machine():
+    """A parameter that is off by two of its errors makes of a record of much information what it likes."""
+    fitted, options, information, off = SimpleNamespace(reduced_chi2=1.0), Options(), 100.0, 2.0
+    chi2 = np.full(SEGMENTS, 48.0) + information * off**2
+    missing = told(chi2, information * off, information, 1.0)
+    assert chi2.sum() / (48.0 * SEGMENTS) > 9
+    assert not refuted(missing, fitted, options)
+    assert refuted(replace(missing, covariance=np.array([[1e-4]])), fitted, options)

@@ -360,3 +360,21 @@ def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record
     options, data = replace(OPTIONS, adequate_chi2=2.0), SimpleNamespace(prepared=[])
     bench = SimpleNamespace(options=options, training=data)
     assert decide._conclude(bench, decision, best, []).outcome == outcome
+
+
+def test_forms_of_one_family_leave_the_family_in_no_doubt():
+    def one(*names: str, **gates: bool) -> SimpleNamespace:
+        return SimpleNamespace(fitted=SimpleNamespace(names=names), gates={"separate": False} | gates)
+
+    def families(best, *rivals, outcome="ambiguous") -> list[str]:
+        return decide.Decision(outcome, [best], [], list(rivals), [], None, None).in_families
+
+    drag = one("quadratic_drag", adequate=True)
+    assert families(drag, one("viscous"), one("friction_curve")) == ["friction over speed"]
+    assert families(drag, one("viscous"), one("offset_force")) == []
+    # without a rival something else is in doubt, as where another gate failed
+    assert families(drag) == families(one("quadratic_drag", stable=False), one("viscous")) == []
+    pair = one("cubic_spring", "viscous")
+    both = ["friction over speed", "spring over stretch"]
+    assert families(pair, one("quadratic_drag", "cubic_spring")) == both
+    assert families(pair, one("quadratic_drag")) == []

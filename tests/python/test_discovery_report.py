@@ -125,6 +125,7 @@ def verdict(outcome: str) -> dict:
         "effects": effects,
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
         "equivalent": False,
+        "in_families": [],
         "places": {},
         "equivalences": ["offset_force and sensor_bias: a shift"] if outcome == "ambiguous" else [],
         "parameters": parameters,

@@ -138,6 +138,10 @@ def summary(verdict: dict) -> list[str]:
             added(verdict),
         ],
     }[verdict["outcome"]]
+    if verdict["in_families"]:
+        lines.append(
+            f"  in any case {' and '.join(verdict['in_families'])}: the form is in doubt, not the family"
+        )
     lines += [f"  {name} sits {place}" for name, place in verdict["places"].items()]
     lines += [f"  {path} = {with_error(verdict['parameters'][path])}" for path in of_effects(verdict)]
     if verdict["function"]:

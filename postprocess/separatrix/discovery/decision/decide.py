@@ -9,7 +9,7 @@ import numpy as np
 from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
 from separatrix.discovery.decision.judge import NOISE, Judged, admissible, equivalent, sizeable
-from separatrix.discovery.decision.misfit import missed
+from separatrix.discovery.decision.misfit import CAUGHT, foretold_chi2, missed, misses
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, run_round
 from separatrix.discovery.decision.several import with_more
@@ -19,6 +19,7 @@ from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted, shared_values
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.fitting.rig import cleaned
@@ -29,11 +30,8 @@ _RENEWALS = 3
 _LEADERS = 3
 _LOWER = 1.0
 _LOWER_SHARE = 0.01
-# standard deviations of chi^2 by which a held-out record is missed for another effect to be tried, and the
-# share of this gap that it must close
-_CHANCE, _CLOSES = 4.0, 0.5
-# segments that may be caught in a wrong minimum
-_CAUGHT = 3
+# share of a gap of held-out records that another effect must close
+_CLOSES = 0.5
 
 
 @dataclass
@@ -61,6 +59,22 @@ class Decision:
     not_added: str = ""
 
     @property
+    def in_families(self) -> list[str]:
+        """Families that the best and all its rivals agree on, where nothing else is in doubt; else none.
+
+        Forms of one family that fit alike are one function within what the records tell of it.
+        """
+        best = self.accepted[0] if self.accepted else None
+        if (
+            best is None
+            or not self.rivals
+            or any(not ok for gate, ok in best.gates.items() if gate != "separate")
+        ):
+            return []
+        found = [sorted(effect_of(name).family for name in one.fitted.names) for one in (best, *self.rivals)]
+        return found[0] if self.outcome == "ambiguous" and all(one == found[0] for one in found) else []
+
+    @property
     def corrected(self) -> Judged | None:
         """The machine that goes on: with the effects of the verdict, or with a table that has no name."""
         return self.accepted[0] if self.accepted else self.added
@@ -79,7 +93,13 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     best, rivals = _lead(bench, first)
     found = first
     if not _detected(best):
-        return _shape_alone(bench, _without_name(bench, decision), first)
+        decision = _shape_alone(bench, _without_name(bench, decision), first)
+        if best.gates["detect"] and not decision.accepted:
+            decision.reasons.append(
+                f"{best.name} gains more than chance does (p = {best.p:.1g}), but few segments carry that, "
+                "which may be in a wrong minimum: longer records would tell"
+            )
+        return decision
     shaped = None if best.gates["adequate"] else _shaped(bench, first)
     if shaped is None and not (best.gates["adequate"] or bench.options.quick):
         # the linear screen may have passed over the effect that closes the gap
@@ -96,7 +116,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         return _conclude(bench, decision, *_with_more_foretold(bench, decision, best, rivals))
     if shaped is None and found is not first:
         shaped = _shaped(bench, found, first)
-    if shaped is not None and not (_of_two_directions(shaped[0]) and bench.options.most_effects > 1):
+    if shaped is not None and not (_of_several(bench, shaped[0]) and bench.options.most_effects > 1):
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
         return _give_up(bench, decision, best)
@@ -128,7 +148,7 @@ def _with_more_foretold(
     told = best.prediction
     if told is None or bench.options.quick or bench.options.most_effects < 2 or best.leaves != NOISE:
         return best, rivals
-    if not _misses(told, best.fitted.fit, bench.options):
+    if not misses(told, best.fitted.fit, bench.options):
         return best, rivals
     rounds = list(decision.rounds)
     whole, others, closed = with_more(bench, rounds, best)
@@ -138,18 +158,6 @@ def _with_more_foretold(
         return best, rivals
     decision.rounds = rounds
     return whole, others
-
-
-def _misses(told: Prediction, fitted: Fit, options: Options) -> bool:
-    """Whether held-out records are missed, by more than chance and not in a few segments alone."""
-    fit, kept = told.fit, told.good.copy()
-    caught = suspicious(fit)
-    if caught.size <= _CAUGHT:
-        kept[caught] = False
-    freedom = float((fit.counts - fit.unknowns)[kept].sum())
-    # noise that was measured too large where it was fitted was so here
-    size = fit.chi2[kept].sum() / max(1.0, freedom) / min(1.0, fitted.reduced_chi2)
-    return bool(size > max(options.adequate_chi2, 1 + _CHANCE * np.sqrt(2 / max(1.0, freedom))))
 
 
 def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
@@ -179,6 +187,17 @@ def _shaped(bench: Bench, found: Round, earlier: Round | None = None) -> tuple[J
         one.gates[gate] for gate in ("adequate", "admissible", "converged", "hold-out") if gate in one.gates
     ]
     return member if all(needed) else None
+
+
+def _of_several(bench: Bench, one: Judged) -> bool:
+    """Whether a function may be the sum of several effects.
+
+    A table of friction for each direction says what two closed forms say with less; and what follows the
+    fitted records but not held-out ones may have taken over what another effect does.
+    """
+    if bench.options.quick or one.prediction is None:
+        return _of_two_directions(one)
+    return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, bench.options)
 
 
 def _of_two_directions(one: Judged) -> bool:
@@ -265,6 +284,12 @@ def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judge
     """A name, if every gate is passed; else what it could be."""
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
+    if "foretold" in failed:
+        size = foretold_chi2(best.prediction, best.fitted.fit)
+        decision.reasons.append(
+            f"held-out records are missed by more than the noise and what errors of the parameters would "
+            f"explain: the reduced chi^2 left there is {size:.4g}"
+        )
     # what only fitted records say, over a base that is not at its minimum, may be what the base lacks to it
     proven = best.gates.get("hold-out", False) or decision.rounds[0].base.fit.converged
     if not (best.gates["admissible"] and best.gates["converged"] and proven):
@@ -330,7 +355,7 @@ def _gap_of_base(bench: Bench, decision: Decision) -> tuple[list[str], bool]:
     left = [one for data, fit in fits for one in missed(data, fit, bench.options)]
     wide = _wide(decision.base_ceiling, base.fit, bench.options)
     caught = suspicious(base.fit) if wide else np.zeros(0, int)
-    if 0 < caught.size <= _CAUGHT:
+    if 0 < caught.size <= CAUGHT:
         others = without_segments(base.fit, caught)
         wide = _wide(ceiling(base.problem, others, bench.scales.mass), others, bench.options)
     return left, wide

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 
 from separatrix.discovery.decision.judge import (
+    LITTLE,
     Judged,
     adequate,
     admissible,
@@ -17,6 +18,7 @@ from separatrix.discovery.decision.judge import (
     sizeable,
     stable,
 )
+from separatrix.discovery.decision.misfit import refuted
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.heldout import Prediction
@@ -81,3 +83,6 @@ def judge_ceiling(bench: Bench, one: Judged) -> None:
     one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
     one.leaves = adequate(one, bench.options)
     one.gates["adequate"] = bool(one.leaves)
+    if one.prediction is not None:
+        closed = one.leaves == LITTLE
+        one.gates["foretold"] = closed or not refuted(one.prediction, one.fitted.fit, bench.options)

@@ -7,8 +7,10 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.heldout import Prediction, explained
 from separatrix.discovery.fitting.noise import noise_of, white_share
 from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
@@ -23,6 +25,11 @@ _DISAGREEMENT = 1.3
 _LARGER = 2.0
 # share of the noise that is rounding from which on its size is no known one
 _ROUNDING = 0.2
+
+# segments that may be caught in a wrong minimum
+CAUGHT = 3
+# standard deviations of chi^2 that are no chance
+_CHANCE = 4.0
 
 
 def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
@@ -47,6 +54,40 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
         if size > _limit(data.prepared[number], options)
         and chi2.sf(size * freedom, freedom) < options.detection_level / len(found)
     ]
+
+
+def misses(told: Prediction, fitted: Fit, options: Options) -> bool:
+    """Whether held-out records are missed, by more than chance and not in a few segments alone."""
+    kept, freedom = _followed(told)
+    # noise that was measured too large where it was fitted was so here
+    size = told.fit.chi2[kept].sum() / freedom / min(1.0, fitted.reduced_chi2)
+    return bool(size > max(options.adequate_chi2, 1 + _CHANCE * np.sqrt(2 / freedom)))
+
+
+def refuted(told: Prediction, fitted: Fit, options: Options) -> bool:
+    """Whether held-out records are missed so far that no error of noise or parameters is the reason."""
+    _, freedom = _followed(told)
+    return foretold_chi2(told, fitted) > max(options.missed_chi2, 1 + _CHANCE * np.sqrt(2 / freedom))
+
+
+def foretold_chi2(told: Prediction, fitted: Fit) -> float:
+    """Reduced chi^2 of held-out records over that in training, where it is above 1.
+
+    What an error of the parameters explains that is likely by what training says of them is taken off, and
+    the few segments that may be caught in a wrong minimum are left out.
+    """
+    kept, freedom = _followed(told)
+    left = told.fit.chi2[kept].sum() - explained(told, kept)
+    return float(left / freedom / max(1.0, fitted.reduced_chi2))
+
+
+def _followed(told: Prediction) -> tuple[np.ndarray, float]:
+    """Held-out segments without a few that may be caught in a wrong minimum, and their degrees of freedom."""
+    fit, kept = told.fit, told.good.copy()
+    caught = suspicious(fit)
+    if caught.size <= CAUGHT:
+        kept[caught] = False
+    return kept, max(1.0, float((fit.counts - fit.unknowns)[kept].sum()))
 
 
 def _limit(one: Prepared, options: Options) -> float:

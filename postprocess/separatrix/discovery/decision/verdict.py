@@ -60,6 +60,7 @@ def verdict_of(findings: Findings) -> dict:
         "not_added": decision.not_added,
         "alternatives": ["+".join(names) for names in decision.alternatives],
         "equivalent": decision.equivalent,
+        "in_families": decision.in_families,
         "equivalences": equivalents([*named, *[names[-1] for names in decision.alternatives]]),
         "parameters": _parameters(final),
         "base_parameters": _parameters(findings.base),

@@ -205,14 +205,28 @@ def _with(model, known: list[tuple[Free, float]]):
         return None
 
 
+def explained(one: Prediction, rows: np.ndarray) -> float:
+    """What of chi^2 of some segments an error of the parameters explains that is likely by what is known."""
+    reduced = one.fit.reduced
+    matrix, gradient = (table[rows].sum(axis=0)[None] for table in (reduced.matrix, reduced.gradient))
+    return float(_explained(matrix, gradient, one.covariance)[0][0])
+
+
 def _scores(chi2: np.ndarray, matrix: np.ndarray, gradient: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Log density of each segment, its start free, the machine known up to its covariance."""
+    part, spread = _explained(matrix, gradient, covariance)
+    _, logarithm = np.linalg.slogdet(spread)
+    return -0.5 * (chi2 - part) - 0.5 * logarithm
+
+
+def _explained(
+    matrix: np.ndarray, gradient: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What errors of the parameters explain of chi^2 of each segment, and the spread of such errors."""
     shared = covariance.shape[0]
     values, vectors = np.linalg.eigh(covariance) if shared else (np.zeros(0), np.zeros((0, 0)))
     root = vectors * np.sqrt(np.maximum(values, 0))
     matrix = root.T @ matrix[:, :shared, :shared] @ root
     gradient = (root.T @ gradient[:, :shared, None])[:, :, 0]
     spread = matrix + np.eye(shared)
-    explained = np.einsum("ki,ki->k", gradient, np.linalg.solve(spread, gradient[:, :, None])[:, :, 0])
-    _, logarithm = np.linalg.slogdet(spread)
-    return -0.5 * (chi2 - explained) - 0.5 * logarithm
+    return np.einsum("ki,ki->k", gradient, np.linalg.solve(spread, gradient[:, :, None])[:, :, 0]), spread

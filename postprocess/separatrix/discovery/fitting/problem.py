@@ -8,6 +8,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.forces import force_argument, force_needed
+from separatrix.discovery.fitting.late import DELAY, Flown, flown_late
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, padded, seeing
@@ -224,7 +225,8 @@ class Problem:
         if derivatives and by_start_alone:
             moves, directions = np.zeros_like(moves), directions[:0]
         start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
-        result = self._simulate(part, active, given, start, directions)
+        seen = self._simulate(number, part, active, given, start, directions)
+        result = seen.shown
         rows, inside = part["rows"], part["inside"]
         length = inside.shape[1]
         failed = np.asarray(result.reason) != 0
@@ -241,13 +243,13 @@ class Problem:
         jacobians = (None, None)
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
-            jacobians = self._derivatives(number, part, moves, result)
+            jacobians = self._derivatives(number, part, moves, seen)
             n = len(directions)
             out.transition[rows, :, 0, :] = padded_table(result.jacobian[:, n : n + 2], inside)
             out.transition[rows, :, 1, :] = padded_table(result.velocity_jacobian[:, n : n + 2], inside)
         spread = prepared.samples.spread(prepared.memory)[part["samples"]]
         for channel, (measured, computed, size) in enumerate(
-            ((part["x"], result.x, prepared.sigma), (part["v"], result.v, prepared.velocity_sigma))
+            ((part["x"], result.x, prepared.sigma), (part["v"], seen.v, prepared.velocity_sigma))
         ):
             if measured is None:
                 continue
@@ -289,19 +291,25 @@ class Problem:
 
     def _simulate(
         self,
+        number: int,
         part: dict,
         active: list[str],
         given: np.ndarray,
         start: np.ndarray,
         directions: np.ndarray | None,
-    ):
+    ) -> Flown:
         more = {} if part["force"] is None else {"force": part["force"]}
         more |= {
             "derivatives": directions is not None,
             "directions": directions,
             "tolerance": part["tolerance"],
         }
-        return self.model.segments(active, given, start, part["offsets"], part["times"], **more)
+        flight = (active, given, start, part["offsets"], part["times"])
+        if DELAY in active and part["v"] is not None and self.prepared[number].frequency is not None:
+            frequency = self.model.drive_frequency(dict(zip(active, given, strict=True)))
+            return flown_late(self.model, *flight, frequency, **more)
+        result = self.model.segments(*flight, **more)
+        return Flown(result, result.v, result.velocity_jacobian)
 
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
@@ -380,7 +388,7 @@ class Problem:
         slope = (ends[0] - ends[1]) / (2 * step)
         return -ratio * slope / (0.5 * (ends[0] + ends[1]))
 
-    def _derivatives(self, number: int, part: dict, moves: np.ndarray, result) -> list:
+    def _derivatives(self, number: int, part: dict, moves: np.ndarray, seen: Flown) -> list:
         """Derivatives of x and v by the start, and by the free parameters through machine and crank."""
         n = np.count_nonzero(moves)
         prepared = self.prepared[number]
@@ -392,7 +400,7 @@ class Problem:
                 crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
         crank = np.repeat(crank, np.diff(part["offsets"]), axis=0)
         found = []
-        for whole in (result.jacobian, result.velocity_jacobian):
+        for whole in (seen.shown.jacobian, seen.velocity_jacobian):
             by_parameter = whole[:, n + 2 : n + 3] * crank
             by_parameter[:, moves] += whole[:, :n]
             found.append((whole[:, n : n + 2], by_parameter))

@@ -23,6 +23,7 @@ GATES = {
     "admissible": "sign and size make sense, and differ from zero",
     "stable": "the effect pays in nearly every resampling of the record",
     "adequate": "what is left is noise",
+    "foretold": "held-out records are followed as well",
     "drop": "each of the effects is needed beside the other",
 }
 
@@ -90,6 +91,10 @@ def _summary(verdict: dict) -> Section:
         )
     elif verdict["not_added"]:
         lines.append(f"{verdict['not_added'][0].upper()}{verdict['not_added'][1:]}.")
+    if verdict["in_families"]:
+        lines.append(
+            f"In any case it is {' and '.join(verdict['in_families'])}: the form is in doubt, not the family."
+        )
     lines += [f"{words(name)} sits {place}." for name, place in verdict["places"].items()]
     for path in of_effects(verdict):
         one = verdict["parameters"][path]
