@@ -67,7 +67,7 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
     notes = []
     units = units_of(problem.model.parameters)
     unit = units.force if problem.in_force else units.position
-    factors, _ = noise_of(problem, fit, 0, mass)
+    factors = noise_of(problem, fit, 0, mass).factors
     found = record_chi2(data, fit)
     for number, one in enumerate(data.prepared):
         if number not in found:
