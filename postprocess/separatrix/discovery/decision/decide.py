@@ -21,7 +21,7 @@ from separatrix.discovery.fitting.fit import Fit, minimise, without_segments
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted, shared_values
 from separatrix.discovery.fitting.rescue import suspicious
-from separatrix.discovery.fitting.rig import cleaned
+from separatrix.discovery.fitting.rig import cleaned_prediction
 from separatrix.discovery.options import Options
 
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
@@ -326,7 +326,7 @@ def _gap_of_base(bench: Bench, decision: Decision) -> tuple[list[str], bool]:
     base = decision.rounds[0].base
     fits = [(bench.training, decision.base_ceiling.fit)]
     if bench.held_out is not None and decision.foretold is not None:
-        fits.append((bench.held_out, cleaned(decision.foretold.problem, decision.foretold.fit)))
+        fits.append((bench.held_out, cleaned_prediction(base, decision.foretold)))
     left = [one for data, fit in fits for one in missed(data, fit, bench.options)]
     wide = _wide(decision.base_ceiling, base.fit, bench.options)
     caught = suspicious(base.fit) if wide else np.zeros(0, int)

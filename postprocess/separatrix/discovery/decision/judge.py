@@ -315,7 +315,8 @@ def adequate(one: Judged, options: Options) -> str:
     trifle = share > 0.5 and not sizeable(one.ceiling.closable, fit, options)
     clean = one.ceiling.p > options.detection_level or trifle
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
-    if fit.sample_chi2 <= options.adequate_chi2 and (clean or closed):
+    doubt = max((record.doubt for record in one.fitted.problem.prepared), default=1.0)
+    if fit.sample_chi2 <= doubt * options.adequate_chi2 and (clean or closed):
         return NOISE
     if _all_closed(one, options):
         return LITTLE

@@ -52,10 +52,11 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
 def _limit(one: Prepared, options: Options) -> float:
     """Reduced chi^2 above which a record is missed.
 
-    Noise that nobody stated is itself an estimate, and rounding follows the motion instead of chance.
+    Noise that nobody stated is itself an estimate, as its memory is, and rounding follows the motion instead
+    of chance.
     """
     rounding = one.resolution**2 / 12 > _ROUNDING * one.sigma**2
-    return options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2
+    return one.doubt * (options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2)
 
 
 def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:

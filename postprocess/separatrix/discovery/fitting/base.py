@@ -86,6 +86,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     known = found.of_samples or misfit < _MISFIT
     for prepared in data.prepared:
         prepared.memory = found.memory if known else 0.0
+        prepared.memory_error = found.error
 
 
 def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
@@ -150,5 +151,6 @@ def limit_noise(source: Data, target: Data) -> bool:
 def copy_noise(source: Data, target: Data) -> None:
     """Give records that are not fitted the memory of the noise of those that are."""
     memory = float(np.mean([one.memory for one in source.prepared]))
+    error = float(np.mean([one.memory_error for one in source.prepared]))
     for one in target.prepared:
-        one.memory = memory
+        one.memory, one.memory_error = memory, error

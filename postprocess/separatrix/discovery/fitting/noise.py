@@ -51,6 +51,8 @@ class Noise:
 
     factors: dict[int, float]
     memory: float
+    # standard error of that correlation
+    error: float = 0.0
     # whether the memory is that of what condensed stretches leave over, in which no machine has a part
     of_samples: bool = False
 
@@ -65,7 +67,9 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float
     # a row of stretches stands for all of one length
     if left.record.size < _FEWEST and not stretches:
         return Noise({}, 0.0)
-    memory = _memory_of(_joined(stretches) if stretches else left) if known is None else known
+    memory, error = _memory_of(_joined(stretches) if stretches else left)
+    if known is not None:
+        memory = known
     if problem.in_force and memory > _MOST:
         memory = 0.0
     factors = {}
@@ -73,11 +77,11 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float
         rows = left.record == number
         expected = float(np.interp(memory, _MEMORIES, left.powers[:, rows].sum(axis=1)))
         factors[int(number)] = float(np.sqrt(left.power[rows].sum() / expected))
-    return Noise(factors, memory, bool(stretches))
+    return Noise(factors, memory, error, bool(stretches))
 
 
-def _memory_of(left: _Left) -> float:
-    """Correlation of neighbours of noise that leaves as much, 0 where it may be chance."""
+def _memory_of(left: _Left) -> tuple[float, float]:
+    """Correlation of neighbours of noise that leaves as much, 0 if it may be chance; its standard error."""
     # each record in its own size
     size = np.ones(left.record.size)
     for number in np.unique(left.record):
@@ -86,7 +90,11 @@ def _memory_of(left: _Left) -> float:
     ratio = left.products.sum(axis=1) / left.powers.sum(axis=1)
     seen = float(np.sum(left.product / size) / np.sum(left.power / size))
     memory = float(np.interp(seen, ratio, _MEMORIES))
-    return 0.0 if memory < max(_LEAST, _SURE / np.sqrt(left.freedom.sum())) else memory
+    # Bartlett's variance of the correlation of neighbours, over how fast it changes with the memory
+    freedom = left.freedom.sum()
+    slope = float(np.interp(memory, _MEMORIES, np.gradient(ratio, _MEMORIES)))
+    error = float(np.sqrt((1 - memory**2) / freedom)) / max(slope, 1e-3)
+    return (0.0 if memory < max(_LEAST, _SURE / np.sqrt(freedom)) else memory), error
 
 
 def white_share(memory: float) -> float:

@@ -90,7 +90,7 @@ class Samples:
         return self._of_noise(memory)[1]
 
     def weights(self, memory: float) -> np.ndarray:
-        """Degrees of freedom over the squares that such noise of size 1 leaves, at first rows of stretches."""
+        """Degrees of freedom over the squares that such noise of size 1 leaves, at first rows."""
         found = np.zeros(self.size.size)
         for size in self.lengths:
             rows = (self.size == size) & (self.node == 0)
