@@ -10,6 +10,7 @@ from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nu
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.rig import cleaned
 from separatrix.discovery.fitting.sensed import SensedData, joint_parameters, measure_sensors
 from separatrix.discovery.measured.signals import white_noise
 
@@ -84,6 +85,9 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
     # values of stretches scatter by more than samples do where the noise has memory: that is no misfit
     known = found.of_samples or misfit < _MISFIT
+    if not known and found.memory:
+        # nor are small faults of a rig
+        known = misfit * cleaned(problem, fit).reduced_chi2 / fit.reduced_chi2 < _MISFIT
     for prepared in data.prepared:
         prepared.memory = found.memory if known else 0.0
         prepared.memory_error = found.error
