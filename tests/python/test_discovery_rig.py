@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fitting.base import fit_base
+from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import ceiling
-from separatrix.discovery.fitting.data import gather
+from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.heldout import Known, predict
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.rig import (
     beside_faults,
     cleaned,
     cleaned_prediction,
     share_beside_faults,
+    share_foretold,
 )
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -77,16 +79,17 @@ def test_what_is_a_fault_of_the_rig_is_no_effect():
     assert share_beside_faults(replace(base, fit=cleaned(base.problem, base.fit)), base) < 0.3
 
 
-def two_records(curved: tuple[float, float, float], seed: int = 5) -> tuple[Model, list]:
-    """Two records and one held out of the machine of the case; each has a sensor of its own curvature."""
+def three_records(curved: tuple[float, float, float], drag: float = 0.0) -> tuple[Model, list]:
+    """Two records and one held out of the machine of a machine with drag; each sensor has its own curve."""
     base = Model.from_text(CASE)
+    true = base.with_effect("quadratic_drag", {"coefficient": drag}) if drag else base
     t = np.arange(1200) / 125
     prepared = []
     for number, (ratio, square) in enumerate(zip((1.1, 0.8, 1.3), curved, strict=True)):
         start = np.array([[0.6, 0.0, 0.4]])
         paths, values = ["drive.ratio"], np.array([ratio])
-        x = base.segments(paths, values, start, np.array([0, t.size]), t, derivatives=False).x
-        noise = np.random.default_rng([seed, number]).standard_normal(t.size)
+        x = true.segments(paths, values, start, np.array([0, t.size]), t, derivatives=False).x
+        noise = np.random.default_rng([5, number]).standard_normal(t.size)
         x = x + square * x.std() * ((x - x.mean()) / x.std()) ** 2 + NOISE / 2 * noise
         head = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "sensor_noise_sigma_m": NOISE / 2}
         prepared.append(prepare(make_record(f"r{number}", {"t": t, "x": x}, head), base))
@@ -95,7 +98,7 @@ def two_records(curved: tuple[float, float, float], seed: int = 5) -> tuple[Mode
 
 def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_number():
     """Neither where it was fitted nor foretold; the intervals hold what faults have moved."""
-    base, prepared = two_records((1e-3, -1e-3, 8e-4))
+    base, prepared = three_records((1e-3, -1e-3, 8e-4))
     fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
     assert fitted.fit.sample_chi2 > 1.5
     assert ceiling(fitted.problem, fitted.fit, 1.0).fit.sample_chi2 < 1.1
@@ -114,3 +117,20 @@ def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_nu
             narrow.append(off[-1] * beside.errors[i] / np.sqrt(fitted.covariance[i, i]))
     assert max(off) < 3
     assert max(narrow) > 5
+
+
+@pytest.mark.parametrize(("curved", "drag"), [(1e-3, 0.0), (0.0, 0.1)])
+def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_explain_it(curved, drag):
+    base, prepared = three_records((curved, -curved, curved), drag)
+    training, held_out = gather(prepared[:2], 1.0, None), gather(prepared[2:], 1.0, None)
+    without = fit_base(training, base, 1.0)
+    found = candidate(base, without.problem.free, (), "quadratic_drag", scales_of(training, base))
+    problem = training.problem(found.model, training.last, found.free)
+    fit = minimise(problem, values_of(without, found.free), without.fit.starts)
+    effect = Fitted(found.names, found.model, problem, fit, found.added)
+    told = [
+        predict(held_out, one.model, one.problem.free, Known(one.fit.values, one.covariance, one.unseen))
+        for one in (effect, without)
+    ]
+    share = share_foretold(*told, without)
+    assert share > 0.6 if drag else share < 0.2

@@ -286,7 +286,7 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
     elif decision.rounds[0].base.fit.sample_chi2 > bench.options.adequate_chi2:
-        decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
+        decision.reasons.append(_no_gap(bench, decision))
     if wide:
         decision.outcome = "not-in-catalogue"
         name = decision.base_ceiling.best.name
@@ -295,6 +295,17 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
         what = "free forces" if several else f"forces that depend on {name}"
         decision.reasons.append(f"{what} would explain more, no effect does")
     return decision
+
+
+def _no_gap(bench: Bench, decision: Decision) -> str:
+    """Why what the base machine leaves is more than noise and yet no gap, in words."""
+    before, beside = decision.rounds[0].base.fit.sample_chi2, decision.base_ceiling.fit.sample_chi2
+    if beside > bench.options.adequate_chi2:
+        return "a reduced chi^2 as large as that may be chance with so few samples"
+    return (
+        f"what the base machine leaves (reduced chi^2 {before:.3g}) may be small faults of the rig, of some "
+        f"1e-3 of the signal: beside them it is {beside:.3g}"
+    )
 
 
 def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:

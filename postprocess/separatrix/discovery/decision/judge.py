@@ -45,6 +45,9 @@ class Judged:
     ceiling: Ceiling | None = None
     # share of the gain that small faults of a rig do not explain
     own: float = 1.0
+    # the same of what is gained on held-out records, and what the base foretold there
+    own_foretold: float = 1.0
+    foretold: Prediction | None = None
     # what it leaves, if it is adequate
     leaves: str = ""
 
@@ -75,7 +78,7 @@ def judged(
     if prediction is not None and foretold is not None:
         parts = gained_together(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
-    return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
+    return Judged(fitted, prediction, training, float(parts.sum()), parts, live, foretold=foretold)
 
 
 def lead(one: Judged, other: Judged) -> float:
@@ -91,7 +94,7 @@ def detection(one: Judged, tested: float, inflation: float) -> float:
 
     What small faults of the rig may explain of it is no gain.
     """
-    gained = one.own * (one.training + one.held_out)
+    gained = one.own * one.training + one.own_foretold * one.held_out
     return family_wise(2 * gained / inflation, one.parameters, tested)
 
 

@@ -86,6 +86,14 @@ class Beside:
         """Some of the parameters."""
         return Beside(self.shift[places], self.covariance[np.ix_(places, places)])
 
+    def add_to(self, matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray) -> None:
+        """Add what is known to normal equations whose first unknowns these are, and let them move."""
+        m, seen = self.shift.size, np.diag(self.covariance) > 0
+        precision = _inverse(self.covariance, seen)
+        matrix[:m, :m] += precision
+        gradient[:m] += precision @ self.shift
+        open_[:m] |= seen
+
     @property
     def errors(self) -> np.ndarray:
         """Standard errors, what faults may have moved a parameter by included."""
@@ -103,12 +111,7 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
     p = evaluation.by_parameter.shape[2]
     without = solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     if known is not None:
-        m = known.shift.size
-        seen = np.diag(known.covariance) > 0
-        precision = _inverse(known.covariance, seen)
-        matrix[:m, :m] += precision
-        gradient[:m] += precision @ known.shift
-        open_[:m] |= seen
+        known.add_to(matrix, gradient, open_)
     sizes = solve_scaled(_bounded(matrix, gradient, p, open_), gradient, open_)
     # a step that the fit has without faults is none of theirs
     sizes[:p] -= without
@@ -120,8 +123,13 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
 
 def cleaned_prediction(fitted: Fitted, told: Prediction) -> Fit:
     """What a machine foretells, without what faults may explain of it and may have made of its parameters."""
+    return cleaned(told.problem, told.fit, _shared(fitted))
+
+
+def _shared(fitted: Fitted) -> Beside:
+    """What training records know beside faults of the parameters that held-out records share with them."""
     shared = [i for i, one in enumerate(fitted.problem.free) if one.record is None]
-    return cleaned(told.problem, told.fit, beside_faults(fitted.problem, fitted.fit).of(shared))
+    return beside_faults(fitted.problem, fitted.fit).of(shared)
 
 
 def beside_faults(problem: Problem, fit: Fit) -> Beside:
@@ -181,10 +189,20 @@ def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -
     return found[0] - found[1]
 
 
-def share_beside_faults(one: Fitted, other: Fitted) -> float:
+def share_foretold(one: Prediction, other: Prediction, base: Fitted) -> float:
+    """The same of what is foretold; the other machine, `base`, is known as training records know it."""
+    beside = _shared(base)
+    without = Beside(np.zeros(beside.shift.size), other.covariance)
+    return share_beside_faults(one, other, (without, beside))
+
+
+def share_beside_faults(
+    one: Fitted | Prediction, other: Fitted | Prediction, known: tuple[Beside, Beside] | None = None
+) -> float:
     """Share of what one machine explains of what another leaves over that faults of a rig do not.
 
-    Linearised, the parameters of the other machine fitted beside them.
+    Linearised, the parameters of the other machine fitted beside them; those that held-out records do not
+    tell as they are `known` without and beside faults.
     """
     evaluation, both = other.fit.evaluation, common(one, other)
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
@@ -192,14 +210,17 @@ def share_beside_faults(one: Fitted, other: Fitted) -> float:
     p, q = evaluation.by_parameter.shape[2], faults.shape[2]
     columns = np.concatenate([evaluation.by_parameter, faults, moved], axis=2)
     weights = evaluation.used * both[:, None]
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
-        0
-    ].total()
-    open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(q, bool)]
-    alone = np.r_[:p, p + q]
-    without = _gain(*project(matrix[np.ix_(alone, alone)], gradient[alone], p, open_[:p]))
-    matrix[:-1, :-1] = _bounded(matrix[:-1, :-1], gradient[:-1], p, open_)
-    beside = _gain(*project(matrix, gradient, p + q, open_))
+    reduced, _, _ = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))
+    gains = []
+    for place, kept in enumerate((np.r_[:p, p + q], np.r_[: p + q + 1])):
+        matrix, gradient = reduced.total()
+        matrix, gradient = matrix[np.ix_(kept, kept)], gradient[kept]
+        open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(kept.size - p - 1, bool)]
+        if known is not None:
+            known[place].add_to(matrix, gradient, open_)
+        matrix[:-1, :-1] = _bounded(matrix[:-1, :-1], gradient[:-1], p, open_)
+        gains.append(_gain(*project(matrix, gradient, kept.size - 1, open_)))
+    without, beside = gains
     return float(np.clip(beside / without, 0.0, 1.0)) if without > 0 else 1.0
 
 
