@@ -171,8 +171,11 @@ def main() -> None:
     parser.add_argument("--machines", nargs="*", choices=[row.key for row in ROWS])
     parser.add_argument("--limits", action="store_true")
     parser.add_argument("--build", type=Path, default=SOURCE / "build")
-    parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "performance.md")
+    parser.add_argument("--output", type=Path)
     options = parser.parse_args()
+    if options.output and (options.limits or options.machines is not None):
+        parser.error("--output: found with --limits or --machines, whose pages have one place each")
+    options.output = options.output or SOURCE / "docs" / "performance.md"
     began = time.perf_counter()
     results = Results(QUICK if options.quick else Sizes())
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:

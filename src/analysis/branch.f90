@@ -9,7 +9,7 @@ module branch
   use branch_passage, only: change_all, enter_sequence, first_passed, label_of_margin, most_secants, no_passage, &
     note_bifurcations
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
-    label_pd, label_range, label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
+    label_pd, label_range, label_release, label_run, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up
   use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
@@ -388,7 +388,7 @@ contains
     points = [points, point]
     if (.not. known) ending = point%label
     ! Impact after impact is put in as a chatter is approached.
-    if (passed%kind == of_gap .and. longest_run(at%now%orbit) >= long_run) ending = label_long
+    if (passed%kind == of_gap .and. longest_run(at%now%orbit) >= long_run) ending = label_run
     if (ending /= no_label) return
     points = [points, beyond%now]
     beyond%came = beyond%step

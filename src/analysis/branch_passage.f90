@@ -9,6 +9,7 @@ module branch_passage
   use branch_point, only: label_bp, label_gr, label_gr_fold, label_not_known, label_ns, label_pd, label_sn, label_stick, &
     label_stiction, no_label, point_t, set_point, step_to, trace_t
   use kinds, only: wp
+  use margin_cause, only: cause_of, together
   use motion_state, only: event_separation
   use one_body, only: one_body_t
   use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_release, of_slip, of_stick, &
@@ -16,8 +17,9 @@ module branch_passage
   use other_sequence, only: change_sequence
   use orbit_motion, only: is_admissible
   use periodic_orbit, only: correct_orbit, direct, orbit_t
+  use short_slip, only: stays_stuck, sticks_apart, with_slip
   use secant_bracket, only: bracket_t, narrow, next_trial
-  use soft_graze, only: enter_touches, is_touch, touches_apart, touching, vanishing_touch
+  use soft_graze, only: enter_apart, is_touch, touches_apart, touching, vanishing_touch
   use structure, only: structure_t
   use structure_sequence, only: change_structure_sequence
   implicit none
@@ -25,9 +27,8 @@ module branch_passage
 
   public :: first_passed, note_bifurcations, label_of_margin, change_all, enter_sequence
 
-  !> A margin within this of 0 is not passed; margins within this of 0 are zero together.
+  !> A margin within this of 0 is not passed.
   real(wp), parameter, public :: no_passage = 1e-11_wp
-  real(wp), parameter :: together = 1e-9_wp
   integer, parameter, public :: most_secants = 60
   !> A test of multipliers that is below this on both sides of a step is zero throughout.
   real(wp), parameter :: rounding = 1e-9_wp
@@ -62,42 +63,13 @@ contains
       next = there
       passed = candidate
       i = vanishing_touch(there%now%orbit, there%margins, candidate%joint)
-      if (i == 0) i = lost_impact(there%margins, candidate)
-      if (i == 0) i = changed_order(there%now%orbit, there%margins, candidate)
+      if (i == 0) i = cause_of(there%now%orbit, there%margins, candidate)
       if (i == 0) cycle
       ! The order of its events and the gap pass zero with it.
       passed = there%margins%list(i)
       return
     end do
   end subroutine first_passed
-
-  !> The number of an impact that loses its speed where friction between the same bodies would turn round with it: the slide's
-  !> margin passes zero with it; 0 without.
-  pure integer function lost_impact(margins, candidate) result(number)
-    type(margins_t), intent(in) :: margins
-    type(margin_t), intent(in) :: candidate
-    number = 0
-    if (all(candidate%kind /= [of_turning, of_stick, of_slip, of_hold])) return
-    do number = 1, size(margins%list)
-      if (margins%list(number)%kind == of_impact .and. abs(margins%list(number)%value) <= together) return
-    end do
-    number = 0
-  end function lost_impact
-
-  !> The number of the order of two events of different joints that change places, where what the first has just done to its own
-  !> guard seems to be undone after the second: that margin passes zero with it; 0 without.
-  pure integer function changed_order(orbit, margins, candidate) result(number)
-    type(orbit_t), intent(in) :: orbit
-    type(margins_t), intent(in) :: margins
-    type(margin_t), intent(in) :: candidate
-    do number = 1, size(margins%list)
-      associate (one => margins%list(number))
-        if (one%kind /= of_order .or. one%event /= -candidate%event - 1 .or. .not. abs(one%value) <= together) cycle
-        if (orbit%events(one%event - 1)%joint == candidate%joint .and. orbit%events(one%event)%joint /= candidate%joint) return
-      end associate
-    end do
-    number = 0
-  end function changed_order
 
   !> The margin that falls below zero first, as far as a straight line tells.
   pure subroutine most_negative(before, after, candidate)
@@ -307,6 +279,10 @@ contains
       i = maxloc(place, 1)
       place(i) = -1
       before = changed
+      if (stops_later(at, at%margins%list(i))) then
+        changed = with_slip(at%machines%centre, before, at%margins%list(i)%event)
+        cycle
+      end if
       select type (machine => at%machines%centre)
       type is (one_body_t)
         call change_sequence(machine, before, at%margins%list(i), changed, known)
@@ -316,8 +292,39 @@ contains
     end do
   end subroutine change_all
 
-  !> A first point with the new sequence, on the side on which its motion really has those events.
+  !> Whether the joint turns round and slips back for a while before it sticks, where the margin of its stick is zero.
+  pure logical function stops_later(at, margin)
+    type(trace_t), intent(in) :: at
+    type(margin_t), intent(in) :: margin
+    stops_later = margin%kind == of_stick .and. margin%event > 0
+    if (stops_later) stops_later = stays_stuck(at%machines%centre, at%now%orbit, margin%event)
+  end function stops_later
+
+  !> A first point with the new sequence, on the side on which its motion really has those events: with the events that are one
+  !> there a little apart where the equations are singular else.
   subroutine enter_sequence(family, at, step, beyond, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: at
+    real(wp), intent(in) :: step
+    type(trace_t), intent(inout) :: beyond
+    logical, intent(out) :: ok
+    real(wp) :: along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
+    logical :: touches
+    along = touches_apart(beyond%now%orbit)
+    touches = any(abs(along) > 0)
+    if (.not. touches) then
+      call enter_beside(family, at, step, beyond, ok)
+      if (ok) return
+      along = sticks_apart(beyond%now%orbit)
+    end if
+    ok = any(abs(along) > 0)
+    if (.not. ok) return
+    call enter_apart(family, at, along, no_passage, beyond, ok)
+    if (ok) beyond%step = 0.1_wp*step
+  end subroutine enter_sequence
+
+  !> The same by looks along the branch of the new sequence, both ways.
+  subroutine enter_beside(family, at, step, beyond, ok)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: at
     real(wp), intent(in) :: step
@@ -325,14 +332,8 @@ contains
     logical, intent(out) :: ok
     type(trace_t) :: start, there, tried(2)
     real(wp) :: look, beyond_step, along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
-    logical :: fits(2), found
+    logical :: fits(2), found, told
     integer :: way, tries, steps
-    along = touches_apart(beyond%now%orbit)
-    if (any(abs(along) > 0)) then
-      call enter_touches(family, at, along, no_passage, beyond, ok)
-      if (ok) beyond%step = 0.1_wp*step
-      return
-    end if
     start%machines = at%machines
     start%now%orbit = beyond%now%orbit
     call correct_orbit(family, start%machines, start%now%orbit, direct(start%now%orbit, 1), ok)
@@ -343,6 +344,7 @@ contains
     along = start%now%tangent
     look = first_look*step
     found = .false.
+    told = .false.
     do tries = 1, 4
       do way = 1, 2
         start%now%tangent = merge(1, -1, way == 1)*along
@@ -354,15 +356,17 @@ contains
         there = tried(findloc(fits, .true., 1))
         beyond_step = max(look, 0.1_wp*step)
         found = .true.
+        told = .not. all(fits)
         ! So near the point both sides may be on it within rounding: a longer look tells them apart.
         if (.not. all(fits) .and. all(there%margins%list%value > no_passage)) exit
       end if
       look = 10*look
     end do
-    ok = found
+    ! Where both sides seem to be on it at every look nothing tells which the branch goes on to.
+    ok = told
     if (.not. ok) return
     beyond = there
     beyond%step = beyond_step
-  end subroutine enter_sequence
+  end subroutine enter_beside
 
 end module branch_passage

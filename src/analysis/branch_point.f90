@@ -8,6 +8,7 @@ module branch_point
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, machine_of_family, section_sizes
+  use multipliers, only: nearly_neutral
   use orbit_margins, only: margins_t
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
   use structure_margins, only: margins_of_machine
@@ -21,13 +22,14 @@ module branch_point
   !> same side of the parameter. BP: multiplier +1 where the parameter does not turn;
   !> release: a body that rests for ever does so no more; contact, crisis: module `homoclinic`. HB: cycles begin or end in an
   !> equilibrium, as a pair of its eigenvalues passes the imaginary axis; BE: an equilibrium touches a stop or lets go of one.
+  !> too_long: so many points; many_impacts: so many in a row that they are the beginning of a chatter.
   integer, parameter, public :: no_label = 0, label_sn = 1, label_pd = 2, label_ns = 3, label_bp = 4, label_gr = 5, &
     label_gr_fold = 6, label_stick = 7, label_chatter = 8, label_stiction = 9, label_range = 10, label_closed = 11, &
     label_not_known = 12, label_long = 13, label_release = 14, label_homoclinic = 15, label_crisis = 16, &
-    label_hb = 17, label_be = 18, last_label = 18
+    label_hb = 17, label_be = 18, label_run = 19, last_label = 19
   character(len=*), parameter, public :: label_names(0:last_label) = [character(len=18) :: 'none', 'SN', 'PD', 'NS', 'BP', &
     'GR', 'GR-fold', 'stick_onset', 'chatter_onset', 'stiction_end', 'end_of_range', 'closed', 'not_known', 'too_long', &
-    'release', 'homoclinic_contact', 'boundary_crisis', 'HB', 'BE']
+    'release', 'homoclinic_contact', 'boundary_crisis', 'HB', 'BE', 'many_impacts']
 
   type, public :: point_t
     type(orbit_t) :: orbit
@@ -66,11 +68,11 @@ module branch_point
 
 contains
 
-  !> Whether all multipliers are within the unit circle.
+  !> Whether all multipliers are within the unit circle, by more than what one is known to where it is 1.
   pure logical function is_stable(orbit)
     type(orbit_t), intent(in) :: orbit
     ! The largest comes first; those that are not known are smaller.
-    is_stable = abs(orbit%multipliers(1)) < 1
+    is_stable = abs(orbit%multipliers(1)) < 1 - nearly_neutral
   end function is_stable
 
   !> Sets the sizes of a family: of the parameter by its range, of the state by the largest motion that the drive alone brings

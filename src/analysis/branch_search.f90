@@ -16,6 +16,7 @@ module branch_search
   use hybrid_machine, only: hybrid_t
   use machine_family, only: machine_neighbourhood, machine_of_family, watched_rows
   use matrices, only: solve
+  use multipliers, only: is_neutral
   use orbit_search, only: find_orbits, found_t
   use orbit_sections, only: section_points
   use orbit_symmetry, only: mark_symmetry
@@ -35,8 +36,6 @@ module branch_search
   real(wp), parameter :: doubled_at = 3e-3_wp
   !> The same of a branch that crosses.
   real(wp), parameter :: crossed_at = 4e-3_wp
-  !> A multiplier this near to +1 of an orbit that does not go on tells a family.
-  real(wp), parameter :: nearly_neutral = 1e-6_wp
 
   type, public :: search_t
     type(family_t) :: family
@@ -220,7 +219,7 @@ contains
   pure logical function is_of_family(found)
     type(branch_t), intent(in) :: found
     is_of_family = size(found%points) == 1
-    if (is_of_family) is_of_family = minval(abs(found%points(1)%orbit%multipliers - 1)) < nearly_neutral
+    if (is_of_family) is_of_family = is_neutral(found%points(1)%orbit%multipliers)
   end function is_of_family
 
   !> Follows an orbit that is on no branch yet.

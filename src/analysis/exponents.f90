@@ -56,6 +56,9 @@ module exponents
     integer :: periods = 0
     real(wp) :: mean_period = 0
     logical :: known = .false.
+    !> Where it is not: sections that a structure passed before that, and whether it was all but at rest then.
+    integer :: passed = 0
+    logical :: at_rest = .false.
   end type spectrum_t
 
 contains

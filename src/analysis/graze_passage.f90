@@ -2,14 +2,15 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Grazes of a branch that its own equations do not lead through: where derivatives are too large, where a soft contact is left, and
-!> where several begin at once.
+!> where several begin at once; onsets of sticking where a slip comes to be none.
 module graze_passage
   use body_family, only: family_t
   use branch_passage, only: change_all, enter_sequence
-  use branch_point, only: label_gr, label_gr_fold, label_not_known, no_label, plan_t, point_t, trace_t
+  use branch_point, only: label_gr, label_gr_fold, label_not_known, label_stick, no_label, plan_t, point_t, trace_t
   use kinds, only: wp
-  use orbit_margins, only: margin_t, of_gap, of_impact
+  use orbit_margins, only: margin_t, of_gap, of_impact, of_stick
   use orbit_sections, only: section_points
+  use short_slip, only: short_slip_of, without_slip
   use soft_graze, only: is_touch, locate_missed_graze
   implicit none
   private
@@ -25,7 +26,7 @@ module graze_passage
 contains
 
   !> Where no step leads on and an impact has next to no speed: without it the branch goes on, and that shows where the graze is.
-  !> `ending`: not known if that is not so; a graze if the orbit is one of a shorter period there.
+  !> The same of a slip. `ending`: not known if that is not so; a graze if the orbit is one of a shorter period there.
   subroutine leave_by_graze(family, plan, trace, points, ending)
     type(family_t), intent(in) :: family
     type(plan_t), intent(in) :: plan
@@ -54,7 +55,10 @@ contains
     if (ok) call enter_sequence(family, at, 0.1_wp*plan%largest_step, beyond, ok)
     if (ok) call locate_missed_graze(family, beyond, lost, at%now%orbit%parameter, graze, ok)
     if (ok) ok = abs(graze%now%orbit%parameter - at%now%orbit%parameter) < near_in_parameter*family%parameter_size
-    if (.not. ok) return
+    if (.not. ok) then
+      call leave_by_stick(family, plan, trace, points, ending)
+      return
+    end if
     ending = merge(label_gr, no_label, is_repeated(graze))
     graze%now%label = label_gr
     if (ending == label_gr) then
@@ -67,6 +71,36 @@ contains
     points = [points, graze%now, beyond%now]
     trace = beyond
   end subroutine leave_by_graze
+
+  !> Where a slip is next to none: without it, the joint sticking at once, the branch goes on, and that shows
+  !> where the onset is. `ending`: not known if that is not so.
+  subroutine leave_by_stick(family, plan, trace, points, ending)
+    type(family_t), intent(in) :: family
+    type(plan_t), intent(in) :: plan
+    type(trace_t), intent(inout) :: trace
+    type(point_t), allocatable, intent(inout) :: points(:)
+    integer, intent(out) :: ending
+    type(trace_t) :: beyond, onset
+    type(margin_t) :: stick
+    integer :: k, i
+    logical :: ok
+    ending = label_not_known
+    k = short_slip_of(trace%machines%centre, trace%now%orbit)
+    if (k == 0) return
+    beyond%now%orbit = without_slip(trace%machines%centre, trace%now%orbit, k)
+    call enter_sequence(family, trace, 0.1_wp*plan%largest_step, beyond, ok)
+    if (.not. ok) return
+    i = findloc(beyond%margins%list%kind == of_stick .and. beyond%margins%list%event == k, .true., 1)
+    if (i == 0) return
+    stick = beyond%margins%list(i)
+    call locate_missed_graze(family, beyond, stick, trace%now%orbit%parameter, onset, ok)
+    if (ok) ok = abs(onset%now%orbit%parameter - trace%now%orbit%parameter) < near_in_parameter*family%parameter_size
+    if (.not. ok) return
+    ending = no_label
+    onset%now%label = label_stick
+    points = [points, onset%now, beyond%now]
+    trace = beyond
+  end subroutine leave_by_stick
 
   !> The graze of a soft contact by the orbit that misses it, for the equations of that which touches are singular there.
   subroutine put_on_graze(family, missing, touch, point)

@@ -11,16 +11,19 @@ module multipliers
   implicit none
   private
 
-  public :: multipliers_of, multipliers_beside_graze, shifted_determinant
+  public :: multipliers_of, multipliers_beside_graze, shifted_determinant, is_neutral
 
   !> Rounding of the entries of a map's derivative, as a share of its norm; what an eigenvalue must be known to, absolutely or as a
   !> share.
   real(wp), parameter :: rounding = 100*epsilon(1.0_wp), known_to = 1e-6_wp
+  !> A multiplier this near to +1 cannot be told from it: where it is 1, as on a family of orbits and in a fold, Newton's method
+  !> leaves the root of rounding in the orbit, and the curvature of the map times that in the multiplier.
+  real(wp), parameter, public :: nearly_neutral = 1e-6_wp
 
 contains
 
   !> Eigenvalues, largest modulus first; with imaginary parts that are none left out. `determinant`: of a matrix of two
-  !> rows, from its factors: the entries of one with a large multiplier know the small one no more. Of more rows those that rounding
+  !> rows, from its factors: the entries of one with a large multiplier know the small one no more. Without it those that rounding
   !> of the entries hides, beside a graze, are not numbers.
   pure function multipliers_of(matrix, determinant) result(values)
     real(wp), intent(in) :: matrix(:, :)
@@ -28,12 +31,17 @@ contains
     complex(wp) :: values(size(matrix, 1)), vectors(size(matrix, 1), size(matrix, 1)), moved
     logical :: ok
     integer :: i, k
-    if (size(matrix, 1) <= 2) then
+    if (size(matrix, 1) <= 2 .and. (present(determinant) .or. size(matrix, 1) == 1)) then
       values = eigenvalues(matrix, determinant)
       return
     else if (.not. all(abs(matrix) < unreachable)) then
       values = ieee_value(1.0_wp, ieee_quiet_nan)
       values(1) = matrix(1, 1)
+      return
+    end if
+    if (size(matrix, 1) == 2) then
+      values = eigenvalues(matrix)
+      call leave_out_hidden(matrix, rounding*norm2(matrix), 2, values)
       return
     end if
     call general_eigen(matrix, values, vectors, ok)
@@ -115,6 +123,13 @@ contains
     values(2:) = multipliers_of(turned(2:, 2:))
     call leave_out_hidden(turned(2:, 2:), scatter, 1, values(2:))
   end function multipliers_beside_graze
+
+  !> Whether one of the multipliers cannot be told from +1: the orbit is not isolated, or only just. Those that are not known
+  !> tell nothing.
+  pure logical function is_neutral(values)
+    complex(wp), intent(in) :: values(:)
+    is_neutral = any(abs(values - 1) < nearly_neutral)
+  end function is_neutral
 
   !> det(M + shift).
   pure real(wp) function shifted_determinant(m, shift) result(determinant)

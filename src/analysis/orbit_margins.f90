@@ -102,7 +102,7 @@ contains
         margins%x_min = min(margins%x_min, y(1))
         until = orbit%periods*machine%period
         if (k < m) until = orbit%events(k + 1)%time
-        if (slips_in(mode) .and. until > t) call look_along(machine, mode, t, y, until, k, gaps, slowest, margins)
+        if (slips_in(mode) .and. until > t) call look_along(machine, orbit, mode, t, y, until, k, gaps, slowest, margins)
       end do
     end select
     margins%list = [margins%list, gaps(-1), gaps(1), slowest]
@@ -185,8 +185,9 @@ contains
 
   !> Where the velocity passes zero within a flight the body turns short of a barrier; where its size has a least value, a slip
   !> in which friction acts may stop.
-  pure subroutine look_along(machine, mode, from, start, until, k, gaps, slowest, margins)
+  pure subroutine look_along(machine, orbit, mode, from, start, until, k, gaps, slowest, margins)
     type(one_body_t), intent(in) :: machine
+    type(orbit_t), intent(in) :: orbit
     integer, intent(in) :: mode, k
     real(wp), intent(in) :: from, start(states), until
     type(margin_t), intent(inout) :: gaps(-1:1), slowest
@@ -201,6 +202,10 @@ contains
     last_t = from
     slope = machine%slope(mode, from, start)
     last_a = slope(2)
+    ! A body that is let go of gathers speed from nothing, whatever rounding says.
+    if (k > 0) then
+      if (orbit%events(k)%kind == event_release) last_a = 0
+    end if
     do i = 1, count
       t = from + (until - from)*i/count
       call machine%fly(mode, last_t, last, t, y)

@@ -10,7 +10,7 @@ module orbit_search
   use machine_family, only: fly_sections, map_with_variation, nearest_copy, within_stops
   use matrices, only: solve
   use motion_state, only: tally_t
-  use multipliers, only: shifted_determinant
+  use multipliers, only: is_neutral
   use orbit_sections, only: section_points
   use orbit_motion, only: is_admissible, orbit_of_motion
   use periodic_orbit, only: correct_orbit, direct, orbit_t, same_orbit
@@ -29,8 +29,6 @@ module orbit_search
   integer, parameter :: any_period = 12
   !> A motion this near to a stable orbit, and coming nearer, is on it.
   real(wp), parameter :: captured = 1e-5_wp
-  !> An orbit whose map less 1 has a determinant below this is one of a family.
-  real(wp), parameter :: neutral = 1e-8_wp
   !> Rate of change in natural sizes below which a motion is an equilibrium.
   real(wp), parameter :: all_but_at_rest = 1e-5_wp
 
@@ -209,7 +207,7 @@ contains
       found%equilibria = found%equilibria + 1
       return
     end if
-    if (abs(shifted_determinant(orbit%matrix, -1.0_wp)) < neutral) then
+    if (is_neutral(orbit%multipliers)) then
       found%families = found%families + 1
       return
     end if

@@ -8,13 +8,13 @@ module soft_graze
   use branch_point, only: set_point, step_to, trace_t
   use kinds, only: wp
   use motion_state, only: event_separation, event_touch_lower, event_touch_upper
-  use orbit_margins, only: margin_t, margins_t, of_gap, of_impact
+  use orbit_margins, only: margin_t, margins_t, of_gap, of_impact, of_stick, same_meaning
   use orbit_motion, only: is_admissible
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit
   implicit none
   private
 
-  public :: is_touch, vanishing_touch, touches_apart, enter_touches, locate_missed_graze
+  public :: is_touch, vanishing_touch, touches_apart, enter_apart, locate_missed_graze
 
   !> First look beyond the graze, in natural times between touch and separation.
   real(wp), parameter :: first_apart = 1e-3_wp
@@ -69,9 +69,9 @@ contains
     if (any(abs(apart) > 0)) apart = apart/norm2(apart)
   end function touches_apart
 
-  !> A first point with new touches, on the side on which its motion really has those events: `apart` is fixed and the parameter
-  !> gives way. `beyond` has the orbit at the graze.
-  subroutine enter_touches(family, at, apart, margin_room, beyond, ok)
+  !> A first point with new touches, or sticks, on the side on which its motion really has those events: `apart` is fixed and the
+  !> parameter gives way. `beyond` has the orbit at the graze.
+  subroutine enter_apart(family, at, apart, margin_room, beyond, ok)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: at
     real(wp), intent(in) :: apart(:), margin_room
@@ -91,10 +91,11 @@ contains
       if (ok) exit
     end do
     if (ok) beyond = there
-  end subroutine enter_touches
+  end subroutine enter_apart
 
-  !> The graze that an orbit is near which misses the barrier of `touch`, by the secant rule over the length of the branch; `start`
-  !> has the value of the parameter near which it is. `ok` is false if it is not found.
+  !> The graze that an orbit is near which misses the barrier of `touch`, or where its margin `touch` of sticking is zero, by the
+  !> secant rule over the length of the branch; `start` has the value of the parameter near which it is. `ok` is false if it is not
+  !> found.
   subroutine locate_missed_graze(family, missing, touch, start, graze, ok)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: missing
@@ -126,7 +127,7 @@ contains
     ok = abs(now) <= 1e3_wp*nil
   end subroutine locate_missed_graze
 
-  !> The gap by which the barrier of a touch is missed; huge where there is none.
+  !> The gap by which the barrier of a touch is missed, or the margin of a stick; huge where there is none.
   pure real(wp) function gap_of(trace, touch) result(gap)
     type(trace_t), intent(in) :: trace
     type(margin_t), intent(in) :: touch
@@ -134,7 +135,11 @@ contains
     gap = huge(gap)
     do i = 1, size(trace%margins%list)
       associate (one => trace%margins%list(i))
-        if (one%kind == of_gap .and. one%joint == touch%joint .and. one%side == touch%side) gap = one%value
+        if (touch%kind == of_stick) then
+          if (same_meaning(one, touch)) gap = one%value
+        else if (one%kind == of_gap .and. one%joint == touch%joint .and. one%side == touch%side) then
+          gap = one%value
+        end if
       end associate
     end do
   end function gap_of

@@ -27,6 +27,8 @@ module structure_exponents
 
   !> Section points within this share of the natural size are one.
   real(wp), parameter :: fixed = 1e-9_wp
+  !> Rate of change in natural sizes below which nothing moves.
+  real(wp), parameter :: still = 1e-5_wp
 
 contains
 
@@ -112,6 +114,8 @@ contains
     do i = 1 - transient, sections
       call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
+      spectrum%passed = transient + i
+      spectrum%at_rest = is_at_rest(structure, mode, coordinates_of(structure, state))
       call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%known)
       if (.not. spectrum%known) return
       if (i < 1) cycle
@@ -128,6 +132,15 @@ contains
     call conclude(structure, batch*batches/duration, duration, left, spectrum)
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
+
+  !> Whether a structure without a clock all but rests at a point of its section, where the next section may be one of rounding.
+  pure logical function is_at_rest(structure, mode, point)
+    type(structure_t), intent(in) :: structure
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: point(:)
+    is_at_rest = .not. structure%has_clock
+    if (is_at_rest) is_at_rest = norm2(structure%slope(mode, 0.0_wp, point)/structure%size_of)*structure%size_of_time() < still
+  end function is_at_rest
 
   !> Takes from a structure that nothing ties to the ground the drift of the whole, which would run out of its digits.
   pure subroutine bring_back(structure, state)

@@ -11,6 +11,7 @@ module structure_margins
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
+  use motion_state, only: event_release
   use orbit_margins, only: margin_t, margins_of, margins_t, of_gap, of_hold, of_impact, of_order, of_press, of_release, &
     of_slip, of_stick, of_turning
   use periodic_orbit, only: closing_time, orbit_t
@@ -193,6 +194,10 @@ contains
           ! A jump elsewhere may have turned it round.
           if (k > 0 .and. rate >= 0) then
             if (orbit%events(k)%joint /= probe%joint) call note(machine, probe, k, t, value, margins)
+          end if
+          ! A joint that is let go of gathers speed from nothing, whatever rounding says.
+          if (k > 0 .and. probe%guard == slide_ends) then
+            if (orbit%events(k)%joint == probe%joint .and. orbit%events(k)%kind == event_release) rate = 0
           end if
         else if (last_rate(g) < 0 .and. rate > 0) then
           call find_least(machine, probe, last, last_t, t, last_rate(g), rate, least_t, least)

@@ -21,6 +21,7 @@ module branches_driver
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
+  use motion_state, only: event_touch_lower, event_touch_upper
   use orbit_margins, only: is_impact
   use orbit_words, only: symmetry_text, word_of
   use periodic_orbit, only: orbit_t
@@ -87,7 +88,7 @@ contains
     end if
     if (session%team%is_root()) then
       if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, exit_bad_case, &
-        'no periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
+        'no isolated periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
         to_text(search%plan%highest)//'; nothing is written')
     end if
     call session%stop_if(error)
@@ -134,7 +135,7 @@ contains
     end if
     families = sum(search%found%families)
     if (maxval(search%found%families) > 1) then
-      call session%journal%line('family', 'orbits that are not isolated (a family, multiplier 1) were met '// &
+      call session%journal%line('family', 'orbits that are not isolated (a multiplier within 1e-6 of 1: a family) were met '// &
                                 to_text(families)//' times; they are not followed')
     else if (families > 0) then
       call session%journal%line('neutral', 'an orbit with a multiplier 1 was met that does not go on: one of a family, or '// &
@@ -253,8 +254,9 @@ contains
     call schema%add_variable('period', type_int16, along, units='1', long_name='period in '// &
                              trim(merge('drive periods', 'returns      ', search%has_clock)), &
                              data=[(real(points(i)%orbit%periods, wp), i=1, size(points))])
-    call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts in a period of the orbit', &
-                             data=[(real(count(is_impact(points(i)%orbit%events%kind)), wp), i=1, size(points))])
+    call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts, or touches of a soft contact, '// &
+                             'in a period of the orbit', &
+                             data=[(real(count_contacts(points(i)%orbit), wp), i=1, size(points))])
     call schema%add_variable('event_word', type_int64, along, units='1', &
                              long_name='events of one period of the orbit, three bits each', &
                              data=[(real(word_of(points(i)%orbit, search), wp), i=1, size(points))])
@@ -278,6 +280,13 @@ contains
     end subroutine add
 
   end subroutine describe_branches
+
+  !> Impacts and touches of soft contacts; a completed chatter is neither.
+  pure integer function count_contacts(orbit)
+    type(orbit_t), intent(in) :: orbit
+    count_contacts = count(is_impact(orbit%events%kind) .or. orbit%events%kind == event_touch_upper .or. &
+                           orbit%events%kind == event_touch_lower)
+  end function count_contacts
 
   !> The first so many multipliers of the points.
   subroutine describe_multipliers(points, shown, schema)

@@ -76,12 +76,20 @@ contains
         k = zero_one_test(section)
         call report(session, spectrum, machines%centre%has_clock, k)
       else
-        call session%journal%line('not_known', 'not known: the motion was given up, met an event tangentially, '// &
-                                  'or rests where nothing holds it')
+        call session%journal%line('not_known', 'not known: '//why_not_known(spectrum))
       end if
     end if
     call session%end_with(exit_done)
   end subroutine run_stability_of_case
+
+  !> Why nothing is known of the exponents of a motion.
+  pure function why_not_known(spectrum) result(why)
+    type(spectrum_t), intent(in) :: spectrum
+    character(len=:), allocatable :: why
+    why = 'the motion was given up, met an event tangentially, or rests where nothing holds it'
+    if (spectrum%at_rest) why = 'the motion comes to rest: after '//to_text(spectrum%passed)//' sections nothing is left that '// &
+      'turns round; the eigenvalues of an equilibrium are those that `separatrix branches` gives'
+  end function why_not_known
 
   !> What was found, with errors and the check.
   subroutine report(session, spectrum, has_clock, k)

@@ -19,6 +19,7 @@ module adaptive_flight
   use oscillator, only: extra_force, system_t => oscillator_t
   use polynomial, only: degree, first_fall, interpolate, maximum_until, value_at
   use restoring_law, only: restoring_force
+  use table_pieces, only: enter_pieces, list_ends, most_ends, of_place, of_speed, of_stretch, piece_end_t
   implicit none
   private
 
@@ -26,6 +27,10 @@ module adaptive_flight
 
   !> Position and velocity.
   integer, parameter :: most_equations = 2
+  !> Barrier, speed zero, exit speed, the ends of pieces of tables.
+  integer, parameter :: most_guards = 3 + most_ends, crosses_knot = -1
+  !> Margins: of a stretch of the spring below a constant, and above it.
+  integer, parameter :: stretch_below = 1, stretch_above = 2
 
   include 'march_types.inc'
 
@@ -43,12 +48,15 @@ contains
     integer, intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
     type(march_t) :: march
-    type(guard_t) :: guards(3)
-    integer :: ends(3), count_guards, fallen
+    type(guard_t) :: guards(most_guards)
+    integer :: ends(most_guards), count_guards, fallen, plain_guards
     real(wp) :: direction, until
     direction = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
     march%context = context_t(direction, state%x, state%z)
-    call list_guards(direction, barrier, exit_speed, guards, ends, count_guards)
+    call list_guards(direction, barrier, exit_speed, guards, ends, plain_guards)
+    count_guards = plain_guards
+    if (machine%effects%by_table) call keep_to_pieces(machine, state%time, [state%x, state%v], march%context, guards, ends, &
+                                                      count_guards)
     call set_out(2, march, machine, options%tolerance, scale_of(machine, state), machine%period, state%time, [state%x, state%v])
     do
       outcome = flight_time_over
@@ -63,7 +71,10 @@ contains
       if (march%fraction > 0 .or. fallen > 0) call look_along(machine, march, state, tally, log)
       if (fallen > 0) then
         outcome = ends(fallen)
-        exit
+        if (outcome /= crosses_knot) exit
+        count_guards = plain_guards
+        call keep_to_pieces(machine, march%time, march%y, march%context, guards, ends, count_guards)
+        call find_slope(machine, march%context, 2, march%time, march%y, march%slopes(:, 1))
       end if
       ! An unstable spring drives a body to infinity within a finite time.
       if (abs(march%y(1)) > options%domain) exit
@@ -79,8 +90,8 @@ contains
   !> What ends a slip in `direction`, and the outcomes: of several at one instant the barrier comes first, then speed zero.
   pure subroutine list_guards(direction, barrier, exit_speed, guards, ends, count_guards)
     real(wp), intent(in) :: direction, barrier, exit_speed
-    type(guard_t), intent(out) :: guards(3)
-    integer, intent(out) :: ends(3), count_guards
+    type(guard_t), intent(out) :: guards(most_guards)
+    integer, intent(out) :: ends(most_guards), count_guards
     count_guards = 1
     guards(1) = guard_t(direction*barrier, [-direction, 0.0_wp])
     ends(1) = flight_barrier
@@ -93,6 +104,38 @@ contains
     guards(count_guards) = guard_t(exit_speed, [0.0_wp, -direction])
     ends(count_guards) = flight_layer_left
   end subroutine list_guards
+
+  !> Keeps `slip` to the pieces of the tables that it is in at `time` [s after the section] in the state `y`, so that no step
+  !> meets a kink, and adds guards for where it leaves them.
+  pure subroutine keep_to_pieces(machine, time, y, slip, guards, ends, count_guards)
+    type(system_t), intent(in) :: machine
+    real(wp), intent(in) :: time, y(2)
+    type(context_t), intent(inout) :: slip
+    type(guard_t), intent(inout) :: guards(most_guards)
+    integer, intent(inout) :: ends(most_guards), count_guards
+    type(piece_end_t) :: pieces(most_ends)
+    integer :: i, count_ends
+    call enter_pieces(machine%effects, y(1), y(2), stretch_at(machine, time, y(1)), slip)
+    call list_ends(machine%effects, slip, pieces, count_ends)
+    do i = 1, count_ends
+      associate (guard => guards(count_guards + i), one => pieces(i))
+        guard = guard_t(one%side*one%limit)
+        if (one%variable == of_stretch) guard%margin = merge(stretch_below, stretch_above, one%side > 0)
+        if (one%variable == of_place) guard%coefficients(1) = -one%side
+        if (one%variable == of_speed) guard%coefficients(2) = -one%side*slip%direction
+      end associate
+    end do
+    ends(count_guards + 1:count_guards + count_ends) = crosses_knot
+    count_guards = count_guards + count_ends
+  end subroutine keep_to_pieces
+
+  pure real(wp) function stretch_at(machine, time, x) result(stretch)
+    type(system_t), intent(in) :: machine
+    real(wp), intent(in) :: time, x
+    real(wp) :: foot
+    call foot_motion(machine%drive, machine%drive_frequency*time, foot)
+    stretch = machine%restoring%free_length + foot - x
+  end function stretch_at
 
   !> Size of position and velocity below which errors are absolute [m, m/s].
   pure function scale_of(machine, state) result(scale)
@@ -112,21 +155,20 @@ contains
     integer, intent(in) :: n
     real(wp), intent(in) :: time, y(n)
     real(wp), intent(out) :: slope(n)
-    real(wp) :: foot, stretch
-    call foot_motion(machine%drive, machine%drive_frequency*time, foot)
-    stretch = machine%restoring%free_length + foot - y(1)
+    real(wp) :: stretch
+    stretch = stretch_at(machine, time, y(1))
     slope(1) = y(2)
     slope(2) = (restoring_force(machine%restoring, stretch) &
                 + sliding_friction(machine%friction, y(2), slip%direction))/machine%mass
     if (machine%extra) slope(2) = slope(2) + extra_force(machine, slip, time, y(1), y(2), stretch)/machine%mass
   end subroutine find_slope
 
-  !> One body has guards of its state alone.
+  !> How far the stretch of the spring is below or above a constant [m].
   pure real(wp) function margin_of(machine, guard, time, y)
     type(system_t), intent(in) :: machine
     type(guard_t), intent(in) :: guard
     real(wp), intent(in) :: time, y(:)
-    margin_of = guard%constant
+    margin_of = guard%constant + merge(1, -1, guard%margin == stretch_above)*stretch_at(machine, time, y(1))
   end function margin_of
 
   !> Largest velocity, energy and samples of the step behind; `state` gives what a sample does not change.

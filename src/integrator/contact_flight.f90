@@ -11,27 +11,30 @@ module contact_flight
   use energy, only: book_instant, gauss_place, gauss_points, gauss_weight, record_with_book
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: power, sliding_friction
-  use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, system_t, &
-    take_step
+  use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step, &
+    watched_system_t
   use kinds, only: wp
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, sample_due, &
     sample_time, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
   use polynomial, only: degree, maximum_until, value_at
   use restoring_law, only: restoring_force
+  use table_pieces, only: enter_pieces, list_ends, most_ends, of_place, of_speed, of_stretch, piece_end_t
   implicit none
   private
 
   public :: contact_side, fly_contact, raise_peak_force
 
-  !> Guards: velocity zero, end of contact, change between pushing and not.
-  integer, parameter :: turning = 1, leaving = 2, cut = 3
+  !> Guards: velocity zero, end of contact, change between pushing and not; after them the ends of pieces of tables.
+  integer, parameter :: turning = 1, leaving = 2, cut = 3, most_guards = cut + most_ends
+  !> Margins: of the stretch of the spring below a constant, and above it.
+  integer, parameter :: stretch_below = 1, stretch_above = 2
   !> Halvings of the golden section that finds a peak of the force.
   integer, parameter :: most_sections = 40
   real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
 
   !> A body pressed on the barrier on `side` +1 (upper) or -1. Unknowns: p [m], p' [m/s], work done on the barrier [J].
-  type, extends(system_t) :: pressed_t
+  type, extends(watched_system_t) :: pressed_t
     type(oscillator_t) :: machine
     !> Time at which the march starts [s after the section], position of the surface [m].
     real(wp) :: start = 0, surface = 0
@@ -40,6 +43,7 @@ module contact_flight
     type(slip_memory_t) :: memory
   contains
     procedure :: slope => pressed_slope
+    procedure :: margin => stretch_margin
   end type pressed_t
 
 contains
@@ -68,9 +72,9 @@ contains
     type(log_t), intent(inout), optional :: log
     type(pressed_t) :: pressed
     type(march_t) :: march
-    type(guard_t) :: guards(cut)
+    type(guard_t) :: guards(most_guards)
     real(wp) :: y(3), scale(3), duration, time, until
-    integer :: fallen
+    integer :: fallen, count_guards
     pressed%machine = machine
     pressed%machine%contact = contact_at_speed(machine%contact, state%touch_speed)
     pressed%side = side
@@ -81,20 +85,20 @@ contains
     y = [side*(state%x - pressed%surface), side*state%v, 0.0_wp]
     pressed%pushing = pressed%machine%contact%tension .or. margin_at(pressed%machine%contact, y) >= 0
     call sizes_of(pressed, y, scale, duration)
-    guards = guards_of(pressed)
+    call list_guards(pressed, 0.0_wp, y, guards, count_guards)
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       until = next_sample(machine%drive, pressed%start + march%time, time_end)
-      call take_step(march, pressed, guards, until - pressed%start, fallen)
+      call take_step(march, pressed, guards(:count_guards), until - pressed%start, fallen)
       if (fallen == march_time_over .and. until < time_end) fallen = march_goes_on
       tally%steps = tally%steps + 1
       if (tally%steps > options%step_budget) fallen = march_failed
       call look_along(march, pressed, state%touch_speed, tally, log)
-      if (fallen == cut) then
-        pressed%pushing = .not. pressed%pushing
-        guards = guards_of(pressed)
+      if (fallen >= cut) then
+        if (fallen == cut) pressed%pushing = .not. pressed%pushing
         y = march%y(:3)
         time = march%time
+        call list_guards(pressed, time, y, guards, count_guards)
         call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, time, y)
       else if (fallen /= march_goes_on) then
         exit
@@ -128,10 +132,9 @@ contains
   pure function pressed_slope(self, time, y) result(slope)
     class(pressed_t), intent(in) :: self
     real(wp), intent(in) :: time, y(:)
-    real(wp) :: slope(size(y)), foot, stretch, force, push
+    real(wp) :: slope(size(y)), stretch, force, push
     associate (machine => self%machine)
-      call foot_motion(machine%drive, machine%drive_frequency*(self%start + time), foot)
-      stretch = machine%restoring%free_length + foot - (self%surface + self%side*y(1))
+      stretch = stretch_at(self, time, y)
       force = restoring_force(machine%restoring, stretch) &
               + sliding_friction(machine%friction, self%side*y(2), real(self%direction, wp))
       if (machine%extra) force = force + extra_force(machine, self%memory, self%start + time, &
@@ -142,17 +145,40 @@ contains
     end associate
   end function pressed_slope
 
+  pure real(wp) function stretch_at(pressed, time, y) result(stretch)
+    class(pressed_t), intent(in) :: pressed
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: foot
+    associate (machine => pressed%machine)
+      call foot_motion(machine%drive, machine%drive_frequency*(pressed%start + time), foot)
+      stretch = machine%restoring%free_length + foot - (pressed%surface + pressed%side*y(1))
+    end associate
+  end function stretch_at
+
+  !> The stretch [m] of the spring, with the sign that it has in a margin.
+  pure real(wp) function stretch_margin(self, number, time, y)
+    class(pressed_t), intent(in) :: self
+    integer, intent(in) :: number
+    real(wp), intent(in) :: time, y(:)
+    stretch_margin = merge(1, -1, number == stretch_above)*stretch_at(self, time, y)
+  end function stretch_margin
+
   pure real(wp) function margin_at(contact, y)
     type(contact_t), intent(in) :: contact
     real(wp), intent(in) :: y(:)
     margin_at = sum(contact_margin(contact)*[1.0_wp, y(1), y(2)])
   end function margin_at
 
-  pure function guards_of(pressed) result(guards)
-    type(pressed_t), intent(in) :: pressed
-    type(guard_t) :: guards(cut)
+  !> What ends the contact or changes its forces from the state `y` on at `time` [s after its start]; keeps it to the pieces of
+  !> the tables that it is in there.
+  pure subroutine list_guards(pressed, time, y, guards, count_guards)
+    type(pressed_t), intent(inout) :: pressed
+    real(wp), intent(in) :: time, y(3)
+    type(guard_t), intent(out) :: guards(most_guards)
+    integer, intent(out) :: count_guards
+    type(piece_end_t) :: pieces(most_ends)
     real(wp) :: margin(3)
-    integer :: inward
+    integer :: inward, i, count_ends
     inward = pressed%side*pressed%direction
     guards(turning)%coefficients(2) = inward
     guards(leaving)%constant = 1
@@ -166,7 +192,23 @@ contains
       guards(cut)%constant = margin(1)
       guards(cut)%coefficients(1:2) = margin(2:3)
     end if
-  end function guards_of
+    count_guards = cut
+    associate (effects => pressed%machine%effects, side => pressed%side)
+      if (.not. effects%by_table) return
+      call enter_pieces(effects, pressed%surface + side*y(1), side*y(2), stretch_at(pressed, time, y), pressed%memory)
+      call list_ends(effects, pressed%memory, pieces, count_ends)
+      do i = 1, count_ends
+        associate (guard => guards(cut + i), one => pieces(i))
+          guard%constant = one%side*one%limit
+          if (one%variable == of_stretch) guard%margin = merge(stretch_below, stretch_above, one%side > 0)
+          if (one%variable == of_place) guard%constant = one%side*(one%limit - pressed%surface)
+          if (one%variable == of_place) guard%coefficients(1) = -one%side*side
+          if (one%variable == of_speed) guard%coefficients(2) = -one%side*inward
+        end associate
+      end do
+    end associate
+    count_guards = cut + count_ends
+  end subroutine list_guards
 
   !> Sizes of the unknowns in this contact and its duration, from the speed, the forces that press, and the penetration
   !> itself.

@@ -18,9 +18,10 @@ const double contact_shrinking = 1.4;
 // A step shorter than this share of what the series allow is left to the scalar code.
 const double shortest_share = 1e-9;
 
-// Coefficients in sigma: u, position, velocity, time since the start of the step; and of the side's p' = w.
+// Coefficients in sigma: u, position, velocity, time since the start of the step; with tables those of the
+// stretch and of the factor of dry friction, too.
 struct contact_expansion {
-  vec u[order + 1], x[order], v[order], time[order + 1];
+  vec u[order + 1], x[order], v[order], time[order + 1], stretch[order], factor[order];
 };
 
 // The side that is pressed: 1 above, -1 below.
@@ -74,7 +75,8 @@ LANE_LEAF vec power_of(int power, const vec *u, const vec *square, vec *cube, in
 }
 
 // Expands the contacts of the lanes from where they are.
-LANE_DEVICE inline void expand_contact(const lane_machine &m, const lane_group &g, contact_expansion &p) {
+LANE_DEVICE inline void expand_contact(const lane_machine &m, const lane_group &g, const table_piece *pieces,
+                                       contact_expansion &p) {
   LANE_COUNT(evaluations, vec_size);
   const lane_contact &c = m.contact;
   const vec side = side_of(g), damping = damping_of(m, g);
@@ -82,6 +84,7 @@ LANE_DEVICE inline void expand_contact(const lane_machine &m, const lane_group &
   vec rate[order], path[order], square[order], cube[order], force[order], w[order], all_forces[order];
   foot_series foot;
   force_series others;
+  others.pieces = pieces;
   foot.start(m, g.time);
   vec depth = side * (g.x - surface_of(m, g));
   put(depth, depth < 0.0, vec{});
@@ -111,6 +114,10 @@ LANE_DEVICE inline void expand_contact(const lane_machine &m, const lane_group &
   }
   p.u[order] = (1.0 / order) * side * p.v[order - 1];
   p.time[order] = (2.0 / order) * p.u[order - 1];
+  if (m.law.has_tables > 0) {
+    p.x[order - 1] = side * square_of(p.u, order - 1);
+    others.keep(p.x, p.stretch, p.factor);
+  }
 }
 
 // Length of a step over which the terms shrink by exp(-shrinking) from one to the next, compared with the
@@ -224,18 +231,18 @@ LANE_DEVICE inline mask pushes(const lane_machine &m, mask asked, const contact_
 
 // What follows the steps `due` that end with an event, or go on. Returns the lanes that the scalar code must
 // look at.
-LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const contact_stride &t, mask due,
-                                            lane_group &g) {
+LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const table_piece *pieces,
+                                            const contact_stride &t, mask due, lane_group &g) {
   const vec side = side_of(g), surface = surface_of(m, g);
   vec u, f1, f2, w, slope;
   value_at<order>(t.u, t.end, u, f1, f2);
   value_at<order - 1>(t.fall, t.end, w, slope, f2);
   vec x = surface + side * (u * u), v = g.direction * w;
   put(x, t.leaves, surface);
-  vec a = slope / (2.0 * u * t.length), factor = 1.0 + m.friction_slope * x;
-  vec push = -a - m.law.rest_friction * factor;
-  mask rare = due & ((t.turns & ~(push > m.break_away * factor)) | (magnitude(x) >= m.domain) |
-                     (factor <= 0.0) | (t.leaves & (w <= 0.0)));
+  vec a = g.direction * slope / (2.0 * u * t.length);
+  turning_forces at_turn = forces_at_turn(m, pieces, x, a, g.direction);
+  mask rare = due & ((t.turns & ~(at_turn.push > at_turn.holds)) | (magnitude(x) >= m.domain) |
+                     (at_turn.factor <= 0.0) | (t.leaves & (w <= 0.0)));
   due = due & ~rare;
   mask turns = due & t.turns, leaves = due & t.leaves;
   LANE_COUNT(events, count(turns | leaves));
@@ -258,7 +265,10 @@ LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const contact
 // code must look at.
 LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left, lane_group &g) {
   contact_expansion p;
-  expand_contact(m, g, p);
+  table_piece pieces[tables];
+  if (m.law.has_tables > 0)
+    find_pieces(m, g, pieces);
+  expand_contact(m, g, pieces, p);
   vec natural = contact_length(m, g, p), room = speed_room<false>(m.law, g, pressed);
   const bool fades = any(pressed & (room < 1e299));
   if (fades) {
@@ -266,8 +276,11 @@ LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit
     put(natural, within < natural, within);
   }
   vec length = pick(limit < natural, limit, natural);
+  mask kept = ~mask{};
+  if (m.law.has_tables > 0)
+    kept = keep_in_pieces(m, g, pieces, p, pressed, length);
   contact_stride t = look_along_contact(m, p, pressed, length, g);
-  mask pulls, proven = pressed & ~t.lost & positive_until(t.fall, pressed, t.end) &
+  mask pulls, proven = pressed & kept & ~t.lost & positive_until(t.fall, pressed, t.end) &
                        pushes(m, pressed & ~t.lost, t, g, pulls);
   if (fades)
     proven = proven & keeps_within(t.fall, t.end, room_pressed * room);
@@ -276,7 +289,7 @@ LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit
   // Where its law comes to pull, the contact has no force: a kink.
   mask lost = pressed & (idle | pulls | (~proven & ~(length > shortest_share * natural)));
   proven = proven & ~lost;
-  lost = lost | (proven & take_contact_events(m, t, proven, g)) | (pressed & (g.flights >= g.budget));
+  lost = lost | (proven & take_contact_events(m, pieces, t, proven, g)) | (pressed & (g.flights >= g.budget));
   put(limit, pressed, pick(proven, vec(1e300), 0.5 * length));
   left = left | lost;
   return proven & ~lost & t.stops;

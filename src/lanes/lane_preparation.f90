@@ -4,14 +4,14 @@
 !> A machine made ready to fly in lanes: in closed form, or in series.
 module lane_preparation
   use contact_law, only: contact_hunt_crossley, contact_kelvin_voigt
-  use curve_law, only: continued_at, curve_t, pieces_of
+  use curve_law, only: continued_at, curve_t, piece_limits, pieces_of
   use effect_law, only: constant_force, effects_t
   use elementary, only: exponential, logarithm
   use exact_flow, only: largest_damping_ratio
   use kinds, only: wp
   use lane_curve, only: restitution_curve_of
   use lane_types, only: contact_series_t, factor_over_place, lane_flow_t, law_t, layer_nodes, machine_t, mode_t, most_harmonics, &
-    over_place, over_speed, over_speed_downwards, over_stretch, table_t
+    over_place, over_play, over_speed, over_speed_downwards, over_stretch, table_t
   use layer_transit, only: gauss
   use motion, only: motion_t
   use motion_state, only: flight_adaptive
@@ -37,10 +37,6 @@ module lane_preparation
   !> A layer is thin if its edge is below this share of the speeds that the drive gives: only what is faster flies in lanes
   !> then. A thicker one is no layer but friction that depends on the speed, for series.
   real(wp), parameter :: thickest = 0.25_wp
-
-  !> A piece of a table reaches beyond its knots by this share of its width: of the second derivative that changes there the
-  !> square of that remains.
-  real(wp), parameter :: overlap = 1e-6_wp
 
 contains
 
@@ -145,7 +141,7 @@ contains
         law%friction%layer_speed <= 0 .and. size(law%drive%cosine) <= most_harmonics
       linear = linear .and. .not. any(abs([effects%quadratic_drag, effects%cubic_damping, effects%cubic, &
                                            effects%dahl_stiffness]) > 0)
-      linear = linear .and. .not. (effects%by_table .or. effects%play > 0)
+      linear = linear .and. .not. effects%by_table
       linear = linear .and. .not. (abs(effects%friction_slope) > 0 .and. abs(effects%asymmetric_coulomb) > 0)
     end associate
   end function has_linear_modes
@@ -252,7 +248,7 @@ contains
   end subroutine set_layer
 
   !> What has a series: every spring and friction but exponents of a Stribeck law other than 1 and 2, barriers that are rigid or
-  !> whose contacts have one, which those of a machine with tables have not. Lanes know no coordinate on a circle.
+  !> whose contacts have one. Lanes know no coordinate on a circle.
   pure subroutine prepare_series(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
@@ -262,7 +258,6 @@ contains
       if (friction%second_excess > 0) flow%available = flow%available .and. has_series(friction%second_exponent)
       if (effects%dahl_stiffness > 0) flow%available = flow%available .and. &
         effects%dahl_sliding > 2*abs(effects%asymmetric_coulomb)
-      if (law%contact%soft) flow%available = flow%available .and. .not. effects%by_table
       if (law%contact%soft) call set_contact(law, flow%machine%contact, flow%available)
       if (.not. flow%available) return
       call set_common(moving, flow)
@@ -314,10 +309,6 @@ contains
       length = 1
       if (law%restoring%stiffness > 0) length = law%force_scale/law%restoring%stiffness
       if (length > 0) l%log_scale = logarithm(length)
-      l%log_speed = l%log_scale + logarithm(law%drive_frequency)
-      l%half_play = effects%play/2
-      l%corner = effects%corner**2
-      l%series_stiffness = effects%series_stiffness/law%mass
       if (effects%by_table) call set_tables(effects, l)
     end associate
   end subroutine set_law
@@ -330,6 +321,7 @@ contains
     law%table(over_stretch) = table_of(effects%spring, law%inverse_mass)
     law%table(over_place) = table_of(effects%force, law%inverse_mass)
     law%table(factor_over_place) = table_of(effects%over_place, 1.0_wp)
+    law%table(over_play) = table_of(effects%play, effects%series_stiffness*law%inverse_mass)
     law%table(over_speed) = table_of(effects%upwards, law%inverse_mass)
     law%table(over_speed_downwards) = table_of(effects%downwards, law%inverse_mass)
     law%change_at_rest = law%inverse_mass*[continued_at(effects%upwards, 0.0_wp), continued_at(effects%downwards, 0.0_wp)]
@@ -339,20 +331,19 @@ contains
   pure type(table_t) function table_of(curve, factor) result(table)
     type(curve_t), intent(in) :: curve
     real(wp), intent(in) :: factor
-    real(wp) :: beyond(curve%count)
-    integer :: last
+    real(wp) :: limits(2)
+    integer :: last, i
     last = curve%count
     if (last == 0) return
     table%knots = last
     table%from(0) = curve%at(1)
     table%from(1:last) = curve%at(:last)
     table%c(:, :last) = factor*pieces_of(curve)
-    beyond(1) = overlap*(curve%at(2) - curve%at(1))
-    beyond(2:) = overlap*(curve%at(2:last) - curve%at(:last - 1))
-    table%low(0) = -huge(1.0_wp)
-    table%low(1:last) = curve%at(:last) - beyond
-    table%high(:last - 1) = curve%at(:last) + beyond
-    table%high(last) = huge(1.0_wp)
+    do i = 0, last
+      limits = piece_limits(curve, i)
+      table%low(i) = limits(1)
+      table%high(i) = limits(2)
+    end do
   end function table_of
 
   !> A soft barrier whose contacts have a series in the root of the penetration: p^n with a whole 2n, a linear one that may pull.

@@ -115,29 +115,14 @@ LANE_DEVICE inline vec next_excess(const lane_law &l, int i, mask within, vec d,
 struct table_series {
   vec u[order], square[order];
 
-  // Coefficient k, from that of the variable.
-  LANE_LEAF vec next(const table_piece &piece, vec variable, int k) {
+  // Coefficient k, from that of the variable. Pieces are cubic, or parabolas.
+  template <int degree> LANE_LEAF vec next(const table_piece &piece, vec variable, int k) {
     u[k] = k == 0 ? variable - piece.from : variable;
     square[k] = square_of(u, k);
-    vec sum = piece.c[1] * u[k] + piece.c[2] * square[k] + piece.c[3] * product(square, u, k);
+    vec sum = piece.c[1] * u[k] + piece.c[2] * square[k];
+    if constexpr (degree > 2)
+      sum += piece.c[3] * product(square, u, k);
     return k == 0 ? piece.c[0] + sum : sum;
-  }
-};
-
-// Distance from a corner of a free play at -`corner`, at least its radius, as a series.
-struct corner_series {
-  vec value[order];
-
-  // Coefficient k, from those of the stretch and of its square.
-  LANE_LEAF vec next(const lane_law &l, double corner, const vec *stretch, const vec *square, int k) {
-    vec under = square[k] + (2 * corner) * stretch[k];
-    if (k == 0)
-      value[0] = square_root(under + (corner * corner + l.corner));
-    else {
-      value[k] = {};
-      value[k] = (under - square_of(value, k)) / (2.0 * value[0]);
-    }
-    return value[k];
   }
 };
 
@@ -146,7 +131,6 @@ struct force_series {
   vec stretch[order], square[order], turn[order], sine[order], cosine[order], dry[order], behind[order],
       factor[order], speed_square[order];
   excess_series excess[2];
-  corner_series corner[2];
   table_series table[tables];
   const table_piece *pieces = nullptr;
 
@@ -170,19 +154,18 @@ struct force_series {
       }
       a += l.pendulum * sine[k];
     }
-    if (l.cubic != 0 || l.series_stiffness != 0)
+    if (l.cubic != 0) {
       square[k] = square_of(stretch, k);
-    if (l.cubic != 0)
       a += l.cubic * product(square, stretch, k);
-    if (l.series_stiffness != 0)
-      a -= (0.5 * l.series_stiffness) * (corner[0].next(l, l.half_play, stretch, square, k) -
-                                         corner[1].next(l, -l.half_play, stretch, square, k));
+    }
     if (l.table[over_stretch].knots > 0)
-      a += table[over_stretch].next(pieces[over_stretch], stretch[k], k);
+      a += table[over_stretch].next<3>(pieces[over_stretch], stretch[k], k);
+    if (l.table[over_play].knots > 0)
+      a += table[over_play].next<2>(pieces[over_play], stretch[k], k);
     if (l.table[over_place].knots > 0)
-      a += table[over_place].next(pieces[over_place], x[k], k);
+      a += table[over_place].next<3>(pieces[over_place], x[k], k);
     if (l.table[over_speed].knots > 0)
-      a -= d * table[over_speed].next(pieces[over_speed], d * v[k], k);
+      a -= d * table[over_speed].next<3>(pieces[over_speed], d * v[k], k);
     if (l.quadratic != 0 || l.cubic_damping != 0)
       speed_square[k] = square_of(v, k);
     if (l.quadratic != 0)
@@ -209,10 +192,20 @@ struct force_series {
       a += l.offset;
     }
     if (l.table[factor_over_place].knots > 0)
-      factor[k] += table[factor_over_place].next(pieces[factor_over_place], x[k], k);
+      factor[k] += table[factor_over_place].next<3>(pieces[factor_over_place], x[k], k);
     else if (!(m.friction_slope != 0))
       return a - dry[k];
     return a - product(factor, dry, k);
+  }
+
+  // Stretch and factor of dry friction where `x` has one coefficient more than they have.
+  LANE_DEVICE inline void keep(const vec *x, vec *all_stretch, vec *all_factor) const {
+    for (int k = 0; k < order - 1; k++) {
+      all_stretch[k] = stretch[k];
+      all_factor[k] = factor[k];
+    }
+    all_stretch[order - 1] = -x[order - 1];
+    all_factor[order - 1] = {};
   }
 };
 
@@ -231,16 +224,8 @@ LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, const
     p.x[k + 1] = (1.0 / (k + 1)) * p.v[k];
   }
   p.x[order] = (1.0 / order) * p.v[order - 1];
-  if (m.law.table[over_stretch].knots > 0) {
-    for (int k = 0; k < order - 1; k++)
-      p.stretch[k] = forces.stretch[k];
-    p.stretch[order - 1] = -p.x[order - 1];
-  }
-  if (m.law.table[factor_over_place].knots > 0) {
-    for (int k = 0; k < order - 1; k++)
-      p.factor[k] = forces.factor[k];
-    p.factor[order - 1] = {};
-  }
+  if (m.law.has_tables > 0)
+    forces.keep(p.x, p.stretch, p.factor);
 }
 
 // Length of a step over which the terms shrink so. The last few are asked, as one may happen to be small.
@@ -249,12 +234,6 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
   vec least = 1e300;
   for (int k = order - 3; k <= order; k++) {
     vec length = (1.0 / k) * (m.law.log_scale - logarithm(magnitude(p.x[k]) + smallest));
-    put(least, length < least, length);
-    if (m.law.series_stiffness == 0)
-      continue;
-    // Beside a corner of a free play steps are so short that the speed is what rounding shows in first.
-    length =
-        (1.0 / (k - 1)) * (m.law.log_speed - logarithm(double(k) * magnitude(p.x[k]) + smallest) - shrinking);
     put(least, length < least, length);
   }
   return exponential(least - shrinking);
@@ -425,6 +404,30 @@ LANE_DEVICE inline vec value_in(const table_piece &piece, vec x) {
   return piece.c[0] + u * (piece.c[1] + u * (piece.c[2] + u * piece.c[3]));
 }
 
+// What decides at a turning point at `x` with the acceleration `a` before it whether the body goes on: the
+// factor of dry friction there, the force that would turn it round, and that which holds it, per mass.
+struct turning_forces {
+  vec factor, push, holds;
+};
+
+LANE_DEVICE inline turning_forces forces_at_turn(const lane_machine &m, const table_piece *pieces, vec x,
+                                                 vec a, vec direction) {
+  turning_forces t;
+  t.factor = 1.0 + m.friction_slope * x;
+  if (m.law.table[factor_over_place].knots > 0)
+    t.factor += value_in(pieces[factor_over_place], x);
+  t.push = -direction * a - m.law.rest_friction * t.factor;
+  t.holds = m.break_away * t.factor;
+  if (m.law.table[over_speed].knots > 0) {
+    mask upward = direction > 0.0;
+    t.push -= pick(upward, vec(m.law.change_at_rest[0]), vec(m.law.change_at_rest[1]));
+    t.holds += pick(upward, vec(m.law.change_at_rest[1]), vec(m.law.change_at_rest[0]));
+    // Friction that is nothing at rest is left to the scalar code.
+    put(t.holds, t.holds - direction * m.law.asymmetric * t.factor <= 0.0, 1e300);
+  }
+  return t;
+}
+
 // What follows the steps `due`. Returns the lanes that the scalar code must look at.
 LANE_DEVICE inline mask take_series_events(const lane_machine &m, const table_piece *pieces,
                                            const stride_of_lanes &t, mask due, vec barrier, lane_group &g) {
@@ -434,23 +437,14 @@ LANE_DEVICE inline mask take_series_events(const lane_machine &m, const table_pi
   vec per_time = 1.0 / t.length, v = scaled_v * per_time, a = scaled_a * (per_time * per_time);
   vec w = g.direction * v, gap = g.direction * (barrier - x);
   put(v, t.slows, g.direction * m.law.edge);
-  vec factor = 1.0 + m.friction_slope * x;
-  if (m.law.table[factor_over_place].knots > 0)
-    factor += value_in(pieces[factor_over_place], x);
-  vec push = -g.direction * a - m.law.rest_friction * factor, holds = m.break_away * factor;
-  if (m.law.table[over_speed].knots > 0) {
-    mask upward = g.direction > 0.0;
-    push -= pick(upward, vec(m.law.change_at_rest[0]), vec(m.law.change_at_rest[1]));
-    holds += pick(upward, vec(m.law.change_at_rest[1]), vec(m.law.change_at_rest[0]));
-    // Friction that is nothing at rest is left to the scalar code.
-    put(holds, holds - g.direction * m.law.asymmetric * factor <= 0.0, 1e300);
-  }
+  turning_forces at_turn = forces_at_turn(m, pieces, x, a, g.direction);
   vec restitution = m.restitution;
   if (any(due & t.hits))
     restitution = restitution_at(m, w);
   mask slow = soft ? w <= 0.0 : restitution * w <= m.slow;
-  mask rare = due & ((t.turns & (push <= holds)) | (t.hits & slow) | (magnitude(x) >= m.domain) |
-                     (factor <= 0.0) | (1.0 + m.friction_slope * g.x <= 0.0));
+  mask rare =
+      due & ((t.turns & (at_turn.push <= at_turn.holds)) | (t.hits & slow) | (magnitude(x) >= m.domain) |
+             (at_turn.factor <= 0.0) | (1.0 + m.friction_slope * g.x <= 0.0));
   due = due & ~rare;
   mask turns = due & t.turns, hits = due & t.hits, events = turns | hits;
   LANE_COUNT(events, count(events));

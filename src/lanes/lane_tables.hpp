@@ -27,9 +27,13 @@ LANE_DEVICE inline void find_piece(const lane_table &t, mask asked, vec u, table
 LANE_DEVICE inline void find_pieces(const lane_machine &m, const lane_group &g, table_piece *pieces) {
   vec foot, speed = g.direction * g.v;
   mask upward = g.direction > 0.0;
-  if (m.law.table[over_stretch].knots > 0) {
+  if (m.law.table[over_stretch].knots > 0 || m.law.table[over_play].knots > 0) {
     expand_foot(m, g.time, 1, &foot);
-    find_piece(m.law.table[over_stretch], ~mask{}, foot - g.x + m.law.length, pieces[over_stretch]);
+    vec stretch = foot - g.x + m.law.length;
+    if (m.law.table[over_stretch].knots > 0)
+      find_piece(m.law.table[over_stretch], ~mask{}, stretch, pieces[over_stretch]);
+    if (m.law.table[over_play].knots > 0)
+      find_piece(m.law.table[over_play], ~mask{}, stretch, pieces[over_play]);
   }
   if (m.law.table[over_place].knots > 0)
     find_piece(m.law.table[over_place], ~mask{}, g.x, pieces[over_place]);
@@ -41,8 +45,8 @@ LANE_DEVICE inline void find_pieces(const lane_machine &m, const lane_group &g, 
   }
 }
 
-// Shortens the steps of the lanes `asked` to where a polynomial in the time, at `c`, leaves its piece.
-// Returns the lanes for which it is proven that it does not do so before.
+// Shortens the steps of the lanes `asked` to where a polynomial in the variable of the series leaves its
+// piece. Returns the lanes for which it is proven that it does not do so before.
 LANE_DEVICE inline mask keep_in_piece(const vec *c, const table_piece &piece, mask asked, vec &length) {
   vec scaled[order], power = length, reach = {}, last = c[0];
   scaled[0] = c[0];
@@ -77,11 +81,14 @@ LANE_DEVICE inline mask keep_in_piece(const vec *c, const table_piece &piece, ma
 
 // The same for every table: the steps `length` end where the first piece is left. Returns the lanes that are
 // proven to keep within their pieces until then, with dry friction above zero.
+template <class series>
 LANE_DEVICE inline mask keep_in_pieces(const lane_machine &m, const lane_group &g, const table_piece *pieces,
-                                       const expansion &p, mask asked, vec &length) {
+                                       const series &p, mask asked, vec &length) {
   mask kept = ~mask{};
   if (m.law.table[over_stretch].knots > 0)
     kept = kept & keep_in_piece(p.stretch, pieces[over_stretch], asked, length);
+  if (m.law.table[over_play].knots > 0)
+    kept = kept & keep_in_piece(p.stretch, pieces[over_play], asked, length);
   if (m.law.table[over_place].knots > 0)
     kept = kept & keep_in_piece(p.x, pieces[over_place], asked, length);
   if (m.law.table[factor_over_place].knots > 0) {

@@ -36,9 +36,9 @@ module lane_types
   end type mode_t
 
   !> Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction over the speed
-  !> upwards and downwards.
+  !> upwards and downwards, free play over the stretch.
   integer, parameter, public :: over_stretch = 1, over_place = 2, factor_over_place = 3, over_speed = 4, over_speed_downwards = 5, &
-    tables = 5
+    over_play = 6, tables = 6
 
   !> Mirrors `lane_table` of lane_types.hpp.
   type, bind(c) :: table_t
@@ -56,7 +56,7 @@ module lane_types
     real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
     real(c_double) :: has_tables = 0
     type(table_t) :: table(tables)
-    real(c_double) :: change_at_rest(2) = 0, half_play = 0, corner = 0, series_stiffness = 0, log_speed = 0
+    real(c_double) :: change_at_rest(2) = 0
   end type law_t
 
   !> Mirrors `lane_contact` of lane_types.hpp.

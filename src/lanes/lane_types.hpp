@@ -15,13 +15,14 @@ enum {
   lane_modes_count = 6,
   most_knots = 16,
   // Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction
-  // over the speed upwards and downwards.
+  // over the speed upwards and downwards, free play over the stretch.
   over_stretch = 0,
   over_place = 1,
   factor_over_place = 2,
   over_speed = 3,
   over_speed_downwards = 4,
-  tables = 5
+  over_play = 5,
+  tables = 6
 };
 
 // A thin Stribeck layer: excess friction per mass E exp(-(w/v_s)^delta) [m/s^2]. No layer: excess 0.
@@ -81,9 +82,6 @@ struct lane_law {
   double has_tables;
   lane_table table[tables];
   double change_at_rest[2];
-  // Free play: half of the play [m], square of the radius of its corners [m^2], stiffness of the spring in
-  // series with it. No play: stiffness 0. Logarithm of the speed to which errors beside it are compared.
-  double half_play, corner, series_stiffness, log_speed;
 };
 
 // A soft barrier whose contacts are expanded in series: stiffness p^n (1 + damping p'), or stiffness p +

@@ -10,7 +10,8 @@ module curve_law
   implicit none
   private
 
-  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, pieces_of, is_positive, knots_problem
+  public :: curve_of, value_at, continued_at, slope_of, integral_of, steepest, most_bent, piece_at, piece_limits, pieces_of, &
+    is_positive, knots_problem
 
   integer, parameter, public :: most_knots = 16
 
@@ -73,33 +74,60 @@ contains
   pure real(wp) function value_at(curve, x) result(value)
     type(curve_t), intent(in) :: curve
     real(wp), intent(in) :: x
-    real(wp) :: width, s, r
-    integer :: i
     value = 0
     if (curve%count == 0) return
     value = curve%value(1)
     if (x <= curve%at(1)) return
     value = curve%value(curve%count)
     if (x >= curve%at(curve%count)) return
-    i = count(curve%at(:curve%count) <= x)
+    value = continued_at(curve, x)
+  end function value_at
+
+  !> Value at `x`; straight on beyond the knots, so that the derivative is continuous everywhere. With `piece` from 0 on that of
+  !> this piece, continued beyond its knots: a function without any kink.
+  pure real(wp) function continued_at(curve, x, piece) result(value)
+    type(curve_t), intent(in) :: curve
+    real(wp), intent(in) :: x
+    integer, intent(in), optional :: piece
+    real(wp) :: width, s, r
+    integer :: i
+    value = 0
+    if (curve%count == 0) return
+    i = -1
+    if (present(piece)) i = piece
+    if (i < 0) i = piece_at(curve, x)
+    if (i == 0 .or. i == curve%count) then
+      i = max(1, i)
+      value = curve%value(i) + curve%slope(i)*(x - curve%at(i))
+      return
+    end if
     width = curve%at(i + 1) - curve%at(i)
     s = (x - curve%at(i))/width
     r = 1 - s
     value = curve%value(i)*r*r*(1 + 2*s) + curve%value(i + 1)*s*s*(3 - 2*s) + &
             width*s*r*(curve%slope(i)*r - curve%slope(i + 1)*s)
-  end function value_at
+  end function continued_at
 
-  !> Value at `x`; straight on beyond the knots, so that the derivative is continuous everywhere.
-  pure real(wp) function continued_at(curve, x) result(value)
+  !> The piece that `x` is in: 0 before the first knot, to `count` from the last on.
+  pure integer function piece_at(curve, x) result(piece)
     type(curve_t), intent(in) :: curve
     real(wp), intent(in) :: x
-    value = value_at(curve, x)
-    if (curve%count == 0) return
-    associate (last => curve%count)
-      if (x < curve%at(1)) value = value + curve%slope(1)*(x - curve%at(1))
-      if (x > curve%at(last)) value = value + curve%slope(last)*(x - curve%at(last))
+    piece = count(curve%at(:curve%count) <= x)
+  end function piece_at
+
+  !> Where a motion that is in a piece leaves it, downwards and upwards: beyond its knots by a small share of its width, so that
+  !> it begins the next piece inside; of the second derivative that changes there the square of that share remains.
+  pure function piece_limits(curve, piece) result(limits)
+    type(curve_t), intent(in) :: curve
+    integer, intent(in) :: piece
+    real(wp) :: limits(2)
+    real(wp), parameter :: overlap = 1e-6_wp
+    limits = [-1, 1]*huge(1.0_wp)
+    associate (at => curve%at, last => curve%count)
+      if (piece > 0) limits(1) = at(piece) - overlap*(at(max(2, piece)) - at(max(2, piece) - 1))
+      if (piece < last) limits(2) = at(piece + 1) + overlap*(at(max(2, piece + 1)) - at(max(2, piece + 1) - 1))
     end associate
-  end function continued_at
+  end function piece_limits
 
   !> Derivative at `x` of the curve that goes straight on beyond the knots.
   pure real(wp) function slope_of(curve, x) result(slope)

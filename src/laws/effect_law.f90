@@ -4,14 +4,14 @@
 !> Effects added to a machine that are not one of its own laws with other numbers, and what a sensor shows. While
 !> sliding in direction s = +1 or -1 at the position x, the spring stretched by l, they add the force
 !>   F - c s v^2 - c3 v^3 - b s v + k3 l^3 + q(l) + r(x) - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
-!> K + E being the dry friction of the machine, g_+, g_-, p, q and r functions given by tables. Free play in series with
-!> the linear spring k l makes its force k d, with d = l - (sqrt((l + g/2)^2 + e^2) - sqrt((l - g/2)^2 + e^2))/2: nothing within
-!> the play g and l -+ g/2 beyond it, with corners of the width e. Dahl's friction -h z takes the
+!> K + E being the dry friction of the machine, g_+, g_-, p, q and r functions given by tables. Free play g in series with
+!> the linear spring k l makes its force k d(l): nothing within the play and l -+ g/2 beyond it, with corners that parabolas
+!> round within e of them. Dahl's friction -h z takes the
 !> place of all dry friction. As the velocity keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
 !>   z = s K + (z_0 - s K) exp(-sigma s (x - x_0)/K),  K the level in that direction.
 module effect_law
   use curve_law, only: continued_at, curve_of, curve_t, integral_of, most_bent, slope_of, steepest
-  use elementary, only: exponential, logarithm
+  use elementary, only: exponential
   use friction_law, only: friction_t, stribeck_excess
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
@@ -48,13 +48,16 @@ module effect_law
     type(curve_t) :: upwards, downwards, over_place
     !> q [N] over the stretch [m], r [N] over the place [m].
     type(curve_t) :: spring, force
-    !> Free play: g [m], 0 = none, e [m], and k [N/m] of the spring in series with it.
-    real(wp) :: play = 0, corner = 0, series_stiffness = 0
+    !> Free play: d(l) - l [m] over the stretch, without knots where there is none, and k [N/m] of the spring in series with it.
+    type(curve_t) :: play
+    real(wp) :: series_stiffness = 0
   end type effects_t
 
-  !> A slip: its direction, and where it began with which z [N].
+  !> A slip: its direction, and where it began with which z [N]. The pieces of the tables that it keeps to, -1 = those that it
+  !> happens to be in.
   type, public :: slip_memory_t
     real(wp) :: direction = 1, x = 0, z = 0
+    integer :: in_spring = -1, in_play = -1, in_force = -1, in_place = -1, in_speed = -1
   end type slip_memory_t
 
   !> What is recorded at t: (1 + gain) x(t - delay) + bias.
@@ -98,8 +101,7 @@ contains
       if (.not. any(abs(list_of(choice, 'force')) > 0)) return
       effects%force = curve_of(list_of(choice, 'place'), list_of(choice, 'force'))
     case ('backlash')
-      effects%play = value_of(choice, 'gap')
-      effects%corner = value_of(choice, 'rounding')*effects%play
+      if (value_of(choice, 'gap') > 0) effects%play = play_of(value_of(choice, 'gap'), value_of(choice, 'rounding'))
     case default
       return
     end select
@@ -133,18 +135,19 @@ contains
   pure subroutine slip_in_series(effects, stiffness)
     type(effects_t), intent(inout) :: effects
     real(wp), intent(in) :: stiffness
-    if (effects%play > 0) effects%series_stiffness = stiffness
+    if (effects%play%count > 0) effects%series_stiffness = stiffness
   end subroutine slip_in_series
 
   !> What the effects together mean for those who fly, vary or prepare a machine.
   pure subroutine finish_effects(effects)
     type(effects_t), intent(inout) :: effects
-    effects%by_position = effects%play > 0 .or. effects%spring%count > 0 .or. effects%force%count > 0
+    effects%by_position = effects%play%count > 0 .or. effects%spring%count > 0 .or. effects%force%count > 0
     effects%by_place = effects%by_position .or. any(abs([effects%cubic, effects%friction_slope]) > 0) .or. &
                        effects%over_place%count > 0
     effects%dry = abs(effects%asymmetric_coulomb) > 0 .or. effects%upwards%count > 0
     effects%turns_round = effects%dry .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous]) > 0)
-    effects%by_table = any([effects%upwards%count, effects%over_place%count, effects%spring%count, effects%force%count] > 0)
+    effects%by_table = any([effects%upwards%count, effects%over_place%count, effects%spring%count, effects%play%count, &
+                            effects%force%count] > 0)
     effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_place .or. effects%by_table .or. effects%unknown_to_lanes .or. &
                         any(abs([effects%quadratic_drag, effects%cubic_damping, effects%asymmetric_viscous]) > 0)
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
@@ -160,17 +163,19 @@ contains
     real(wp) :: factor
     force = effects%offset - slip%direction*(effects%quadratic_drag*v + effects%asymmetric_viscous)*v + effects%cubic*stretch**3
     if (effects%dahl_stiffness > 0) then
-      force = force - friction_factor(effects, x)*dahl_force(effects, slip, x)
+      force = force - friction_factor(effects, x, slip%in_place)*dahl_force(effects, slip, x)
     else if (abs(effects%friction_slope) > 0 .or. effects%over_place%count > 0) then
-      factor = friction_factor(effects, x)
+      factor = friction_factor(effects, x, slip%in_place)
       force = force - slip%direction*(factor - 1)*(friction%kinetic + stribeck_excess(friction, slip%direction*v)) &
               - factor*effects%asymmetric_coulomb
     else
       force = force - effects%asymmetric_coulomb
     end if
-    if (effects%upwards%count > 0) force = force - slip%direction*friction_change(effects, slip%direction, slip%direction*v)
+    if (effects%upwards%count > 0) force = force - slip%direction* &
+      friction_change(effects, slip%direction, slip%direction*v, slip%in_speed)
     if (effects%cubic_damping > 0) force = force - effects%cubic_damping*v**3
-    if (effects%by_position) force = force + play_and_table(effects, stretch) + place_force(effects, x)
+    if (effects%by_position) force = force + play_and_table(effects, stretch, slip%in_spring, slip%in_play) &
+                                     + continued_at(effects%force, x, slip%in_force)
   end function effect_force
 
   !> Bound [N] on the change of the forces over a bounce of a given `speed` [m/s] and `height` [m] from a place where Dahl's
@@ -198,42 +203,42 @@ contains
     if (effects%by_position) force = force + play_and_table(effects, stretch)
   end function stretch_force
 
-  pure real(wp) function play_and_table(effects, stretch) result(force)
+  pure real(wp) function play_and_table(effects, stretch, in_spring, in_play) result(force)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: stretch
-    force = continued_at(effects%spring, stretch)
-    if (effects%play > 0) force = force - effects%series_stiffness*(corner_distance(effects, stretch, 1) &
-                                                                    - corner_distance(effects, stretch, -1))/2
+    integer, intent(in), optional :: in_spring, in_play
+    force = continued_at(effects%spring, stretch, in_spring) &
+            + effects%series_stiffness*continued_at(effects%play, stretch, in_play)
   end function play_and_table
 
-  !> Distance [m] from the corner of the play on `side` +1 (at -g/2) or -1, at least e.
-  pure real(wp) function corner_distance(effects, stretch, side) result(distance)
-    type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: stretch
-    integer, intent(in) :: side
-    distance = sqrt((stretch + side*effects%play/2)**2 + effects%corner**2)
-  end function corner_distance
+  !> d(l) - l [m] over the stretch l for a play of `gap` [m] whose corners are rounded within `rounding` times that: with the
+  !> slope 0 beyond the play and -1 within, a cubic between is a parabola.
+  pure type(curve_t) function play_of(gap, rounding) result(play)
+    real(wp), intent(in) :: gap, rounding
+    real(wp) :: inner, outer
+    inner = (0.5_wp - rounding)*gap
+    outer = (0.5_wp + rounding)*gap
+    play%count = 4
+    play%at(:4) = [-outer, -inner, inner, outer]
+    play%value(:4) = [gap/2, inner, -inner, -gap/2]
+    play%slope(:4) = [0, -1, -1, 0]
+  end function play_of
 
   !> Derivative of `stretch_force` by the stretch [N/m].
   pure real(wp) function stretch_slope(effects, stretch) result(slope)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: stretch
-    integer :: side
     slope = 3*effects%cubic*stretch**2
     if (.not. effects%by_position) return
-    slope = slope + slope_of(effects%spring, stretch)
-    if (.not. effects%play > 0) return
-    do side = -1, 1, 2
-      slope = slope - effects%series_stiffness*side*(stretch + side*effects%play/2)/(2*corner_distance(effects, stretch, side))
-    end do
+    slope = slope + slope_of(effects%spring, stretch) + effects%series_stiffness*slope_of(effects%play, stretch)
   end function stretch_slope
 
   !> Bounds on the first [N/m] and second [N/m^2] derivative of the table over the stretch and of the play.
   pure function stretch_bounds(effects) result(bounds)
     type(effects_t), intent(in) :: effects
     real(wp) :: bounds(2)
-    bounds = [steepest(effects%spring), most_bent(effects%spring)]
-    if (effects%play > 0) bounds = bounds + effects%series_stiffness*[1.0_wp, 1/effects%corner]
+    bounds = [steepest(effects%spring), most_bent(effects%spring)] &
+             + effects%series_stiffness*[steepest(effects%play), most_bent(effects%play)]
   end function stretch_bounds
 
   !> r [N], a force over the place `x` [m].
@@ -249,21 +254,9 @@ contains
     real(wp), intent(in) :: x, stretch
     energy = effects%cubic*stretch**4/4 - effects%offset*x
     if (.not. effects%by_position) return
-    energy = energy + integral_of(effects%spring, stretch) - integral_of(effects%force, x)
-    if (effects%play > 0) energy = energy - effects%series_stiffness*(corner_area(effects, stretch, 1) &
-                                                                      - corner_area(effects, stretch, -1))/2
+    energy = energy + integral_of(effects%spring, stretch) + effects%series_stiffness*integral_of(effects%play, stretch) &
+             - integral_of(effects%force, x)
   end function effect_energy
-
-  !> Integral of `corner_distance` over the stretch [m^2]: (u sqrt(u^2 + e^2) + e^2 asinh(u/e))/2, u from the corner on.
-  pure real(wp) function corner_area(effects, stretch, side) result(area)
-    type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: stretch
-    integer, intent(in) :: side
-    real(wp) :: u, distance
-    u = stretch + side*effects%play/2
-    distance = corner_distance(effects, stretch, side)
-    area = (u*distance + effects%corner**2*sign(logarithm((abs(u) + distance)/effects%corner), u))/2
-  end function corner_area
 
   !> Power [W] that dry friction and damping lose to the effects beyond what the law of friction loses without them.
   pure function effect_losses(effects, friction, slip, x, v) result(losses)
@@ -284,24 +277,26 @@ contains
   end function effect_losses
 
   !> h, by which the place `x` [m] changes dry friction.
-  pure elemental real(wp) function friction_factor(effects, x) result(factor)
+  pure elemental real(wp) function friction_factor(effects, x, piece) result(factor)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x
+    integer, intent(in), optional :: piece
     factor = 1 + effects%friction_slope*x
-    if (effects%over_place%count > 0) factor = factor + continued_at(effects%over_place, x)
+    if (effects%over_place%count > 0) factor = factor + continued_at(effects%over_place, x, piece)
     factor = max(0.0_wp, factor)
   end function friction_factor
 
   !> g [N], by which the sliding speed `speed` [m/s] in `direction` +1 or -1 changes friction; smooth continuation below zero.
-  pure real(wp) function friction_change(effects, direction, speed) result(change)
+  pure real(wp) function friction_change(effects, direction, speed, piece) result(change)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: direction, speed
+    integer, intent(in), optional :: piece
     change = 0
     if (effects%upwards%count == 0) return
     if (direction > 0) then
-      change = continued_at(effects%upwards, speed)
+      change = continued_at(effects%upwards, speed, piece)
     else
-      change = continued_at(effects%downwards, speed)
+      change = continued_at(effects%downwards, speed, piece)
     end if
   end function friction_change
 

@@ -183,7 +183,8 @@ contains
                                                  + effects%dahl_sliding + abs(effects%cubic)*length**3 &
                                                  + maxval(abs([effects%upwards%value, effects%downwards%value]))
       if (effects%by_position) machine%force_scale = machine%force_scale + maxval(abs(effects%spring%value)) &
-                                                     + maxval(abs(effects%force%value)) + effects%series_stiffness*effects%play
+                                                     + maxval(abs(effects%force%value)) + &
+                                                     effects%series_stiffness*maxval(abs(effects%play%value))
     end associate
   end subroutine set_bounds
 

@@ -11,13 +11,14 @@ module body_flight
   use exact_flight, only: flight_speed_reached, fly_exact
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: sliding_friction, sliding_slope
-  use guarded_march, only: begin_march, guard_t, march_failed, march_t, march_time_over, system_t, take_step
+  use guarded_march, only: begin_march, guard_t, march_failed, march_t, march_time_over, take_step, watched_system_t
   use kinds, only: wp
   use layer_transit, only: cross_layer
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
   use restoring_law, only: restoring_force, restoring_stiffness
+  use table_pieces, only: enter_pieces, list_ends, most_ends, of_place, of_speed, of_stretch, piece_end_t
   implicit none
   private
 
@@ -30,17 +31,23 @@ module body_flight
   integer, parameter :: most_steps = 100000
   !> After a stop in the layer the law is followed up to this share of Stribeck's velocity.
   real(wp), parameter :: half_way = 0.5_wp
+  !> Guards: the speed rises to where it is to end, the force of a barrier is cut off or comes back; after them the ends of pieces
+  !> of tables. Margins: of the stretch of the spring below a constant, and above it.
+  integer, parameter :: exits = 1, cut_off = 2, most_cuts = cut_off + most_ends, stretch_below = 1, stretch_above = 2
 
   !> Position and velocity, and after them the derivatives of both by the start, column by column.
-  type, extends(system_t) :: slip_t
+  type, extends(watched_system_t) :: slip_t
     type(oscillator_t) :: machine
     !> Steps of the differences of laws.
     real(wp) :: step_of(2) = 1
     integer :: mode = 0
     real(wp) :: start = 0
     logical :: pushing = .true.
+    !> The pieces of the tables that the slip keeps to.
+    type(slip_memory_t) :: pieces
   contains
     procedure :: slope => slope_of_slip
+    procedure :: margin => stretch_margin
   end type slip_t
 
 contains
@@ -225,9 +232,9 @@ contains
     real(wp), intent(inout) :: t, y(2)
     real(wp), intent(inout), optional :: flight(2, 2)
     type(march_t) :: steps
-    type(guard_t) :: cut(2)
+    type(guard_t) :: cut(most_cuts)
     real(wp) :: scale(6), time, span, all(6)
-    integer :: fallen, i, n, mode
+    integer :: fallen, i, n, mode, count_cuts
     span = t1 - t
     if (.not. abs(span) > 0) return
     n = merge(6, 2, present(flight))
@@ -239,26 +246,26 @@ contains
     if (span < 0) system%mode = -mode
     system%pushing = pushes(system%machine, mode, y)
     time = 0
-    fallen = 2
+    fallen = cut_off
     do i = 1, most_steps
       if (fallen > 0) then
-        cut = cuts_of(system%machine, mode, system%pushing, exit)
+        call list_cuts(system, mode, exit, time, all(1:2), cut, count_cuts)
         call begin_march(steps, system, moving%options%tolerance, scale(:n), abs(span), time, all(:n))
       end if
-      call take_step(steps, system, cut, abs(span), fallen)
+      call take_step(steps, system, cut(:count_cuts), abs(span), fallen)
       time = steps%time
       all(:n) = steps%y(:n)
-      if (fallen == march_time_over .or. fallen == march_failed .or. fallen == 1) then
+      if (fallen == march_time_over .or. fallen == march_failed .or. fallen == exits) then
         exit
-      else if (fallen == 2) then
+      else if (fallen == cut_off) then
         system%pushing = .not. system%pushing
       end if
     end do
     t = t1
-    if (fallen == 1) t = t + sign(time, span) - span
+    if (fallen == exits) t = t + sign(time, span) - span
     y = all(1:2)
     if (present(flight)) flight = matmul(reshape(all(3:6), [2, 2]), flight)
-    if (fallen /= march_time_over .and. fallen /= 1) y = huge(1.0_wp)
+    if (fallen /= march_time_over .and. fallen /= exits) y = huge(1.0_wp)
     if (.not. y(1) < huge(1.0_wp)) t = t1
     system%mode = mode
   end subroutine march
@@ -275,27 +282,62 @@ contains
     pushes = sum(contact_margin(machine%contact)*[1.0_wp, side*(y(1) - surface_of(machine, side)), side*y(2)]) >= 0
   end function pushes
 
-  !> The guard at which the speed rises to `exit`, and that at which the force of a soft barrier is cut off or comes back; never,
-  !> where there is none.
-  pure function cuts_of(machine, mode, pushing, exit) result(cut)
-    type(oscillator_t), intent(in) :: machine
+  !> What cuts a march from the state `y` on at `time`; never, where there is no such thing. Keeps the slip to the pieces of the
+  !> tables that it is in there.
+  pure subroutine list_cuts(system, mode, exit, time, y, cut, count_cuts)
+    type(slip_t), intent(inout) :: system
     integer, intent(in) :: mode
-    logical, intent(in) :: pushing
-    real(wp), intent(in) :: exit
-    type(guard_t) :: cut(2)
+    real(wp), intent(in) :: exit, time, y(2)
+    type(guard_t), intent(out) :: cut(most_cuts)
+    integer, intent(out) :: count_cuts
     real(wp) :: margin(3)
     integer :: side
     side = pressed_side(mode)
     cut%constant = 1
+    count_cuts = cut_off
     if (exit < huge(exit)) then
-      cut(1)%constant = exit
-      cut(1)%coefficients(2) = -direction_in(mode)
+      cut(exits)%constant = exit
+      cut(exits)%coefficients(2) = -direction_in(mode)
     end if
-    if (side == 0 .or. machine%contact%tension) return
-    margin = merge(1, -1, pushing)*contact_margin(machine%contact)
-    cut(2)%constant = margin(1) - side*surface_of(machine, side)*margin(2)
-    cut(2)%coefficients(1:2) = side*margin(2:3)
-  end function cuts_of
+    if (side /= 0 .and. .not. system%machine%contact%tension) then
+      margin = merge(1, -1, system%pushing)*contact_margin(system%machine%contact)
+      cut(cut_off)%constant = margin(1) - side*surface_of(system%machine, side)*margin(2)
+      cut(cut_off)%coefficients(1:2) = side*margin(2:3)
+    end if
+    if (system%machine%effects%by_table) call keep_to_pieces(system, direction_in(mode), time, y, cut, count_cuts)
+  end subroutine list_cuts
+
+  pure subroutine keep_to_pieces(system, direction, time, y, cut, count_cuts)
+    type(slip_t), intent(inout) :: system
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: time, y(2)
+    type(guard_t), intent(inout) :: cut(most_cuts)
+    integer, intent(inout) :: count_cuts
+    type(piece_end_t) :: ends(most_ends)
+    integer :: i, count_ends
+    system%pieces%direction = direction
+    call enter_pieces(system%machine%effects, y(1), y(2), stretch_margin(system, stretch_above, time, y), system%pieces)
+    call list_ends(system%machine%effects, system%pieces, ends, count_ends)
+    do i = 1, count_ends
+      associate (guard => cut(count_cuts + i), one => ends(i))
+        guard%constant = one%side*one%limit
+        if (one%variable == of_stretch) guard%margin = merge(stretch_below, stretch_above, one%side > 0)
+        if (one%variable == of_place) guard%coefficients(1) = -one%side
+        if (one%variable == of_speed) guard%coefficients(2) = -one%side*direction
+      end associate
+    end do
+    count_cuts = count_cuts + count_ends
+  end subroutine keep_to_pieces
+
+  !> The stretch [m] of the spring, with the sign that it has in a margin.
+  pure real(wp) function stretch_margin(self, number, time, y)
+    class(slip_t), intent(in) :: self
+    integer, intent(in) :: number
+    real(wp), intent(in) :: time, y(:)
+    real(wp) :: foot
+    call foot_motion(self%machine%drive, self%machine%drive_frequency*sign(1, self%mode)*(self%start + time), foot)
+    stretch_margin = merge(1, -1, number == stretch_above)*(self%machine%restoring%free_length + foot - y(1))
+  end function stretch_margin
 
   pure function slope_of_slip(self, time, y) result(slope)
     class(slip_t), intent(in) :: self
@@ -305,7 +347,7 @@ contains
     way = sign(1, self%mode)
     mode = abs(self%mode)
     t = way*(self%start + time)
-    slope(1:2) = [y(2), slip_acceleration(self%machine, mode, self%pushing, t, y(1), y(2))]
+    slope(1:2) = [y(2), slip_acceleration(self%machine, mode, self%pushing, t, y(1), y(2), self%pieces)]
     if (size(y) > 2) then
       by = acceleration_slopes(self, mode, t, y(1), y(2))
       slope(3:4) = [y(4), sum(by*y(3:4))]
@@ -341,7 +383,7 @@ contains
     !> Acceleration without the barrier, off the state by steps.
     pure real(wp) function free_at(i, k) result(a)
       integer, intent(in) :: i, k
-      a = slip_acceleration(self%machine, mode, .false., t, x + i*self%step_of(1), v + k*self%step_of(2))
+      a = slip_acceleration(self%machine, mode, .false., t, x + i*self%step_of(1), v + k*self%step_of(2), self%pieces)
     end function free_at
 
   end function acceleration_slopes
@@ -352,19 +394,24 @@ contains
     change = (8*(further - back) - (far - far_back))/12
   end function quarter
 
-  !> Acceleration [m/s^2] in a slip; `pushing`: a soft barrier acts.
-  pure real(wp) function slip_acceleration(machine, mode, pushing, t, x, v) result(a)
+  !> Acceleration [m/s^2] in a slip; `pushing`: a soft barrier acts; by these `pieces` of tables, without them by those it is in.
+  pure real(wp) function slip_acceleration(machine, mode, pushing, t, x, v, pieces) result(a)
     type(oscillator_t), intent(in) :: machine
     integer, intent(in) :: mode
     logical, intent(in) :: pushing
     real(wp), intent(in) :: t, x, v
+    type(slip_memory_t), intent(in), optional :: pieces
+    type(slip_memory_t) :: slip
     real(wp) :: foot, stretch, direction
     integer :: side
     direction = direction_in(mode)
+    if (present(pieces)) slip = pieces
+    slip%direction = direction
+    slip%x = x
     call foot_motion(machine%drive, machine%drive_frequency*t, foot)
     stretch = machine%restoring%free_length + foot - x
     a = restoring_force(machine%restoring, stretch) + sliding_friction(machine%friction, v, direction)
-    if (machine%extra) a = a + extra_force(machine, slip_memory_t(direction, x, 0.0_wp), t, x, v, stretch)
+    if (machine%extra) a = a + extra_force(machine, slip, t, x, v, stretch)
     side = pressed_side(mode)
     if (side /= 0 .and. pushing) a = a - side*contact_force(machine%contact, side*(x - surface_of(machine, side)), side*v)
     a = a/machine%mass

@@ -9,6 +9,7 @@ module variations
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use matrices, only: determinant_of
+  use motion_state, only: event_stick
   implicit none
   private
 
@@ -21,6 +22,9 @@ module variations
   real(wp), parameter :: weight_of(4, -1:1) = reshape([-48.0_wp, 36.0_wp, -16.0_wp, 3.0_wp, 1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp, &
     48.0_wp, -36.0_wp, 16.0_wp, -3.0_wp], [4, 3])/12
   real(wp), parameter :: own_weight(-1:1) = [25.0_wp, 0.0_wp, -25.0_wp]/12
+
+  !> Rates of a state that differ by no more, in natural sizes, do so by rounding.
+  real(wp), parameter :: nothing = 1e-11_wp
 
   !> A machine and, for derivatives by a parameter, its four neighbours.
   type, public :: neighbourhood_t
@@ -248,12 +252,30 @@ contains
       end do
       determinant = determinant*determinant_of(saltation)
     end if
+    if (sticks_as_it_was()) then
+      change = matmul(r_y, change)
+      change(:, n + 1) = change(:, n + 1) + by_parameter
+      return
+    end if
     later = -matmul(g_y, change)/rate
     later(n + 1) = later(n + 1) - guard_by_parameter(1)/rate
     do k = 1, size(change, 2)
       change(:, k) = matmul(r_y, change(:, k) + before*later(k)) + (r_t - after)*later(k)
     end do
     change(:, n + 1) = change(:, n + 1) + by_parameter
+
+  contains
+
+    !> Whether the motion before a stick differs from that after it in the speed that is lost alone, so that the instant does not
+    !> matter; where the joint is slowest, rounding over a rate of nothing would be all that is left.
+    pure logical function sticks_as_it_was()
+      real(wp) :: differ(n)
+      sticks_as_it_was = event%kind == event_stick
+      if (.not. sticks_as_it_was) return
+      differ = (matmul(r_y, before) + r_t - after)/machines%centre%size_of
+      sticks_as_it_was = norm2(differ)*machines%centre%size_of_time() <= nothing
+    end function sticks_as_it_was
+
   end subroutine salt
 
   !> Derivative of the period by the parameter.

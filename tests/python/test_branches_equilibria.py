@@ -111,3 +111,20 @@ def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp
         assert [piece.tolist() for piece in drawn.collections[0].get_segments()] == [
             [[value, pytest.approx(0.1)], [value, pytest.approx(0.9)]] for value in (0.475, 0.825)
         ]
+
+
+COMES_TO_REST = """
+body.a.mass = 1
+spring.g = { between = ["a"], stiffness = 1.3, damping = 0.3 }
+watch.body = "a"
+start = { x0 = 1 }
+run = { duration = 300 }
+"""
+
+
+def test_a_motion_that_comes_to_rest_is_said_to(separatrix: Path, tmp_path: Path) -> None:
+    """It has no section any more: its exponents are the eigenvalues of an equilibrium."""
+    (tmp_path / "case.toml").write_text(COMES_TO_REST)
+    said = succeed(separatrix, "stability", "case.toml", folder=tmp_path).out
+    assert "not known: the motion comes to rest: after" in said
+    assert "the eigenvalues of an equilibrium are those that `separatrix branches` gives" in said

@@ -91,6 +91,16 @@ def test_a_share_is_that_of_the_area() -> None:
     assert alone.lower < area / 2.4**2 < alone.upper
 
 
+def test_a_share_without_any_crossed_cell_is_not_beyond_doubt() -> None:
+    """A basin smaller than a cell lies between the points: the interval of its share has a width."""
+    labels, area = ellipse((0.02, 0.02)), np.pi * 0.02**2 / 2.4**2
+    grid, axes = grid_of(labels, WIDE.lower, WIDE.upper, 20)
+    share = areas.global_share(labels, grid, axes, 1, 2000)
+    assert share.value == 0 and share.lower == 0 < area < share.upper < 0.02 and share.drawn
+    other = areas.global_share(labels, grid, axes, 2, 2000)
+    assert other.lower < 1 - area < other.upper == other.value == 1
+
+
 def test_the_interval_of_a_share_holds_what_it_says() -> None:
     labels, area = ellipse((0.7, 0.3)), np.pi * 0.21 / 2.4**2
     inside = 0

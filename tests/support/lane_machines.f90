@@ -115,12 +115,15 @@ contains
       'hunt_crossley stiffness=2e4 damping=0.1 exponent=1', 'flores stiffness=1e6 restitution=0.6', &
       'hunt_crossley stiffness=1e7 damping=0 exponent=2.5', 'kelvin_voigt stiffness=1e4 damping=20 tension=1', &
       'hunt_crossley_exact stiffness=3e3 restitution=0.46']
-    character(len=*), parameter :: effects(0:6) = [character(len=60) :: 'cubic_spring stiffness=20', 'offset_force force=1', &
+    character(len=*), parameter :: effects(0:10) = [character(len=110) :: 'cubic_spring stiffness=20', 'offset_force force=1', &
       'dahl stiffness=300', 'viscous damping=0.3', 'stribeck excess=0.3 velocity=0.1', 'offset_force force=-20', &
-      'stribeck excess=0.3 velocity=0.03 exponent=1']
+      'stribeck excess=0.3 velocity=0.03 exponent=1', 'backlash gap=0.1', &
+      'friction_curve speed=0,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3', &
+      'spring_curve stretch=-1,0,1 force=-5,0,6; effect force_curve place=0,1.09,1.1,1.13 force=0,0,0.5,2', &
+      'friction_place_curve place=0,0.5,1.1,1.14 change=0.3,-0.2,0.4,0']
     laws = laws_from('body point_mass mass=2 gravity=9.81; restoring linear stiffness=88.8 free_length=0.4; contact '// &
       trim(contacts(modulo(i, 6)))//' upper=1.1; friction coulomb kinetic_coefficient=0.1; drive fourier ratio=1 '// &
-      'mean=0.31 cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 7))))
+      'mean=0.31 cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 11))))
     call set_parameter(laws, 'drive.ratio', uniform(0.4_wp, 2.3_wp))
     if (modulo(i, 3) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
     moving = build(laws)

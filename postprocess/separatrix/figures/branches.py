@@ -33,7 +33,8 @@ _MARKS = {
     "homoclinic_contact": ("d", "homoclinic contact"),
     "boundary_crisis": ("p", "boundary crisis"),
     "not_known": ("x", "end not known"),
-    "too_long": ("|", "events too many to go on"),
+    "many_impacts": ("1", "impacts too many to go on"),
+    "too_long": ("|", "points too many to go on"),
 }
 
 # Colour and line of a curve in two parameters.

@@ -27,6 +27,8 @@ class Share:
     upper: float
     starts: int
     not_known: float
+    drawn: bool = False
+    """The interval is that of the points of a grid as if they had been drawn."""
 
 
 def crossed_cells(grid: np.ndarray) -> np.ndarray:
@@ -64,7 +66,8 @@ def global_share(
 
     Cells whose corners are all alike count as their corners. With a labelling function `starts` are drawn in
     the other cells, and the interval is that of Clopper and Pearson times their share; without one it is
-    from none to all of them, and the value counts points.
+    from none to all of them, and the value counts points. Where there are no other cells, parts smaller than
+    a cell may still be missed: the interval is that of the points as if they had been drawn.
     """
     widths = np.ones(())
     for axis in axes:
@@ -76,7 +79,8 @@ def global_share(
     crossed = low != high
     rest = float(widths[crossed].sum())
     if not crossed.any():
-        return Share(whole, whole, whole + unknown, 0, unknown)
+        lowest, highest = share_interval(int(np.sum(grid == own)), grid.size)
+        return Share(whole, min(whole, lowest), min(1.0, highest + unknown), 0, unknown, drawn=True)
     if labels is None or starts == 0:
         value = float(np.mean(grid == own))
         return Share(

@@ -16,8 +16,16 @@ CELLS = (
     "95 %: cells with corners of one label count as that label, new starts in the others "
     "(Clopper and Pearson)"
 )
+DRAWN = "95 %: the points of the map as if they had been drawn, as all have one label (Clopper and Pearson)"
 POINTS = "from none to all of the cells with corners of more than one label"
 RAY = "own starts up to the lower end, a start of another label at the upper end"
+
+
+def basis(share: areas.Share) -> str:
+    """Return what the interval of a share of the window is from."""
+    if share.drawn:
+        return DRAWN
+    return CELLS if share.starts else POINTS
 
 
 def global_integrity(found: Slice, own: int) -> Measure:
@@ -41,7 +49,7 @@ def global_integrity(found: Slice, own: int) -> Measure:
         share.value,
         share.lower,
         share.upper,
-        CELLS if share.starts else POINTS,
+        basis(share),
         {"new_starts": share.starts, "area_of_the_window": f"{volume:.9g} {unit}"},
         tuple(limits),
         {"area": share.value * volume, "share_not_known": share.not_known},

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from separatrix.measuring import areas, balls
-from separatrix.measuring.integrity import CELLS, RAY, ball_at
+from separatrix.measuring.integrity import RAY, ball_at, basis
 from separatrix.measuring.maps import Slice
 from separatrix.measuring.report import Measure
 
@@ -169,7 +169,7 @@ def safe_basin(found: Slice, own: int) -> list[Measure]:
         share.value,
         share.lower,
         share.upper,
-        CELLS,
+        basis(share),
         parameters,
         tuple(limits),
         details,

@@ -1,0 +1,78 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The pieces of its tables that a slip is in, and where it leaves them: a flight that keeps to a piece until there meets no
+!> kink of a table within a step.
+module table_pieces
+  use curve_law, only: curve_t, piece_at, piece_limits
+  use effect_law, only: effects_t, slip_memory_t
+  use kinds, only: wp
+  implicit none
+  private
+
+  public :: enter_pieces, list_ends
+
+  !> Variables of tables: stretch of the spring, place, speed in the direction of the slip.
+  integer, parameter, public :: of_stretch = 1, of_place = 2, of_speed = 3
+  !> Two each of spring, play, force, factor of dry friction, friction.
+  integer, parameter, public :: most_ends = 10
+
+  !> A variable leaves its piece above (side 1) or below (side -1) a limit [m, m/s].
+  type, public :: piece_end_t
+    integer :: variable = 0, side = 0
+    real(wp) :: limit = 0
+  end type piece_end_t
+
+contains
+
+  !> Keeps `slip` to the pieces that it is in at `x` [m], `v` [m/s] and a `stretch` [m] of the spring.
+  pure subroutine enter_pieces(effects, x, v, stretch, slip)
+    type(effects_t), intent(in) :: effects
+    real(wp), intent(in) :: x, v, stretch
+    type(slip_memory_t), intent(inout) :: slip
+    slip%in_spring = piece_at(effects%spring, stretch)
+    slip%in_play = piece_at(effects%play, stretch)
+    slip%in_force = piece_at(effects%force, x)
+    slip%in_place = piece_at(effects%over_place, x)
+    if (slip%direction > 0) then
+      slip%in_speed = piece_at(effects%upwards, v)
+    else
+      slip%in_speed = piece_at(effects%downwards, -v)
+    end if
+  end subroutine enter_pieces
+
+  !> Where a slip that keeps to its pieces leaves them.
+  pure subroutine list_ends(effects, slip, ends, count_ends)
+    type(effects_t), intent(in) :: effects
+    type(slip_memory_t), intent(in) :: slip
+    type(piece_end_t), intent(out) :: ends(most_ends)
+    integer, intent(out) :: count_ends
+    count_ends = 0
+    call add_ends(effects%spring, slip%in_spring, of_stretch, ends, count_ends)
+    call add_ends(effects%play, slip%in_play, of_stretch, ends, count_ends)
+    call add_ends(effects%force, slip%in_force, of_place, ends, count_ends)
+    call add_ends(effects%over_place, slip%in_place, of_place, ends, count_ends)
+    if (slip%direction > 0) then
+      call add_ends(effects%upwards, slip%in_speed, of_speed, ends, count_ends)
+    else
+      call add_ends(effects%downwards, slip%in_speed, of_speed, ends, count_ends)
+    end if
+  end subroutine list_ends
+
+  pure subroutine add_ends(curve, piece, variable, ends, count_ends)
+    type(curve_t), intent(in) :: curve
+    integer, intent(in) :: piece, variable
+    type(piece_end_t), intent(inout) :: ends(most_ends)
+    integer, intent(inout) :: count_ends
+    real(wp) :: limits(2)
+    integer :: i
+    if (curve%count == 0) return
+    limits = piece_limits(curve, piece)
+    do i = 1, 2
+      if (.not. abs(limits(i)) < huge(1.0_wp)) cycle
+      count_ends = count_ends + 1
+      ends(count_ends) = piece_end_t(variable, 2*i - 3, limits(i))
+    end do
+  end subroutine add_ends
+
+end module table_pieces
